@@ -13,6 +13,7 @@ import pytest
 from running import Server, serving
 
 from unitcad.serve.gate import BODY_S, LARGEST_BODY
+from unitcad.serve.keys import Keys
 from unitcad.validation import templates
 
 HOSTS = ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "0.0.0.0", "[::]"]
@@ -92,11 +93,59 @@ def test_hostile_requests_are_many() -> None:
     assert min(map(len, HOSTILE.values())) > 5
 
 
-def test_a_cookie_is_enough_to_read_alone(server: Server, text: str) -> None:
-    """A form of another site could make the browser send it."""
-    cookie = {"X-Unitcad-Token": "", "Cookie": f"unitcad-{server.port}={server.token}"}
+def test_a_cookie_reads_the_page_alone(server: Server, text: str) -> None:
+    """A form of another site could make the browser send it, and a server of another port gets it."""
+    page = server.send("/")
+    kept = page[2]["set-cookie"].partition(";")[0]
+    assert server.token not in str(page)
+    cookie = {"X-Unitcad-Token": "", "Cookie": kept}
     assert server.send("/", headers=cookie)[0] == 200
+    assert server.send("/", headers={**cookie, "Cookie": f"unitcad-{server.port}={server.token}"})[0] == 403
     assert server.send("/ask", {"text": text}, headers=cookie)[0] == 403
+    assert server.send("/job/0123456789abcdef", headers=cookie)[0] == 403
+    assert server.send("/files/x.json", headers=cookie)[0] == 403
+
+
+OPENED = {
+    "X-Unitcad-Token": "",
+    "Sec-Fetch-Site": "cross-site",
+    "Sec-Fetch-Mode": "navigate",
+    "Sec-Fetch-Dest": "document",
+}
+
+
+def test_a_folder_s_key_opens_its_files_alone(tmp_path: Path, text: str) -> None:
+    """What a result's own page has, which runs as another site."""
+    for file in ("one/report.html", "one/deep/base.stl", "other/spec.toml", "at-root.json"):
+        (tmp_path / "out" / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "out" / file).write_text("{}")
+    with serving(tmp_path, "embedded", "--token", "a-token-of-the-lab") as own:
+        address = Keys("a-token-of-the-lab").address("one/report.html")
+        key = address.partition("/")[0]
+        for file in ("one/report.html", "one/deep/base.stl"):
+            status, _, headers = own.send(f"/files/{key}/{file}", headers=OPENED)
+            assert status == 200
+            assert headers["content-security-policy"].startswith("sandbox ")
+            assert "Access-Control-Allow-Origin" not in headers
+        for path in (
+            f"{key}/other/spec.toml", f"{key}/at-root.json", f"{key}/spec.toml", "one/report.html", key, f"{key}/",
+            f"/{key}/one/report.html", f"{key[:-1]}/one/report.html", f"{key.upper()}/one/report.html",
+            "%c3%a9/one/report.html",
+        ):  # fmt: skip
+            assert own.send(f"/files/{path}", headers=OPENED)[0] == 403, path
+        assert own.send(f"/files/{key}/one/../other/spec.toml", headers=OPENED)[0] == 404
+        assert own.send("/files/one/report.html")[0] == 404  # the token alone is no key
+        for path, message in (("/", None), ("/ask", {"text": text}), (f"/job/{key}", None), (f"/{key}/", None)):
+            assert own.send(path, message, headers={**OPENED, "Sec-Fetch-Site": "none"})[0] == 403
+        # What a script, a picture or a frame of such a page asks for, and another site's form.
+        for headers in (
+            {"Origin": "null"}, {"Origin": "http://evil.example"}, {"Sec-Fetch-Mode": "cors"},
+            {"Sec-Fetch-Mode": "no-cors"}, {"Sec-Fetch-Dest": "iframe"}, {"Sec-Fetch-Dest": "image"},
+            {"Sec-Fetch-Dest": "script"}, {"Sec-Fetch-Dest": ""},
+        ):  # fmt: skip
+            assert own.send(f"/files/{address}", headers={**OPENED, **headers})[0] == 403, headers
+        assert own.send(f"/files/{address}", headers={**OPENED, "Host": "evil.example"})[0] == 421
+        assert own.send(f"/files/{address}", {"text": text}, headers=OPENED)[0] == 403
 
 
 def test_a_request_has_one_host(server: Server) -> None:
@@ -124,7 +173,8 @@ def test_no_path_leads_out_of_the_folder(tmp_path: Path, path: str) -> None:
 
 
 def test_paths_are_refused_by_the_server(server: Server) -> None:
-    for path in PATHS:
+    key = Keys(server.token).address("x.html").partition("/")[0]
+    for path in [*PATHS, *(f"{key}/{path}" for path in PATHS)]:
         line = f"GET /files/{path} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nX-Unitcad-Token: {server.token}\r\n\r\n"
         answer = server.raw(line.encode("latin-1"))
         assert answer.split(b" ")[1] in (b"404", b"400"), (path, answer[:200])

@@ -23,6 +23,7 @@ from unitcad.files import read_text, write
 from unitcad.report.page import page_data
 from unitcad.serve.gate import Gate, Limits
 from unitcad.serve.jobs import Jobs
+from unitcad.serve.keys import Keys
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.live_worker import Worker, WorkerLost
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
@@ -39,7 +40,7 @@ FILE_TYPES = {
     ".html": "text/html; charset=utf-8", ".svg": "image/svg+xml", ".png": "image/png", ".json": "application/json",
     ".md": "text/plain; charset=utf-8", ".csv": "text/csv; charset=utf-8", ".toml": "text/plain; charset=utf-8",
     ".stl": "model/stl", ".3mf": "model/3mf", ".step": "model/step", ".glb": "model/gltf-binary",
-    ".dxf": "image/vnd.dxf", ".gcode": "text/plain; charset=utf-8",
+    ".dxf": "image/vnd.dxf", ".kicad_pcb": "text/plain; charset=utf-8", ".gcode": "text/plain; charset=utf-8",
 }  # fmt: skip
 _SANDBOX = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 'self'"
 """A result's page runs apart: it can reach neither the token nor this server."""
@@ -85,7 +86,7 @@ def application(live: Live, limits: Limits = Limits()) -> Gate:  # noqa: B008  #
         Route("/cancel", live.cancel, methods=["POST"]),
     ]
     inner = Starlette(routes=routes, lifespan=live.lifespan)
-    return Gate(inner, setting.token, setting.hosts, live.cookie, limits)
+    return Gate(inner, setting.token, setting.hosts, live.cookie, live.keys, limits)
 
 
 class Live:
@@ -94,8 +95,9 @@ class Live:
     def __init__(self, setting: Setting) -> None:
         self.setting = setting
         self.cookie = f"unitcad-{setting.port}"
+        self.keys = Keys(setting.token)
         self.workers = {what: Worker() for what in ANSWER_S}
-        self.jobs = Jobs(setting.out)
+        self.jobs = Jobs(setting.out, self.keys)
         self._newest: dict[tuple[str, str], int] = {}
         self._trusted = msgspec.json.encode(setting.trusted)
 
@@ -115,7 +117,7 @@ class Live:
         await asyncio.gather(self.jobs.close(), *(worker.close() for worker in self.workers.values()))
 
     async def page(self, request: Request) -> Response:
-        """Answer with the page, and let the browser keep the token for files."""
+        """Answer with the page, and let the browser keep what loads it again."""
         setting = self.setting
         if setting.campaign and "token" in request.query_params:
             # Its page has no script that takes the token out of the address.
@@ -123,7 +125,7 @@ class Live:
         if setting.campaign:
             return await self._campaign(setting.campaign)
         batch = page_data(setting.batch, with_models=False)[0] if setting.batch else None
-        html = live_page(setting.text, setting.name, setting.token, str(setting.folder), setting.starts, batch)
+        html = live_page(setting.text, setting.name, str(setting.folder), setting.starts, batch)
         return self._html(html)
 
     def _html(self, html: str, status: int = 200) -> Response:
@@ -131,8 +133,8 @@ class Live:
         return self._keeping(Response(html, status, media_type="text/html; charset=utf-8", headers=headers))
 
     def _keeping(self, response: Response) -> Response:
-        """Return a response with which the browser keeps the token."""
-        response.set_cookie(self.cookie, self.setting.token, httponly=True, samesite="strict")
+        """Return a response with which the browser keeps the page's cookie."""
+        response.set_cookie(self.cookie, self.keys.cookie, httponly=True, samesite="strict")
         return response
 
     async def _campaign(self, path: Path) -> Response:
@@ -274,8 +276,9 @@ class Live:
         return await _handled(request, Cancel, cancelled)
 
     async def file(self, request: Request) -> Response:
-        """Answer with a file of a result, which runs apart from this server."""
-        path = _within(self.setting.out, request.path_params["path"])
+        """Answer with a file of a result, which runs apart from this server; its path begins with a folder's key."""
+        asked = self.keys.file(request.path_params["path"])
+        path = _within(self.setting.out, asked) if asked else None
         if path is None:
             return PlainTextResponse("no such file\n", 404)
         headers = {"content-security-policy": _SANDBOX}

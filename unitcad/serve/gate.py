@@ -1,7 +1,8 @@
 """Who may ask the server, and how much: Host, Origin and token checked, requests bounded in size, time and number.
 
 A page of another site can reach the loopback address through the person's browser. Its requests carry its own Origin,
-or under DNS rebinding its own Host, and never the token.
+or under DNS rebinding its own Host, and never the token. A result's page is apart from the server too, and its links to
+the files beside it are another site's: they carry their folder's key in their path.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from unitcad.serve.addresses import means
+from unitcad.serve.keys import Keys
 
 TOKEN_HEADER = b"x-unitcad-token"
+FILES = "/files/"
 LARGEST_BODY = 4 << 20
 """Bytes of a request's body."""
 BODY_S = 10.0
@@ -45,13 +48,16 @@ class Limits:
 class Gate:
     """ASGI middleware in front of `app`: passes a request on, its body whole, or refuses it with one line.
 
-    `hosts` are the values of Host that mean this server (`addresses.hosts`). A GET carries the token in its query or in
-    the cookie `cookie`, which is sent to this server's own pages alone; anything else carries it in a header, which a
-    page of another site can't set.
+    `hosts` are the values of Host that mean this server (`addresses.hosts`). A request carries the token in a header,
+    which a page of another site can't set, or, where it only reads, in its query. Two of `keys` do instead of it: the
+    page itself is read with the cookie of the name `cookie`, and a file with its folder's key in its path.
     """
 
-    def __init__(self, app: ASGIApp, token: str, hosts: frozenset[str], cookie: str, limits: Limits) -> None:
-        self.app, self.token, self.hosts, self.cookie, self.limits = app, token.encode(), hosts, cookie, limits
+    def __init__(
+        self, app: ASGIApp, token: str, hosts: frozenset[str], cookie: str, keys: Keys, limits: Limits
+    ) -> None:
+        self.app, self.token, self.hosts, self.limits = app, token.encode(), hosts, limits
+        self.cookie, self.keys = cookie.encode(), keys
         self._under_way = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -85,27 +91,42 @@ class Gate:
         origins = [value.decode("latin-1").lower() for name, value in headers if name == b"origin"]
         if any(origin != f"http://{hosts[0]}" for origin in origins):
             return 403, "a request from another site"
-        if any(name == b"sec-fetch-site" and value in (b"cross-site", b"same-site") for name, value in headers):
+        keyed = self._has_folder_key(scope)
+        if not (keyed and _is_opened(headers)) and any(
+            name == b"sec-fetch-site" and value in (b"cross-site", b"same-site") for name, value in headers
+        ):
             return 403, "a request from another site"
         if scope["method"] not in ("GET", "POST"):
             return 405, "GET and POST alone"
-        if not self._has_token(scope, headers):
+        if not keyed and not self._has_token(scope, headers):
             return 403, "no valid token: open the address that unitcad serve printed"
         lengths = [value for name, value in headers if name == b"content-length"]
         if any(not value.isdigit() or int(value) > self.limits.body for value in lengths):
             return 413, f"a body has at most {self.limits.body} bytes"
         return None
 
+    def _has_folder_key(self, scope: Scope) -> bool:
+        path: str = scope["path"]
+        return (
+            scope["method"] == "GET" and path.startswith(FILES) and self.keys.file(path.removeprefix(FILES)) is not None
+        )
+
     def _has_token(self, scope: Scope, headers: list[tuple[bytes, bytes]]) -> bool:
         given = [value for name, value in headers if name == TOKEN_HEADER]
         if scope["method"] == "GET":
             query = parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=10)
             given += [value.encode("latin-1", "replace") for value in query.get("token", [])]
-            for name, value in headers:
-                if name == b"cookie":
-                    pairs = (part.strip().partition(b"=") for part in value.split(b";"))
-                    given += [text for key, _, text in pairs if key == self.cookie.encode()]
+            if scope["path"] == "/" and self._has_cookie(headers):
+                return True
         return any(hmac.compare_digest(value, self.token) for value in given)
+
+    def _has_cookie(self, headers: list[tuple[bytes, bytes]]) -> bool:
+        parts = [
+            part.strip().partition(b"=") for name, value in headers if name == b"cookie" for part in value.split(b";")
+        ]
+        return any(
+            key == self.cookie and hmac.compare_digest(text, self.keys.cookie.encode()) for key, _, text in parts
+        )
 
     async def _body(self, receive: Receive) -> bytes | tuple[int, str]:
         """Return a request's body, or the status and the reason for which it is refused."""
@@ -130,6 +151,12 @@ class Gate:
         # What is left of the body is not waited for.
         response = PlainTextResponse(reason + "\n", status, headers={"connection": "close"})
         await response(scope, receive, _with_headers(send))
+
+
+def _is_opened(headers: list[tuple[bytes, bytes]]) -> bool:
+    """Tell whether a browser opens a page or a download with a request: no script or picture of a page asks for it."""
+    said = {name: value for name, value in headers if name.startswith(b"sec-fetch-")}
+    return (said.get(b"sec-fetch-mode"), said.get(b"sec-fetch-dest")) == (b"navigate", b"document")
 
 
 def _at_once(body: bytes, receive: Receive) -> Receive:

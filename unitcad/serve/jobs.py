@@ -15,6 +15,7 @@ from pathlib import Path
 
 from unitcad.children import STAGES
 from unitcad.errors import UnitcadError
+from unitcad.serve.keys import Keys
 from unitcad.serve.messages import JobState
 
 MOST_KEPT = 20
@@ -36,10 +37,10 @@ class Job:
 
 
 class Jobs:
-    """The jobs of a server; results go below `out`."""
+    """The jobs of a server; results go below `out`, whose files have addresses of `keys`."""
 
-    def __init__(self, out: Path) -> None:
-        self.out = out
+    def __init__(self, out: Path, keys: Keys) -> None:
+        self.out, self.keys = out, keys
         self.known: dict[str, Job] = {}
 
     async def start(
@@ -123,7 +124,8 @@ class Jobs:
             job.state.folder = str(folder)
             page = folder / "report.html"
             if page.is_file() and page.resolve().is_relative_to(self.out.resolve()):
-                job.state.page = page.resolve().relative_to(self.out.resolve()).as_posix()
+                file = page.resolve().relative_to(self.out.resolve()).as_posix()
+                job.state.page = self.keys.address(file)
         job.state.ended = True
         if job.scratch:
             shutil.rmtree(job.scratch, ignore_errors=True)

@@ -25,20 +25,19 @@ HEADER_POLICY = "frame-ancestors 'none'"
 def live_page(
     text: str,
     name: str,
-    token: str,
     folder: str,
     starts: Mapping[str, str | None],
     batch: dict[str, Any] | None = None,
 ) -> str:
     """Return the HTML of the page that starts with a spec's `text`, the file `name` of `folder`.
 
+    It holds no token: that stands in the address that is opened, and the page takes it from there.
     `starts` are the texts to start from by their names, None for one that may not be used. `batch`: the data of a
     batch's page, whose rows then open live.
     """
     data: dict[str, Any] = {
         "text": text,
         "name": name,
-        "token": token,
         "folder": folder,
         "version": __version__,
         "batch": batch,

@@ -153,7 +153,10 @@ class Answer(Struct, kw_only=True, omit_defaults=True):
 
 
 class JobState(Struct, kw_only=True):
-    """How far a job is: its stage, the lines it printed; once it has ended, its exit code, its folder and its page."""
+    """How far a job is: its stage, the lines it printed; once it has ended, its exit code, its folder and its page.
+
+    `page` is a path below /files/, with the key of its folder.
+    """
 
     job: str
     title: str

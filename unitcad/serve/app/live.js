@@ -11,9 +11,7 @@
   function start() {
     const packed = Uint8Array.from(atob(document.getElementById("data").textContent), (c) => c.charCodeAt(0));
     const data = JSON.parse(new TextDecoder().decode(packed));
-    // The token stands in no address that is copied, bookmarked or kept as history.
-    history.replaceState(null, "", location.pathname + location.hash);
-    const server = U.createServer(data.token);
+    const server = U.createServer();
     const kept = U.keepText(data.text);
     const state = { text: kept.text, pending: [], past: kept.past, future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], opened: "", later: 0, asked: 0 };
     window.unitcad.timings = [];

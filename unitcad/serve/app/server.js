@@ -1,8 +1,23 @@
-// Questions to the server that this page came from. Every message carries the token that the page was given.
+// Questions to the server that this page came from. Every message carries the token of the address that was opened.
 (() => {
   "use strict";
 
-  function createServer(token) {
+  const KEY = "unitcad-token";
+
+  // The token stands in no address that is copied, bookmarked or kept as history. The tab holds it, for this server alone.
+  function takeToken() {
+    const given = new URLSearchParams(location.search).get("token");
+    history.replaceState(null, "", location.pathname + location.hash);
+    try {
+      if (given) sessionStorage.setItem(KEY, given);
+      return given || sessionStorage.getItem(KEY) || "";
+    } catch {
+      return given || "";
+    }
+  }
+
+  function createServer() {
+    const token = takeToken();
     const page = Math.random().toString(36).slice(2, 14);
     const newest = {};
     const underWay = {};
