@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-import os
-import signal
 import time
 import tomllib
 from pathlib import Path
@@ -73,26 +71,6 @@ def test_the_form_has_every_key_of_the_schema_with_its_range(server: Server, tex
     assert any(word == "dragon-skin-30" for word, _ in fields["layers.0.material"]["choices"])
     assert [group["title"] for group in groups if not group.get("present", True)] == ["Wires"]
     assert all(set(field) <= set(Field.__struct_fields__) for field in fields.values())
-
-
-def test_a_worker_that_is_killed_or_hangs_is_replaced(tmp_path: Path, text: str) -> None:
-    with serving(tmp_path) as own:
-        assert "faults" not in own.ask(text)
-        children = [
-            int(pid) for pid in Path(f"/proc/{own.process.pid}/task/{own.process.pid}/children").read_text().split()
-        ]
-        assert len(children) == 3
-        for pid in children:
-            os.kill(pid, signal.SIGKILL)
-        deadline = time.monotonic() + 60
-        while True:
-            status, content, _ = own.send("/ask", {"text": text})
-            if status == 200:
-                break
-            assert status == 500
-            assert "worker ended" in content.decode()
-            assert time.monotonic() < deadline
-        assert "faults" not in json.loads(content)
 
 
 def ended(own: Server, state: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:

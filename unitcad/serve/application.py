@@ -25,13 +25,12 @@ from unitcad.serve.gate import Gate, Limits
 from unitcad.serve.jobs import Jobs
 from unitcad.serve.keys import Keys
 from unitcad.serve.live_page import HEADER_POLICY, live_page
-from unitcad.serve.live_worker import Worker, WorkerLost
+from unitcad.serve.live_worker import WorkerLost
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
+from unitcad.serve.questions import ANSWER_S, Questions, Superseded
 from unitcad.text import toml
 
 T = TypeVar("T", bound=msgspec.Struct)
-ANSWER_S = {"unit": 20.0, "moulds": 60.0, "estimate": 30.0}
-"""Seconds that a question may take, by what is asked."""
 CAMPAIGN_S = 300.0
 """Seconds that the records of a campaign may take."""
 STORE_S = 10.0
@@ -67,10 +66,6 @@ class Setting:
     campaign: Path | None = None
 
 
-class Superseded(Exception):
-    """A newer question of the same page about the same thing."""
-
-
 def application(live: Live, limits: Limits = Limits()) -> Gate:  # noqa: B008  # frozen
     """Return the ASGI application of a live page."""
     setting = live.setting
@@ -96,16 +91,14 @@ class Live:
         self.setting = setting
         self.cookie = f"unitcad-{setting.port}"
         self.keys = Keys(setting.token)
-        self.workers = {what: Worker() for what in ANSWER_S}
+        self.questions = Questions(setting.text, setting.trusted)
         self.jobs = Jobs(setting.out, self.keys)
-        self._newest: dict[tuple[str, str], int] = {}
-        self._trusted = msgspec.json.encode(setting.trusted)
 
     @contextlib.asynccontextmanager
     async def lifespan(self, app: Starlette) -> AsyncIterator[None]:
         """Warm the workers up at the start, end workers and jobs at the end."""
-        warm = () if self.setting.campaign else self.workers
-        warming = [asyncio.create_task(self._warm(what)) for what in warm]
+        warm = () if self.setting.campaign else ANSWER_S
+        warming = [asyncio.create_task(self.questions.warm(what)) for what in warm]
         try:
             yield
         finally:
@@ -114,7 +107,7 @@ class Live:
 
     async def close(self) -> None:
         """End jobs and workers; a question under way is answered that the server is ending."""
-        await asyncio.gather(self.jobs.close(), *(worker.close() for worker in self.workers.values()))
+        await asyncio.gather(self.jobs.close(), self.questions.close())
 
     async def page(self, request: Request) -> Response:
         """Answer with the page, and let the browser keep what loads it again."""
@@ -139,7 +132,7 @@ class Live:
 
     async def _campaign(self, path: Path) -> Response:
         """Answer with the page of a campaign, measured anew; a change of its file is seen by loading it again."""
-        worker = self.workers["estimate"]
+        worker = self.questions.workers["estimate"]
         async with worker.turn:
             try:
                 of = "unitcad.serve.answers:campaign_page"
@@ -150,24 +143,7 @@ class Live:
 
     async def ask(self, request: Request) -> Response:
         """Answer a question about a text by the worker for it."""
-        return await _handled(request, Ask, self._ask)
-
-    async def _ask(self, ask: Ask) -> bytes:
-        key = (ask.page, ask.what)
-        mine = self._newest[key] = self._newest.get(key, 0) + 1
-        while len(self._newest) > _MOST_PAGES:
-            del self._newest[next(iter(self._newest))]
-        worker = self.workers[ask.what]
-        async with worker.turn:
-            if self._newest.get(key, mine) != mine:
-                raise Superseded
-            message = msgspec.json.encode(ask)
-            return await worker.ask("unitcad.serve.answers:respond", message, self._trusted, seconds=ANSWER_S[ask.what])
-
-    async def _warm(self, what: str) -> None:
-        ask = Ask(text=self.setting.text, what=what)  # type: ignore[arg-type]
-        with contextlib.suppress(WorkerLost):
-            await self._ask(ask)
+        return await _handled(request, Ask, self.questions.ask)
 
     async def save(self, request: Request) -> Response:
         """Write the text as a file in the server's folder."""
@@ -230,10 +206,10 @@ class Live:
 
         Raises UnitcadError for a text that is refused.
         """
-        worker = self.workers["unit"]
+        worker = self.questions.workers["unit"]
         async with worker.turn:
             content = await worker.ask(
-                "unitcad.serve.answers:effective", text.encode("utf-8", "replace"), self._trusted, seconds=10.0
+                "unitcad.serve.answers:effective", text.encode("utf-8", "replace"), self.questions.trusted, seconds=10.0
             )
         given = msgspec.json.decode(content)
         if "refused" in given:
@@ -285,10 +261,6 @@ class Live:
         return FileResponse(path, media_type=FILE_TYPES[path.suffix], headers=headers)
 
 
-_MOST_PAGES = 100
-"""Pairs of a page and a question whose newest one is remembered."""
-
-
 async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaitable[bytes]]) -> Response:
     """Parse a message, handle it, and answer with JSON: with the one fault where there is one."""
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
@@ -302,7 +274,7 @@ async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaita
     except Superseded:
         return PlainTextResponse("a newer question is under way\n", 409)
     except WorkerLost as error:
-        return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 500)
+        return _json(msgspec.json.encode({"faults": [Fault(str(error))], "again": True}), 500)
     except Refusal as error:
         return _json(msgspec.json.encode({"faults": [Fault(str(error), error.field, error.as_dict()["nearest"])]}), 422)
     except (UnitcadError, OSError) as error:

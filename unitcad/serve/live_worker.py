@@ -32,12 +32,25 @@ class WorkerLost(Exception):
     """The end of a worker in the middle of a question: it took too long, too much memory, or crashed."""
 
 
+class TimeIsUp(WorkerLost):
+    """No answer within `seconds`."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(f"no answer within {seconds:g} s")
+        self.seconds = seconds
+
+
+class WorkerEnded(WorkerLost):
+    """A process that has ended by itself, or by others."""
+
+
 class Worker:
-    """One worker process, which answers one question at a time."""
+    """One worker process, which answers one question at a time; another is ready where `prepare` was called."""
 
     def __init__(self, memory: int = MEMORY) -> None:
         self.memory = memory
         self._child: asyncio.subprocess.Process | None = None
+        self._spare: asyncio.Task[asyncio.subprocess.Process] | None = None
         self._closed = False
         self.turn = asyncio.Lock()
         """Whoever asks holds it, and may look after waiting whether the question still stands."""
@@ -50,8 +63,30 @@ class Worker:
     async def ask(self, function: str, *parts: bytes, seconds: float) -> bytes:
         """Return what a function "module:name" gives for byte strings, under `turn`.
 
-        Raises WorkerLost where the worker hangs or ends; the next question gets another one.
+        Raises WorkerLost where the worker hangs, or where it ends and so does another one that is asked the same; the
+        next question gets another one.
         """
+        try:
+            return await self._asked(function, *parts, seconds=seconds)
+        except WorkerEnded:
+            # It may have ended while it had nothing to do.
+            return await self._asked(function, *parts, seconds=seconds)
+
+    def prepare(self, function: str, *parts: bytes) -> None:
+        """Have another process ready for when this one is ended, warmed by a question whose answer is not wanted."""
+        if self._spare is None and not self._closed:
+            self._spare = asyncio.create_task(self._warmed((function.encode(), *parts)))
+
+    async def _warmed(self, parts: tuple[bytes, ...]) -> asyncio.subprocess.Process:
+        child = await self._started()
+        try:
+            async with asyncio.timeout(START_S):
+                await self._exchange(child, parts)
+        except (TimeoutError, OSError, EOFError, WorkerLost, asyncio.CancelledError):
+            await _killed(child)
+        return child
+
+    async def _asked(self, function: str, *parts: bytes, seconds: float) -> bytes:
         fresh = self.pid is None
         child = await self._running()
         try:
@@ -59,10 +94,10 @@ class Worker:
                 return await self._exchange(child, (function.encode(), *parts))
         except TimeoutError:
             await self._end()
-            raise WorkerLost(f"no answer within {seconds:g} s") from None
+            raise TimeIsUp(seconds) from None
         except (OSError, EOFError):
             await self._end()
-            raise WorkerLost("the worker ended: out of memory, or a fault in a kernel") from None
+            raise WorkerEnded("the worker ended: out of memory, or a fault in a kernel") from None
         except asyncio.CancelledError:
             # Half an answer would be taken for the next one.
             await self._end()
@@ -71,21 +106,36 @@ class Worker:
     async def close(self) -> None:
         """End the worker; no other one is started. A question under way gets WorkerLost."""
         self._closed = True
+        spare, self._spare = self._spare, None
+        if spare:
+            spare.cancel()
+            await asyncio.wait([spare])
+            if not spare.cancelled():
+                await _killed(spare.result())
         await self._end()
 
     async def _running(self) -> asyncio.subprocess.Process:
         if self._closed:
             raise WorkerLost("the server is ending")
-        if self._child is None or self._child.returncode is not None:
-            start = _START.format(path=sys.path, memory=self.memory, preload=PRELOAD)
-            self._child = await asyncio.create_subprocess_exec(
-                sys.executable, "-P", "-c", start,
-                stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, limit=LARGEST, start_new_session=True,
-            )  # fmt: skip
+        if self.pid is None and self._spare:
+            spare = self._spare
+            await asyncio.wait([spare])
+            self._spare = None
+            self._child = None if spare.cancelled() else spare.result()
+        if self.pid is None:
+            self._child = await self._started()
+        assert self._child
         if self._closed:  # meanwhile
             await self._end()
             raise WorkerLost("the server is ending")
         return self._child
+
+    async def _started(self) -> asyncio.subprocess.Process:
+        start = _START.format(path=sys.path, memory=self.memory, preload=PRELOAD)
+        return await asyncio.create_subprocess_exec(
+            sys.executable, "-P", "-c", start,
+            stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, limit=LARGEST, start_new_session=True,
+        )  # fmt: skip
 
     async def _exchange(self, child: asyncio.subprocess.Process, parts: tuple[bytes, ...]) -> bytes:
         assert child.stdin
@@ -102,11 +152,15 @@ class Worker:
     async def _end(self) -> None:
         child, self._child = self._child, None
         if child is not None:
-            if child.returncode is None:
-                # Not child.kill(), which reaps a child that has ended just now, so that asyncio misses its end.
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(child.pid, signal.SIGKILL)
-            await child.wait()
+            await _killed(child)
+
+
+async def _killed(child: asyncio.subprocess.Process) -> None:
+    if child.returncode is None:
+        # Not child.kill(), which reaps a child that has ended just now, so that asyncio misses its end.
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(child.pid, signal.SIGKILL)
+    await child.wait()
 
 
 def work(memory: int, preload: tuple[str, ...]) -> None:

@@ -171,6 +171,8 @@
       if (!answer || mine !== state.asked) return;
       if (answer.lost || answer.text === undefined) {
         said("bad", answer.faults[0].message);
+        clear(others, unanswered(answer));
+        page.dataset.stale = "true";
         page.setAttribute("aria-busy", "false");
         return;
       }
@@ -262,8 +264,13 @@
       page.setAttribute("aria-busy", "false");
     }
 
+    // Nothing is wrong with the text, as far as is known: the same may be asked again.
+    function unanswered(answer) {
+      return el("p", { className: "refusal" }, answer.faults[0].message, " ", el("button", { type: "button", onclick: () => { toForm(); ask(); } }, "Try again"));
+    }
+
     function showEstimate(answer) {
-      const refused = (answer.faults || []).map((one) => el("p", { className: "refusal" }, one.message));
+      const refused = answer.again || answer.lost ? unanswered(answer) : (answer.faults || []).map((one) => el("p", { className: "refusal" }, one.message));
       if (answer.estimate) clear(estimated, U.estimate({ estimate: answer.estimate, manifest: {} }));
       else if (answer.drawings) clear(estimated, section("estimate", "Crosstalk", answer.lines.map((line, i) => el("p", { className: i ? undefined : "lead" }, line)),
         answer.drawings.map(([caption, svg]) => el("figure", {}, U.framed(svg, caption, caption), el("figcaption", {}, caption)))));
@@ -282,8 +289,12 @@
         state.model = { ...state.model, ...answer.model };
         if (stage) await stage.update(state.model).catch(() => {});
       }
-      page.dataset.moulds = faults.length ? "none" : "new";
-      if (faults.length) {
+      const open = answer.again || answer.lost;
+      page.dataset.moulds = open ? "old" : faults.length ? "none" : "new";
+      if (open) {
+        said("bad", "moulds not judged");
+        clear(others, unanswered(answer));
+      } else if (faults.length) {
         said("bad", "no moulds");
         const left = form.refuse(faults);
         clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, one.field, toForm))), el("p", { className: "note" }, "This unit has no moulds; the view keeps the unit alone."));

@@ -3,6 +3,7 @@
   "use strict";
 
   const KEY = "unitcad-token";
+  const LONG_MS = 1500;
 
   // The token stands in no address that is copied, bookmarked or kept as history. The tab holds it, for this server alone.
   function takeToken() {
@@ -44,16 +45,20 @@
     }
 
     // The answer to a question about a text, or null where a newer question of that kind has been put meanwhile. One of a
-    // kind is under way; of those put meanwhile the newest follows it. A drag so never fills the server's line.
+    // kind is under way; of those put meanwhile the newest follows it. A drag so never fills the server's line. One that
+    // takes long is not waited for: the server ends it for the newer one.
     async function ask(what, text, edits = [], since = []) {
       const mine = (newest[what] = (newest[what] || 0) + 1);
       while (underWay[what]) {
-        await underWay[what];
+        const before = underWay[what];
+        await Promise.race([before.answer, before.long]);
         if (mine !== newest[what]) return null;
+        if (before === underWay[what]) underWay[what] = null;
       }
-      underWay[what] = sent("/ask", { text, what, edits, since, page }).catch(() => LOST);
-      const answer = await underWay[what];
-      underWay[what] = null;
+      const own = { answer: sent("/ask", { text, what, edits, since, page }).catch(() => LOST), long: new Promise((done) => setTimeout(done, LONG_MS)) };
+      underWay[what] = own;
+      const answer = await own.answer;
+      if (underWay[what] === own) underWay[what] = null;
       return mine === newest[what] && answer.status !== 409 ? answer : null;
     }
 

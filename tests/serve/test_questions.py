@@ -1,0 +1,155 @@
+"""Whose question a worker is on: one that is overtaken is ended after a grace, and none of another page."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from unitcad.serve import questions
+from unitcad.serve.live_worker import WorkerLost
+from unitcad.serve.messages import Ask, Trusted, What
+from unitcad.serve.questions import Questions, Superseded
+
+
+def answered(message: bytes, trusted: bytes) -> bytes:
+    """Answer in a worker as a test says in the question's text: the seconds that it takes, or "die"."""
+    ask = msgspec.json.decode(message, type=Ask)
+    if ask.text == "die":
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(float(ask.text))
+    return str(os.getpid()).encode()
+
+
+def with_questions(act: Callable[[Questions], Awaitable[None]]) -> None:
+    """Act on questions whose workers have answered one each."""
+
+    async def run() -> None:
+        asked = Questions("0", Trusted())
+        try:
+            await asyncio.gather(*(asked.warm(what) for what in ("unit", "moulds")))
+            await act(asked)
+        finally:
+            await asked.close()
+
+    asyncio.run(run())
+
+
+@pytest.fixture(autouse=True)
+def _answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(os.path.dirname(__file__))
+    monkeypatch.setattr("unitcad.serve.live_worker.PRELOAD", ())
+    monkeypatch.setattr(Questions, "_parts", lambda self, ask: (f"{__name__}:answered", msgspec.json.encode(ask), b""))
+    monkeypatch.setattr(questions, "GRACE_S", 0.5)
+
+
+def asking(asked: Questions, text: str, page: str = "a", what: What = "moulds") -> asyncio.Task[bytes]:
+    return asyncio.create_task(asked.ask(Ask(text=text, what=what, page=page)))
+
+
+def test_an_overtaken_question_is_ended_and_the_newer_one_has_a_warm_worker() -> None:
+    async def act(asked: Questions) -> None:
+        first = asked.workers["moulds"].pid
+        older = asking(asked, "60")
+        await asyncio.sleep(2.0)
+        begun = time.monotonic()
+        newer = asking(asked, "0")
+        with pytest.raises(Superseded):
+            await older
+        assert int(await newer) != first
+        assert time.monotonic() - begun < 1.0
+        # It can be done again.
+        older = asking(asked, "60")
+        await asyncio.sleep(0.1)
+        newer = asking(asked, "0")
+        await newer
+        assert older.done()
+
+    with_questions(act)
+
+
+def test_a_burst_of_edits_keeps_the_worker() -> None:
+    async def act(asked: Questions) -> None:
+        first = asked.workers["moulds"].pid
+        every = []
+        for _ in range(20):
+            every.append(asking(asked, "0.1"))
+            await asyncio.sleep(0.02)
+        done = await asyncio.gather(*every, return_exceptions=True)
+        assert int(done[-1]) == first  # type: ignore[arg-type]
+        assert any(isinstance(one, Superseded) for one in done)
+        assert asked.workers["moulds"].pid == first
+
+    with_questions(act)
+
+
+def test_another_page_s_question_is_not_ended() -> None:
+    async def act(asked: Questions) -> None:
+        first = asked.workers["moulds"].pid
+        other = asking(asked, "2", "b")
+        await asyncio.sleep(0.1)
+        mine = [asking(asked, "0", "a") for _ in range(3)]
+        others_unit = asking(asked, "0", "b", "unit")  # another kind, which overtakes nothing
+        assert int(await other) == first
+        done = await asyncio.gather(*mine, return_exceptions=True)
+        assert [isinstance(one, Superseded) for one in done] == [True, True, False]
+        await others_unit
+
+    with_questions(act)
+
+
+def test_a_worker_killed_while_idle_is_replaced_unseen() -> None:
+    async def act(asked: Questions) -> None:
+        worker = asked.workers["moulds"]
+        pid = worker.pid
+        assert pid
+        os.kill(pid, signal.SIGKILL)
+        assert int(await asking(asked, "0")) != pid
+        # It ends right under the question.
+        pid = worker.pid
+        assert pid
+        under_way = asking(asked, "0.3")
+        await asyncio.sleep(0.1)
+        os.kill(pid, signal.SIGKILL)
+        assert int(await under_way) != pid
+        with pytest.raises(WorkerLost, match="worker ended"):
+            await asking(asked, "die")
+        assert int(await asking(asked, "0"))
+
+    with_questions(act)
+
+
+def test_a_time_limit_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def act(asked: Questions) -> None:
+        monkeypatch.setitem(questions.ANSWER_S, "moulds", 1.0)
+        with pytest.raises(WorkerLost, match="not judged: it took more than 1 s"):
+            await asking(asked, "60")
+        assert int(await asking(asked, "0"))
+
+    with_questions(act)
+
+
+def test_no_process_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those under way and the one that is made ready end with the questions."""
+    pids: list[int] = []
+
+    async def act(asked: Questions) -> None:
+        asked._text = "30"
+        under_way = asking(asked, "60")
+        await asyncio.sleep(1.0)
+        children = Path(f"/proc/self/task/{os.getpid()}/children").read_text()
+        pids.extend(map(int, children.split()))
+        await asked.close()
+        with contextlib.suppress(WorkerLost):
+            await under_way
+
+    with_questions(act)
+    assert len(pids) >= 3
+    assert not any(os.path.exists(f"/proc/{pid}") for pid in pids)
