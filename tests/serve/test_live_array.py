@@ -197,6 +197,31 @@ def test_a_campaign_is_measured_again_after_a_save(running: Any, tmp_path: Path)
         context.close()
 
 
+def test_a_campaign_that_is_refused_says_why_and_is_measured_again(running: Any, tmp_path: Path) -> None:
+    shutil.copytree(CAMPAIGN.parent, tmp_path / "lab")
+    file = tmp_path / "lab" / CAMPAIGN.name
+    text = file.read_text("utf-8")
+    with serving(tmp_path, f"lab/{CAMPAIGN.name}") as own:
+        context = running.new_context(color_scheme="dark")
+        page = context.new_page()
+        page.set_default_timeout(120_000)
+        for broken, why in (
+            (text.replace("motor-off.wav", "gone.wav"), "'gone.wav': no such file"),
+            (text.replace("[sensor]", "[[sensor]"), f"{file}: not TOML"),
+        ):
+            file.write_text(broken, "utf-8")
+            page.goto(own.url)
+            assert page.inner_text("h1") == CAMPAIGN.name
+            assert why in page.inner_text(".error")
+            assert str(tmp_path / "lab") in page.inner_text("body")
+            assert page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(24, 26, 27)"
+            file.write_text(text, "utf-8")
+            page.click("text=measure again")
+            page.wait_for_selector("table")
+            assert page.locator(".error").count() == 0
+        context.close()
+
+
 def test_a_campaign_opens_its_decay(tmp_path: Path) -> None:
     with serving(tmp_path, str(CAMPAIGN)) as own:
         status, content, headers = own.send("/")

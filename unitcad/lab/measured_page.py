@@ -1,12 +1,14 @@
-"""The page of a campaign: levels, findings, records, charts. It has no script and contacts nothing."""
+"""The page of a campaign: levels, findings, records, charts; or why there are none. It has no script."""
 
 from __future__ import annotations
 
 import re
 from html import escape
+from typing import TYPE_CHECKING
 
-from unitcad.lab.measuring import Measured
-from unitcad.lab.record_result import RecordResult
+if TYPE_CHECKING:
+    from unitcad.lab.measuring import Measured
+    from unitcad.lab.record_result import RecordResult
 
 _STYLE = """:root{color-scheme:light dark;--text:#222;--back:#fff;--edge:#ccc;--error:#a11;--warning:#850}
 @media(prefers-color-scheme:dark){:root{--text:#ddd;--back:#181a1b;--edge:#555;--error:#f99;--warning:#eb6}}
@@ -34,17 +36,27 @@ def page(result: Measured, charts: dict[str, str], lead: str = "") -> str:
     )
     decay = "".join(_figure(svg) for name, svg in charts.items() if name.startswith("decay"))
     figures = "".join(_figure(svg) for name, svg in charts.items() if not name.startswith("decay"))
-    name = escape(result.campaign.name)
+    return _document(
+        result.campaign.name,
+        f"{lead}<p>{escape(result.campaign.note)}</p><h2>Levels</h2>{_levels(result)}{assumed}{decay}"
+        f"<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
+        f"<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
+        f"comes from the scatter of the repeats.</p>{_records(result)}"
+        f"<h2>Charts of the records</h2>{figures}",
+    )
+
+
+def fault_page(name: str, fault: str, lead: str = "") -> str:
+    """Return the page of a campaign that can't be measured, as HTML: why; `lead` is HTML that stands after it."""
+    return _document(name, f'<h2>Not measured</h2><p class="error">{escape(fault)}</p>{lead}')
+
+
+def _document(name: str, body: str) -> str:
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
-        f"<title>{name}</title><style>{_STYLE}</style></head><body><h1>{name}</h1>{lead}"
-        f"<p>{escape(result.campaign.note)}</p><h2>Levels</h2>{_levels(result)}{assumed}{decay}"
-        f"<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
-        f"<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
-        f"comes from the scatter of the repeats.</p>{_records(result)}"
-        f"<h2>Charts of the records</h2>{figures}</body></html>\n"
+        f"<title>{escape(name)}</title><style>{_STYLE}</style></head><body><h1>{escape(name)}</h1>{body}</body></html>\n"
     )
 
 

@@ -1,4 +1,4 @@
-"""What the page is told about a text: of a unit's spec or of an array, and the page of a campaign.
+"""What the page is told about a text: of a unit's spec or of an array.
 
 Runs in a worker process, which a hang or a crash ends. A text from the page is data: what it names in files is read,
 and code is run, only where the spec that the server was started with names the same.
@@ -7,8 +7,6 @@ and code is run, only where the spec that the server was started with names the 
 from __future__ import annotations
 
 import time
-from html import escape
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -96,22 +94,3 @@ def _line_of(message: str) -> int | None:
     _, _, place = message.rpartition("(at line ")
     digits = place.partition(",")[0]
     return int(digits) if digits.isdigit() else None
-
-
-def campaign_page(path: bytes) -> bytes:
-    """Return the page of a campaign file, its records measured; or, as {"refused": why}, why there is none."""
-    from unitcad.lab.campaign import read_campaign
-    from unitcad.lab.measured_charts import charts_of
-    from unitcad.lab.measured_page import page
-    from unitcad.lab.measuring import measure
-
-    file = Path(path.decode())
-    try:
-        result = measure(read_campaign(file), file.parent)
-    except UnitcadError as error:
-        return msgspec.json.encode({"refused": str(error)})
-    lead = (
-        f"<p>Measured from {escape(str(file))} as it is saved. Its recordings are files that it names by "
-        'patterns, so it has no form here: change the file in an editor, then <a href="/">measure again</a>.</p>'
-    )
-    return msgspec.json.encode({"page": page(result, charts_of(result), lead)})

@@ -7,7 +7,6 @@ import contextlib
 import hashlib
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass
-from html import escape
 from itertools import count
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeVar
@@ -21,6 +20,7 @@ from starlette.routing import Route
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text, write
 from unitcad.report.page import page_data
+from unitcad.serve.campaign_page import refused
 from unitcad.serve.gate import Gate, Limits
 from unitcad.serve.jobs import Jobs
 from unitcad.serve.keys import Keys
@@ -132,14 +132,18 @@ class Live:
 
     async def _campaign(self, path: Path) -> Response:
         """Answer with the page of a campaign, measured anew; a change of its file is seen by loading it again."""
-        worker = self.questions.workers["estimate"]
+        worker, status = self.questions.workers["estimate"], 422
         async with worker.turn:
             try:
-                of = "unitcad.serve.answers:campaign_page"
-                given = msgspec.json.decode(await worker.ask(of, str(path).encode(), seconds=CAMPAIGN_S))
+                content = await worker.ask(
+                    "unitcad.serve.campaign_page:measured", str(path).encode(), seconds=CAMPAIGN_S
+                )
+                given = msgspec.json.decode(content)
             except WorkerLost as error:
-                return self._html(escape(str(error)), 500)
-        return self._html(given["page"]) if "page" in given else self._html(escape(given["refused"]), 422)
+                given, status = {"refused": str(error)}, 500
+        if "page" in given:
+            return self._html(given["page"])
+        return self._html(refused(path, given["refused"]), status)
 
     async def ask(self, request: Request) -> Response:
         """Answer a question about a text by the worker for it."""

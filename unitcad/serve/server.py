@@ -61,7 +61,7 @@ def serve(
     text = read_text(path)
     data = parse_toml(text, str(path))  # a file that is no TOML is refused at once
     folder = path.parent.resolve() if is_own(source) else Path.cwd()
-    campaign = path if {"sensor", "unit"} <= set(data) else None
+    campaign = path.resolve() if {"sensor", "unit"} <= set(data) else None
     trusted = [_trusted(data, path, code)]
     plain = templates() | array_templates()
     starts: dict[str, str | None] = {name: read_text(each) for name, each in plain.items()}
