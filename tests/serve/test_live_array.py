@@ -181,6 +181,27 @@ def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
     live.close()
 
 
+def test_a_bed_refusal_stands_at_the_changed_count_and_goes_with_a_newer_answer(running: Any, tmp_path: Path) -> None:
+    columns = 'input[name="layout.columns"]'
+    with serving(tmp_path, "forearm-patch") as patch:
+        live = Live(running, patch)
+        live.choose('input[name="layout.pitch_mm"]', "18")
+        live.choose(columns, "12")
+        live.until(lambda: live.state == "no moulds")
+        use = live.page.locator('.field[data-path="layout.columns"] .refusal').get_by_role("button").first
+        assert use.inner_text() == "Use 9"
+        assert "moulds.bed_x_mm" in live.page.inner_text("#judged")
+        live.page.evaluate(
+            "() => { const at = document.querySelector('#judged');"
+            " new MutationObserver(() => { window.seen ??= at.children.length; }).observe(at, { childList: true }); }"
+        )
+        use.click()
+        live.until(lambda: "passed" in live.state)
+        assert live.page.input_value(columns) == "9"
+        assert live.page.evaluate("() => window.seen") == 0
+        live.close()
+
+
 def test_a_campaign_is_measured_again_after_a_save(running: Any, tmp_path: Path) -> None:
     shutil.copytree(CAMPAIGN.parent, tmp_path / "lab")
     file = tmp_path / "lab" / CAMPAIGN.name

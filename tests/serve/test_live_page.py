@@ -113,6 +113,15 @@ def test_a_change_that_another_field_refuses_is_refused_where_it_was_made(live: 
     assert "passed" in live.state
 
 
+def test_a_button_names_its_key_where_it_stands_at_another_one(live: Live) -> None:
+    live.choose('input[name="motor.diameter_mm"]', "99999")
+    told = live.page.locator("#faults .refusal").filter(has_text="diameter_mm = 14")
+    assert [button.inner_text() for button in told.get_by_role("button").all()] == ["Use motor.diameter_mm = 8.8"]
+    own = live.page.locator('.field[data-path="motor.diameter_mm"] .refusal')
+    assert own.get_by_role("button").inner_text() == "Use 8.8"
+    assert "nearest accepted: 8.8" in own.inner_text()
+
+
 def test_wires_take_the_circuit_s_place_and_a_cap_is_left_out(live: Live) -> None:
     live.page.click("summary:text-is('Wires')")
     live.pressed(live.page.get_by_label("with wires"))

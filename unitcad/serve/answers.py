@@ -52,9 +52,11 @@ def answered(ask: Ask, trusted: Trusted) -> Answer:
         kind.ANSWERS[ask.what](subject, answer)
     except Refusal as error:
         answer.faults = [_fault(error)]
-        if subject is None and whole is not None:  # else it is what the moulds or the estimate met
+        if whole is not None and subject is None:
             every = [_fault(one) for one in kind.faults_of(error, whole, text)]
-            answer.faults = remedied(every, whole, ask.since, kind.judge)
+            answer.faults = remedied(every, whole, ask.since, kind.judge, kind.makeable)
+        elif whole is not None and ask.what == "moulds":
+            answer.faults = remedied([_fault(error)], whole, ask.since, kind.makeable, kind.makeable)
     except UnitcadError as error:
         answer.faults = [_fault(error)]
     if ask.what == "unit":

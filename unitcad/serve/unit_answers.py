@@ -43,6 +43,15 @@ def judge(data: dict[str, Any]) -> Mapping[str, Any]:
     return to_data(effective(convert(data, AskedSpec)))
 
 
+def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
+    """Return what `judge` does. Raises UnitcadError also for a unit that has no moulds."""
+    from unitcad.moulds.mould_set import MouldSet
+
+    spec = effective(convert(data, AskedSpec))
+    _ = MouldSet(spec).plan
+    return to_data(spec)
+
+
 def asked_toml(text: str, data: Mapping[str, Any], spec: Spec, trusted: Trusted) -> str:
     """Return what a text asks for as TOML that names no file: the text itself where it names none."""
     import tomlkit

@@ -130,21 +130,21 @@
       return { main: box, others: [], set: (next) => { box.checked = Boolean(next.value); } };
     }
 
-    // What would make a refused text accepted, as words and what they do: a value here, one in another field, none.
-    function remedies(one, path) {
+    // What would make a refused text accepted, as words and what they do: a value in the field of `place`, one in another, none.
+    function remedies(one, place) {
       const out = [one.field, ...(one.together || [])];
-      const use = (at, value, where) => value !== undefined && value !== null && [`Use ${where}${typeof value === "number" ? number(value, 6) : value}`, () => options.change(at, value)];
+      const use = (at, value) => value !== undefined && value !== null && [`Use ${at === place ? "" : `${at} = `}${typeof value === "number" ? number(value, 6) : Array.isArray(value) ? `[${value.join(", ")}]` : value}`, () => options.change(at, value)];
       return [
-        one.at && use(one.at, one.at_nearest, ""),
-        use(one.field || path, one.nearest, one.at ? `${one.field} = ` : ""),
+        one.at && use(one.at, one.at_nearest),
+        use(one.field, one.nearest),
         one.rename && [`Rename it ${one.rename[0]}`, () => options.rename(one.field, ...one.rename)],
         one.leave_out && [out.length > 1 ? `Leave out ${out.join(" and ")}` : "Leave it out", () => options.remove(...out)],
       ].filter(Boolean);
     }
 
-    // A refusal with its reason and a button for each remedy; `then` puts the focus where the button no longer is.
-    function told(one, path, then) {
-      return [one.message, remedies(one, path).map(([words, act]) => el("button", { type: "button", onclick: () => {
+    // A refusal at the field of `place`, with its reason and a button for each remedy; `then` puts the focus where the button no longer is.
+    function told(one, place, then) {
+      return [one.message, remedies(one, place).map(([words, act]) => el("button", { type: "button", onclick: () => {
         act();
         then();
       } }, words))];

@@ -15,7 +15,7 @@
     history.replaceState(null, "", location.pathname + location.hash);
     const server = U.createServer(data.token);
     const kept = U.keepText(data.text);
-    const state = { text: kept.text, pending: [], past: kept.past, future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], opened: "", later: 0, asked: 0 };
+    const state = { text: kept.text, pending: [], past: kept.past, future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], made: new Map(), unmade: [], opened: "", later: 0, asked: 0 };
     window.unitcad.timings = [];
 
     const form = U.createForm({
@@ -114,15 +114,18 @@
         // Only the newest value of a key that is being dragged is worth sending.
         state.pending = state.pending.filter((one) => one.path !== change.path || one.remove || change.remove);
         state.pending.push(change);
-        state.changed = [change.path, ...state.changed.filter((one) => one !== change.path)].slice(0, 5);
+        state.changed = newest(change.path, state.changed);
+        state.unmade = newest(change.path, state.unmade);
       }
       ask();
     }
 
-    // Edits that take back what was changed since the text was last accepted, newest first.
-    function since() {
-      return state.changed.filter((path) => state.accepted.has(path)).map((path) => {
-        const field = state.accepted.get(path);
+    function newest(path, paths) { return [path, ...paths.filter((one) => one !== path)].slice(0, 5); }
+
+    // Edits that take back to the fields of before what was changed since then, newest first.
+    function since(changed, before) {
+      return changed.filter((path) => before.has(path)).map((path) => {
+        const field = before.get(path);
         return field.given ? { path, value: field.value, ...(field.kind === "toml" ? { toml: true } : {}) } : { path, remove: true };
       });
     }
@@ -169,7 +172,7 @@
       chip.textContent = "working";
       page.setAttribute("aria-busy", "true");
       const sent = state.pending.length;
-      const answer = await server.ask("unit", state.text, state.pending, since());
+      const answer = await server.ask("unit", state.text, state.pending, since(state.changed, state.accepted));
       if (!answer || mine !== state.asked) return;
       if (answer.lost || answer.text === undefined) {
         said("bad", answer.faults[0].message);
@@ -190,13 +193,15 @@
         state.accepted = new Map(answer.groups.flatMap((group) => group.fields || []).map((field) => [field.path, field]));
         state.changed = [];
       }
+      // A newer answer takes away why there were no moulds.
+      if (page.dataset.moulds === "none") clear(judged);
       // What is wrong with the text itself stands under it alone, a value's fault at its field; who types the text has all there.
       const unread = faults.filter((one) => !one.field);
       const homeless = form.refuse(faults.filter((one) => one.field));
       const typing = document.activeElement === text;
       textFault.textContent = !typing && !unread.length ? "" : faults.map((one) => (one.field && one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
       if (unread.length) tabs.open = true;
-      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, form.told(one, one.field, toForm))), faults.length > 0 && el("p", { className: "note" }, state.unit.text ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
+      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), faults.length > 0 && el("p", { className: "note" }, state.unit.text ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
       page.dataset.stale = String(faults.length > 0);
       buttons();
       if (!faults.length) await shown(answer);
@@ -251,7 +256,7 @@
           time("estimate", answer);
           showEstimate(answer);
         }),
-        server.ask("moulds", state.text).then(async (answer) => {
+        server.ask("moulds", state.text, [], since(state.unmade, state.made)).then(async (answer) => {
           if (!answer || mine !== state.asked) return;
           state.moulds = { ...answer, of: state.unit.text };
           await showMoulds(answer);
@@ -280,6 +285,7 @@
         const list = U.parts.checks({ manifest });
         clear(judged, (answer.lines || []).map((line) => el("p", {}, line)), [...list.childNodes].slice(1));
       } else clear(judged, faults.map((one) => el("p", { className: "refusal" }, one.message)));
+      if (!faults.length) [state.made, state.unmade] = [state.accepted, []];
       if (answer.model && state.model) {
         state.model = { ...state.model, ...answer.model };
         if (stage) await stage.update(state.model).catch(() => {});
@@ -288,7 +294,7 @@
       if (faults.length) {
         said("bad", "no moulds");
         const left = form.refuse(faults);
-        clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, one.field, toForm))), el("p", { className: "note" }, "This unit has no moulds; the view keeps the unit alone."));
+        clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, "This unit has no moulds; the view keeps the unit alone."));
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
       } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.laws.length} mould checks failed` : `${manifest.laws.length} mould checks passed`);
