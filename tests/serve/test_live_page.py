@@ -309,6 +309,15 @@ def test_save_and_build_from_the_page(running: Any, tmp_path: Path) -> None:
     assert all(check["ok"] for check in json.loads(manifests[0].read_text())["laws"])
 
 
+def test_the_file_s_name_follows_the_template_unless_a_person_named_it(live: Live) -> None:
+    assert live.page.input_value("#file-name") == "encapsulating.toml"
+    live.start_from("embedded")
+    assert live.page.input_value("#file-name") == "embedded.toml"
+    live.page.fill("#file-name", "mine.toml")
+    live.start_from("three-layer")
+    assert live.page.input_value("#file-name") == "mine.toml"
+
+
 def test_an_older_answer_does_not_replace_a_newer_one(live: Live) -> None:
     """A slider that is dragged: the last value is the one that is shown, whatever was asked meanwhile."""
     live.page.evaluate(

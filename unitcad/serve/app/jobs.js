@@ -10,9 +10,16 @@
     // Beside what is written anew, so that it keeps the focus.
     const cancel = el("button", { type: "button", hidden: true, onclick: () => server.send("/cancel", { job: running }) }, "Cancel");
     const log = el("div", { className: "job" });
-    const file = el("input", { type: "text", id: "file-name", value: name, spellcheck: "false" });
+    const file = el("input", { type: "text", id: "file-name", value: name, spellcheck: "false", oninput: () => { typed = true; } });
+    let typed = false;
     const said = el("p", { className: "note", role: "status" });
     let running = null;
+
+    // Another spec has another file, unless a person named one.
+    function suggest(other) {
+      if (!typed) file.value = other;
+      clear(said);
+    }
 
     async function save(replace) {
       const named = file.value.trim();
@@ -109,7 +116,7 @@
       el("details", {}, el("summary", {}, "Sweep this"), el("div", { className: "tools" }, field("Key", key), field("from", low), field("to", high), field("values", count),
         el("button", { type: "button", onclick: sweep }, "Run the sweep"))),
       progress, cancel, log);
-    return { node, keys };
+    return { node, keys, suggest };
   }
 
   Object.assign(window.unitcad, { createJobs });

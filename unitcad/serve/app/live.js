@@ -40,7 +40,7 @@
     const textFault = el("p", { className: "refusal", id: "text-fault", role: "status" });
     const undo = el("button", { type: "button", onclick: () => step(state.past, state.future) }, "Undo");
     const redo = el("button", { type: "button", onclick: () => step(state.future, state.past) }, "Redo");
-    const template = el("select", { name: "template", "aria-label": "Start from a template", onchange: () => { if (template.value) startFrom(data.templates[template.value]); template.value = ""; } },
+    const template = el("select", { name: "template", "aria-label": "Start from a template", onchange: () => { if (template.value) startFrom(data.templates[template.value], `${template.value.split("/").pop()}.toml`); template.value = ""; } },
       el("option", { value: "" }, "Start from ..."), Object.entries(data.templates).map(([name, text]) => el("option", { value: name, disabled: text === null }, text === null ? `${name}: its code needs --allow-code` : name)));
     const title = el("h1", { tabindex: "-1" }, data.name);
     const opened = el("p", { className: "line" }, UNWRITTEN);
@@ -136,8 +136,9 @@
       return (field.value === undefined || field.value === null) && before && !field.required ? { ...field, value: before.value } : field;
     }
 
-    function startFrom(text) {
+    function startFrom(text, file = data.name) {
       state.opened = "";
+      jobs.suggest(file);
       replaceText(text);
     }
 
@@ -320,17 +321,35 @@
       else return;
       event.preventDefault();
     });
+    function variant(folder) { return server.send(`/variant/${encodeURIComponent(folder)}`); }
+
+    // What a refused row starts from: its base where that is a template, else the first variant that was made.
+    async function startOf({ base }) {
+      return data.templates[base] ? { text: data.templates[base] } : variant(batch.first);
+    }
+
+    // What the row starts from is accepted, so its values are refused where they stand, with what would do.
+    async function openRefused(text, changes) {
+      remember("", false);
+      state.text = text;
+      state.pending = [];
+      await ask();
+      edit(changes);
+    }
+
     // A row of the batch that is opened: its spec becomes the one that is changed.
     async function openVariant() {
       const folder = U.variantAsked();
       if (!folder) return;
-      const answer = await server.send(`/variant/${encodeURIComponent(folder)}`);
+      const refused = batch.refused.get(folder);
+      const answer = refused ? await startOf(refused) : await variant(folder);
       if (answer.text === undefined) {
         clear(others, el("p", { className: "refusal" }, answer.faults[0].message));
         return;
       }
       state.opened = folder;
-      replaceText(answer.text);
+      if (refused) await openRefused(answer.text, refused.changes);
+      else replaceText(answer.text);
       // The same row may be opened again.
       history.replaceState(null, "", location.pathname);
       page.querySelector(".columns").scrollIntoView();
@@ -339,9 +358,8 @@
 
     // A batch's page begins with its first variant.
     async function openFirst() {
-      // A row begins with its folder.
-      const [[folder] = []] = (data.batch.table || { rows: [] }).rows;
-      const answer = folder ? await server.send(`/variant/${encodeURIComponent(folder)}`) : {};
+      const folder = batch.first;
+      const answer = folder ? await variant(folder) : {};
       if (answer.text !== undefined) [state.text, state.opened] = [answer.text, folder];
       text.value = state.text;
       ask();
@@ -358,8 +376,11 @@
 
   function createBatch(data) {
     const { variant, why } = U.records(data);
-    const made = U.batch(data, why, variant);
-    return { plot: made.plot, node: el("details", { id: "of-batch", open: true }, el("summary", {}, `${data.title}: a name opens the variant live`), made.sections) };
+    const { table, refused } = data.table ? U.refusedRows(data) : { table: { rows: [] }, refused: new Map() };
+    // A row begins with its folder.
+    const [first] = table.rows.map(([folder]) => folder).filter((folder) => folder && !refused.has(folder));
+    const made = U.batch({ ...data, table }, why, variant);
+    return { plot: made.plot, refused, first, node: el("details", { id: "of-batch", open: true }, el("summary", {}, `${data.title}: a name opens the variant live`), made.sections) };
   }
 
   try {
