@@ -181,6 +181,28 @@ def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
     live.close()
 
 
+def test_a_count_is_swept_by_whole_numbers(running: Any, tmp_path: Path) -> None:
+    small = re.sub(r"(columns|rows) = \d+", r"\1 = 2", TEXT) + "\n[output]\nformats = []\n"
+    (tmp_path / "small.toml").write_text(small, "utf-8")
+    with serving(tmp_path, "small.toml") as own:
+        live = Live(running, own)
+        live.page.click("text=Sweep this")
+        live.page.select_option("#sweep-key", "layout.columns")
+        assert [live.page.input_value(f"#sweep-{each}") for each in ("low", "high", "count")] == ["1", "4", "4"]
+        live.page.fill("#sweep-count", "3")
+        live.page.click("text=Run the sweep")
+        assert "from 1 to 4 there can be 2 or 4 values" in live.page.inner_text("#do .job")
+        live.page.fill("#sweep-high", "2")
+        live.page.fill("#sweep-count", "2")
+        live.page.click("text=Run the sweep")
+        live.page.wait_for_selector('.job[data-ended="true"]', timeout=240_000)
+        live.close()
+    sweep = tmp_path / "out" / "sweep-1" / "sweep.toml"
+    assert "[1, 2]" in sweep.read_text("utf-8")
+    rows = json.loads((sweep.parent / "results" / "batch.json").read_text("utf-8"))["variants"]
+    assert [row["status"] for row in rows] == ["ok", "ok"]
+
+
 def test_a_bed_refusal_stands_at_the_changed_count_and_goes_with_a_newer_answer(running: Any, tmp_path: Path) -> None:
     columns = 'input[name="layout.columns"]'
     with serving(tmp_path, "forearm-patch") as patch:

@@ -4,7 +4,7 @@
   const { el, clear, section, number } = window.unitcad;
   const EVERY_MS = 400;
 
-  // options: server, text(), name, folder, numbers() gives [{path, value, low, high}] of the form's numbers.
+  // options: server, text(), name, folder, numbers() gives [{path, kind, value, low, high}] of the form's numbers.
   function createJobs({ server, text, name, folder, numbers }) {
     const progress = el("div", { className: "job", role: "status", tabindex: "-1" });
     // Beside what is written anew, so that it keeps the focus.
@@ -87,6 +87,15 @@
     const offer = () => {
       const one = numbers().find((each) => each.path === key.value);
       if (!one) return;
+      const whole = one.kind === "integer";
+      low.step = high.step = whole ? "1" : "any";
+      if (whole) {
+        low.value = String(Math.max(one.low ?? 0, one.value - 2));
+        high.value = String(Math.min(one.high ?? Infinity, one.value + 2));
+        count.value = String(Math.max(2, high.valueAsNumber - low.valueAsNumber + 1));
+        return;
+      }
+      count.value = "5";
       low.value = String(Number(Math.max(one.low ?? -Infinity, one.value * 0.8).toPrecision(4)));
       high.value = String(Number(Math.min(one.high ?? Infinity, one.value * 1.2).toPrecision(4)));
     };
@@ -105,6 +114,12 @@
     const sweep = async () => {
       if (![low, high, count].every((one) => one.value !== "" && one.checkValidity())) {
         clear(progress, el("p", { className: "fault" }, "A sweep needs its two ends, and from 2 to 50 values."));
+        return;
+      }
+      const across = high.valueAsNumber - low.valueAsNumber;
+      if (low.step === "1" && across > 0 && across % (count.valueAsNumber - 1)) {
+        const counts = Array.from({ length: Math.min(across, 49) }, (_, i) => i + 1).filter((steps) => across % steps === 0).map((steps) => steps + 1);
+        clear(progress, el("p", { className: "fault" }, `${key.value} is a whole number: from ${low.value} to ${high.value} there can be ${counts.join(" or ")} values.`));
         return;
       }
       follow(await server.send("/sweep", { text: text(), key: key.value, low: low.valueAsNumber, high: high.valueAsNumber, count: count.valueAsNumber }));

@@ -78,7 +78,7 @@
     function now() { return state.text; }
 
     function numbers() {
-      return state.groups.flatMap((group) => group.fields).filter((field) => field.kind === "number" && typeof field.value === "number");
+      return state.groups.flatMap((group) => group.fields).filter((field) => ["number", "integer"].includes(field.kind) && typeof field.value === "number");
     }
 
     // What is shown, each with the spec that it is of: of a refused text the last unit that could be made.
