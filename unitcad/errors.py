@@ -11,6 +11,8 @@ from unitcad.text import toml
 
 NEAREST = "; nearest accepted: "
 """What a refusal's sentence names the nearest accepted value after."""
+UNIT_ALONE = "; --only unit makes the unit alone"
+"""How a refusal of moulds ends that leaves the unit possible."""
 
 
 class UnitcadError(Exception):

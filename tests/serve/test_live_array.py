@@ -181,6 +181,32 @@ def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
     live.close()
 
 
+def test_a_kind_that_needs_other_keys_offers_each_act_once_also_after_undo(running: Any, pockets: Server) -> None:
+    live = Live(running, pockets)
+    kind = 'select[name="layout.kind"]'
+
+    def buttons() -> list[str]:
+        return [one.inner_text() for one in live.page.locator(".refusal button").all()]
+
+    def turned(name: str) -> None:
+        count = len(live.timings())
+        live.page.select_option(kind, name)
+        live.until(lambda: len(live.timings()) > count)
+        live.settled()
+
+    turned("list")
+    assert buttons() == ["Use grid"]
+    assert live.page.get_attribute('input[name="layout.points_mm"]', "placeholder") == ""
+    assert "the last array that could be made" in live.page.inner_text("#faults")
+    live.pressed(live.page.locator(".refusal button"))
+    live.pressed(live.page.get_by_role("button", name="Undo"))
+    assert live.page.input_value(kind) == "list"
+    assert buttons() == ["Use grid"]
+    turned("hex")
+    assert len([one for one in buttons() if one.startswith("Leave out")]) == 1
+    live.close()
+
+
 def test_a_count_is_swept_by_whole_numbers(running: Any, tmp_path: Path) -> None:
     small = re.sub(r"(columns|rows) = \d+", r"\1 = 2", TEXT) + "\n[output]\nformats = []\n"
     (tmp_path / "small.toml").write_text(small, "utf-8")

@@ -10,7 +10,9 @@ pytest.importorskip("tomlkit", reason="the extra serve is not installed")
 from unitcad.arrays.array_names import array_templates
 from unitcad.serve.answers import answered
 from unitcad.serve.messages import Ask, Edit, Fault, Trusted, What
-from unitcad.validation import templates
+from unitcad.serve.server import _trusted
+from unitcad.spec import read_toml
+from unitcad.validation import custom_templates, templates
 
 
 def faults(template: str, edits: list[Edit], since: list[Edit], what: What = "unit") -> list[Fault]:
@@ -139,3 +141,21 @@ def test_a_bed_that_is_too_small_is_refused_at_the_count_that_was_changed() -> N
     fault = faults("forearm-patch", edits, since, "moulds")[0]
     assert "layout.columns = 9 would do" in fault.message
     assert (fault.field, fault.at, fault.at_nearest) == ("moulds.bed_x_mm", "layout.columns", 9)
+
+
+def test_no_option_of_the_command_line_is_told_on_the_page() -> None:
+    path = custom_templates()["custom/dome"]
+    known = Trusted([_trusted(read_toml(path), path, code=True)])
+    told = answered(Ask(text=path.read_text("utf-8"), what="moulds"), known).faults
+    assert [fault.field for fault in told] == ["design"]
+    assert "can't be cast" in told[0].message
+    assert "--only" not in told[0].message
+
+
+def test_the_form_of_an_array_says_what_its_numbers_are_and_what_holds() -> None:
+    text = array_templates()["forearm-pockets"].read_text("utf-8")
+    fields = {field.path: field for group in answered(Ask(text=text), Trusted()).groups for field in group.fields}
+    assert fields["sheet.strap_slot_mm.0"].label == "strap slot width"
+    assert fields["sheet.strap_slot_mm.1"].label == "strap slot length"
+    assert "stl" in fields["output.formats"].value
+    assert not fields["output.formats"].given

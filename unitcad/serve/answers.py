@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from unitcad.arrays.array_names import is_array
-from unitcad.errors import Refusal, UnitcadError, UnknownKey
+from unitcad.errors import NEAREST, UNIT_ALONE, Refusal, UnitcadError, UnknownKey
 from unitcad.serve import array_answers, unit_answers
 from unitcad.serve.edits import edited
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted
@@ -83,14 +83,15 @@ def effective(text: bytes, trusted: bytes) -> bytes:
 
 
 def _fault(error: UnitcadError) -> Fault:
+    message = str(error).replace(UNIT_ALONE, "")  # the page shows the unit alone, and has no options
     if isinstance(error, Refusal):
         given = error.as_dict()
         if isinstance(error, UnknownKey):
             # What is nearest is a key's name; `remedied` tells whether the text is accepted with it.
             rename = (str(error.nearest), given["value"]) if error.nearest else None
-            return Fault(str(error), error.field, line=error.line, rename=rename)
-        return Fault(str(error), error.field, given["nearest"], error.line)
-    return Fault(str(error))
+            return Fault(message.partition(NEAREST)[0], error.field, line=error.line, rename=rename)
+        return Fault(message, error.field, given["nearest"], error.line)
+    return Fault(message)
 
 
 def _line_of(message: str) -> int | None:

@@ -131,7 +131,8 @@ def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
     there = isinstance(data.get("circuit"), dict)
     rows = [*fields(CircuitTable, "circuit", data, holds, choices)] if there else []
     made.append(Group("circuit", "Common circuit", rows, there, optional=True))
-    return [*made, *table_groups(LAST_TABLES, data, holds, choices)]
+    # What the array's tables leave out its unit has.
+    return [*made, *table_groups(LAST_TABLES, data, array.asked["unit"] if array else {}, choices)]
 
 
 def _with_kinds(rows: Iterator[Field], choices: Mapping[str, list[tuple[str, str]]]) -> Iterator[Field]:

@@ -3,6 +3,16 @@
   "use strict";
   const { el, clear, section, number } = window.unitcad;
   const EVERY_MS = 400;
+  // What a build's stages do, in words.
+  const STAGES = {
+    plan: "laying out the tools and the pours", meshes: "making the solids", drawing: "drawing the section", "step pictures": "drawing the steps of casting",
+    step: "writing the STEP files", pictures: "drawing pictures", "mould checks": "checking the moulds", check: "checking the printable files", estimate: "estimating the edge level",
+    patch: "making the patch", casting: "writing the casting procedure", "circuit and crosstalk": "drawing the circuit and the crosstalk", page: "writing the page",
+  };
+  const inWords = (stage) => {
+    const [, of = "", name] = /^(unit: )?(.*)$/.exec(stage);
+    return of + (STAGES[name] || name);
+  };
 
   // options: server, text(), name, folder, numbers() gives [{path, kind, value, low, high}] of the form's numbers.
   function createJobs({ server, text, name, folder, numbers }) {
@@ -10,7 +20,7 @@
     // Beside what is written anew, so that it keeps the focus.
     const cancel = el("button", { type: "button", hidden: true, onclick: () => server.send("/cancel", { job: running }) }, "Cancel");
     const log = el("div", { className: "job" });
-    const file = el("input", { type: "text", id: "file-name", value: name, spellcheck: "false", oninput: () => { typed = true; } });
+    const file = el("input", { type: "text", id: "file-name", value: name, spellcheck: "false", oninput: () => { typed = true; clear(said); } });
     let typed = false;
     const said = el("p", { className: "note", role: "status" });
     let running = null;
@@ -65,7 +75,7 @@
       const done = state.ended && (state.code === 0 || state.code === 1);
       // A count of variants is a length of the bar.
       const [, count, of] = /^(\d+) of (\d+) /.exec(state.stage) || [];
-      const words = !state.ended ? `${state.title} is under way: ${state.stage || "starting"}` : state.code === 0 ? `${state.title} is done.` : state.code === 1 ? `${state.title} is done, with findings.` : state.code === 130 || state.code < 0 ? `${state.title} was cancelled.` : `${state.title} failed.`;
+      const words = !state.ended ? `${state.title} is under way: ${state.stage ? inWords(state.stage) : "starting"}` : state.code === 0 ? `${state.title} is done.` : state.code === 1 ? `${state.title} is done, with findings.` : state.code === 130 || state.code < 0 ? `${state.title} was cancelled.` : `${state.title} failed.`;
       progress.dataset.ended = String(Boolean(state.ended));
       clear(progress, el("p", { className: "lead" }, words[0].toUpperCase() + words.slice(1)),
         !state.ended && el("progress", { "aria-label": state.title, ...(of ? { max: Number(of), value: Number(count) } : {}) }),
@@ -111,7 +121,12 @@
       }
     }
 
+    const build = async () => {
+      clear(said);
+      follow(await server.send("/build", { text: text() }));
+    };
     const sweep = async () => {
+      clear(said);
       if (![low, high, count].every((one) => one.value !== "" && one.checkValidity())) {
         clear(progress, el("p", { className: "fault" }, "A sweep needs its two ends, and from 2 to 50 values."));
         return;
@@ -127,7 +142,7 @@
     const field = (label, control) => el("label", {}, `${label} `, control);
     const node = section("do", "Save, build, sweep",
       el("div", { className: "tools" }, field(`Spec file in ${folder}`, file), el("button", { type: "button", onclick: () => save(false) }, "Save spec")), said,
-      el("div", { className: "tools" }, el("button", { type: "button", className: "main", onclick: async () => follow(await server.send("/build", { text: text() })) }, "Build this")),
+      el("div", { className: "tools" }, el("button", { type: "button", className: "main", onclick: build }, "Build this")),
       el("details", {}, el("summary", {}, "Sweep this"), el("div", { className: "tools" }, field("Key", key), field("from", low), field("to", high), field("values", count),
         el("button", { type: "button", onclick: sweep }, "Run the sweep"))),
       progress, cancel, log);

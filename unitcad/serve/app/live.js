@@ -77,6 +77,8 @@
     // The text as the page knows it; edits that are under way are in the next one.
     function now() { return state.text; }
 
+    function noun() { return state.groups.some((group) => group.title === "Array") ? "array" : "unit"; }
+
     function numbers() {
       return state.groups.flatMap((group) => group.fields).filter((field) => ["number", "integer"].includes(field.kind) && typeof field.value === "number");
     }
@@ -114,20 +116,10 @@
         // Only the newest value of a key that is being dragged is worth sending.
         state.pending = state.pending.filter((one) => one.path !== change.path || one.remove || change.remove);
         state.pending.push(change);
-        state.changed = newest(change.path, state.changed);
-        state.unmade = newest(change.path, state.unmade);
+        state.changed = U.newestFirst(change.path, state.changed);
+        state.unmade = U.newestFirst(change.path, state.unmade);
       }
       ask();
-    }
-
-    function newest(path, paths) { return [path, ...paths.filter((one) => one !== path)].slice(0, 5); }
-
-    // Edits that take back to the fields of before what was changed since then, newest first.
-    function since(changed, before) {
-      return changed.filter((path) => before.has(path)).map((path) => {
-        const field = before.get(path);
-        return field.given ? { path, value: field.value, ...(field.kind === "toml" ? { toml: true } : {}) } : { path, remove: true };
-      });
     }
 
     // A default that follows from other values is not known while one of them is refused: the last one stays in its field.
@@ -173,7 +165,7 @@
       chip.textContent = "working";
       page.setAttribute("aria-busy", "true");
       const sent = state.pending.length;
-      const answer = await server.ask("unit", state.text, state.pending, since(state.changed, state.accepted));
+      const answer = await server.ask("unit", state.text, state.pending, U.takenBack(state.changed, state.accepted));
       if (!answer || mine !== state.asked) return;
       if (answer.lost || answer.text === undefined) {
         said("bad", answer.faults[0].message);
@@ -184,6 +176,11 @@
       state.pending = state.pending.slice(sent);
       keep();
       const faults = answer.faults || [];
+      // What undo or the text changed is known once its form is there.
+      if (faults.length && answer.groups && !state.changed.length && document.activeElement !== text) {
+        state.changed = U.unlike(answer.groups, state.accepted);
+        if (state.changed.length) return ask();
+      }
       state.layers = answer.layers || 0;
       if (answer.groups) {
         state.groups = faults.length ? answer.groups.map((group) => ({ ...group, fields: (group.fields || []).map(held) })) : answer.groups;
@@ -202,7 +199,7 @@
       const typing = document.activeElement === text;
       textFault.textContent = !typing && !unread.length ? "" : faults.map((one) => (one.field && one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
       if (unread.length) tabs.open = true;
-      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), faults.length > 0 && el("p", { className: "note" }, state.unit.text ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
+      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), faults.length > 0 && el("p", { className: "note" }, state.unit.text ? `What is shown is the last ${noun()} that could be made.` : "Nothing could be made yet."));
       page.dataset.stale = String(faults.length > 0);
       buttons();
       if (!faults.length) await shown(answer);
@@ -257,7 +254,7 @@
           time("estimate", answer);
           showEstimate(answer);
         }),
-        server.ask("moulds", state.text, [], since(state.unmade, state.made)).then(async (answer) => {
+        server.ask("moulds", state.text, [], U.takenBack(state.unmade, state.made)).then(async (answer) => {
           if (!answer || mine !== state.asked) return;
           state.moulds = { ...answer, of: state.unit.text };
           await showMoulds(answer);
@@ -295,7 +292,7 @@
       if (faults.length) {
         said("bad", "no moulds");
         const left = form.refuse(faults);
-        clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, "This unit has no moulds; the view keeps the unit alone."));
+        clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, `This ${noun()} has no moulds; the view keeps it alone.`));
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
       } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.laws.length} mould checks failed` : `${manifest.laws.length} mould checks passed`);
