@@ -9,6 +9,11 @@ from collections.abc import Iterable
 
 from unitcad.text import toml
 
+NEAREST = "; nearest accepted: "
+"""What a refusal's sentence names the nearest accepted value after."""
+UNIT_ALONE = "; --only unit makes the unit alone"
+"""How a refusal of moulds ends that leaves the unit possible."""
+
 
 class UnitcadError(Exception):
     """A request that can't be met, or something that the machine lacks: exit code 2, no traceback."""
@@ -38,9 +43,9 @@ class Refusal(UnitcadError):
 
     def __init__(self, field: str, value: object, limit: str, nearest: object = None) -> None:
         self.field, self.value, self.limit, self.nearest = field, value, limit, nearest
-        text = f"{field}: {limit}" if value is None else f"{field} = {_shown(value)}: {limit}"
+        text = f"{field}: {limit}" if value is None else f"{field} = {shown(value)}: {limit}"
         if nearest is not None:
-            text += f"; nearest accepted: {_shown(nearest)}"
+            text += NEAREST + shown(nearest)
         super().__init__(text)
 
     def as_dict(self) -> dict[str, object]:
@@ -106,7 +111,8 @@ def misfit(error: Exception) -> str:
     return f"{place} has a value of the wrong kind"
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
+    """Return a value as a refusal's sentence has it."""
     if isinstance(value, float):
         return f"{value:.6g}"
     plain = _plain(value)

@@ -62,6 +62,12 @@ def test_a_text_that_is_no_toml_is_told_with_its_line(server: Server, text: str)
     assert "thousands of digits" in longest["faults"][0]["message"]
 
 
+def test_a_design_s_file_is_refused_for_what_it_is(server: Server, text: str) -> None:
+    faults = server.ask(text.replace('design = "encapsulating"', 'design = "/tmp/evil.py:unit"'))["faults"]
+    assert [fault["field"] for fault in faults] == ["design"]
+    assert "only where the spec that the server was started with names it" in faults[0]["message"]
+
+
 def test_the_form_has_every_key_of_the_schema_with_its_range(server: Server, text: str) -> None:
     groups = server.ask(text)["groups"]
     fields = {field["path"]: field for group in groups for field in group["fields"]}

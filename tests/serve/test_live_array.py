@@ -181,6 +181,75 @@ def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
     live.close()
 
 
+def test_a_kind_that_needs_other_keys_offers_each_act_once_also_after_undo(running: Any, pockets: Server) -> None:
+    live = Live(running, pockets)
+    kind = 'select[name="layout.kind"]'
+
+    def buttons() -> list[str]:
+        return [one.inner_text() for one in live.page.locator(".refusal button").all()]
+
+    def turned(name: str) -> None:
+        count = len(live.timings())
+        live.page.select_option(kind, name)
+        live.until(lambda: len(live.timings()) > count)
+        live.settled()
+
+    turned("list")
+    assert buttons() == ["Use grid"]
+    assert live.page.get_attribute('input[name="layout.points_mm"]', "placeholder") == ""
+    assert "the last array that could be made" in live.page.inner_text("#faults")
+    live.pressed(live.page.locator(".refusal button"))
+    live.pressed(live.page.get_by_role("button", name="Undo"))
+    assert live.page.input_value(kind) == "list"
+    assert buttons() == ["Use grid"]
+    turned("hex")
+    assert len([one for one in buttons() if one.startswith("Leave out")]) == 1
+    live.close()
+
+
+def test_a_count_is_swept_by_whole_numbers(running: Any, tmp_path: Path) -> None:
+    small = re.sub(r"(columns|rows) = \d+", r"\1 = 2", TEXT) + "\n[output]\nformats = []\n"
+    (tmp_path / "small.toml").write_text(small, "utf-8")
+    with serving(tmp_path, "small.toml") as own:
+        live = Live(running, own)
+        live.page.click("text=Sweep this")
+        live.page.select_option("#sweep-key", "layout.columns")
+        assert [live.page.input_value(f"#sweep-{each}") for each in ("low", "high", "count")] == ["1", "4", "4"]
+        live.page.fill("#sweep-count", "3")
+        live.page.click("text=Run the sweep")
+        assert "from 1 to 4 there can be 2 or 4 values" in live.page.inner_text("#do .job")
+        live.page.fill("#sweep-high", "2")
+        live.page.fill("#sweep-count", "2")
+        live.page.click("text=Run the sweep")
+        live.page.wait_for_selector('.job[data-ended="true"]', timeout=240_000)
+        live.close()
+    sweep = tmp_path / "out" / "sweep-1" / "sweep.toml"
+    assert "[1, 2]" in sweep.read_text("utf-8")
+    rows = json.loads((sweep.parent / "results" / "batch.json").read_text("utf-8"))["variants"]
+    assert [row["status"] for row in rows] == ["ok", "ok"]
+
+
+def test_a_bed_refusal_stands_at_the_changed_count_and_goes_with_a_newer_answer(running: Any, tmp_path: Path) -> None:
+    columns = 'input[name="layout.columns"]'
+    with serving(tmp_path, "forearm-patch") as patch:
+        live = Live(running, patch)
+        live.choose('input[name="layout.pitch_mm"]', "18")
+        live.choose(columns, "12")
+        live.until(lambda: live.state == "no moulds")
+        use = live.page.locator('.field[data-path="layout.columns"] .refusal').get_by_role("button").first
+        assert use.inner_text() == "Use 9"
+        assert "moulds.bed_x_mm" in live.page.inner_text("#judged")
+        live.page.evaluate(
+            "() => { const at = document.querySelector('#judged');"
+            " new MutationObserver(() => { window.seen ??= at.children.length; }).observe(at, { childList: true }); }"
+        )
+        use.click()
+        live.until(lambda: "passed" in live.state)
+        assert live.page.input_value(columns) == "9"
+        assert live.page.evaluate("() => window.seen") == 0
+        live.close()
+
+
 def test_a_campaign_is_measured_again_after_a_save(running: Any, tmp_path: Path) -> None:
     shutil.copytree(CAMPAIGN.parent, tmp_path / "lab")
     file = tmp_path / "lab" / CAMPAIGN.name

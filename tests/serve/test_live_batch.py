@@ -65,6 +65,26 @@ def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running: Any
         visit.close()
 
 
+def test_a_refused_row_opens_with_its_values_and_its_refusal(running: Any, tmp_path: Path) -> None:
+    base = {"base": "single-embedded", "set": {"output.formats": []}}
+    sweep = from_file({**base, "sweep": {"layers.0.wall_mm": [9.0, 1.0]}}, Path(), "walls")
+    run(sweep, tmp_path / "walls", BatchOptions(("unit",), check=False), SerialExecutor(), workers=1)
+    with serving(tmp_path, str(tmp_path / "walls")) as own:
+        visit = Live(running, own)
+        # The page begins with the first variant that was made.
+        assert visit.page.input_value(WALL) == "1"
+        row = visit.page.locator("#variants tbody th a").first
+        assert row.inner_text() == "variant 0"
+        visit.pressed(row)
+        visit.until(lambda: visit.page.input_value(WALL) == "9")
+        visit.settled()
+        assert visit.state == "1 value is refused"
+        use = visit.page.locator('.field[data-path="layers.0.wall_mm"] .refusal').get_by_role("button").first
+        visit.pressed(use)
+        assert "passed" in visit.state
+        visit.close()
+
+
 def test_the_folder_of_a_result_opens_its_spec(batch: Path) -> None:
     folder = sorted(batch.glob("encapsulating-*"))[0]
     with serving(batch.parent, str(folder)) as own:

@@ -113,6 +113,15 @@ def test_a_change_that_another_field_refuses_is_refused_where_it_was_made(live: 
     assert "passed" in live.state
 
 
+def test_an_act_has_one_button_at_its_own_field(live: Live) -> None:
+    live.choose('input[name="motor.diameter_mm"]', "99999")
+    assert "diameter_mm = 14" in live.page.inner_text("#faults")
+    assert [button.inner_text() for button in live.page.locator(".refusal button").all()] == ["Use 8.8"]
+    own = live.page.locator('.field[data-path="motor.diameter_mm"] .refusal')
+    assert own.get_by_role("button").count() == 1
+    assert "nearest accepted: 8.8" in own.inner_text()
+
+
 def test_wires_take_the_circuit_s_place_and_a_cap_is_left_out(live: Live) -> None:
     live.page.click("summary:text-is('Wires')")
     live.pressed(live.page.get_by_label("with wires"))
@@ -287,6 +296,9 @@ def test_save_and_build_from_the_page(running: Any, tmp_path: Path) -> None:
         words = visit.page.evaluate("() => [...window.words]")
         assert words[0] == "The build is under way: starting"
         assert len(words) > 2, words
+        assert "The build is under way: plan" not in words
+        assert any("laying out the tools" in each or "checking the moulds" in each for each in words), words
+        assert f"In {tmp_path / 'out'}/" in visit.page.inner_text(".job")
         assert "The build is done." in visit.page.inner_text(".job")
         with visit.context.expect_page() as opened:
             visit.page.click("text=Open its page")
@@ -298,6 +310,40 @@ def test_save_and_build_from_the_page(running: Any, tmp_path: Path) -> None:
     manifests = list((tmp_path / "out").glob("*/manifest.json"))
     assert len(manifests) == 1
     assert all(check["ok"] for check in json.loads(manifests[0].read_text())["laws"])
+
+
+def test_the_file_s_name_follows_the_template_unless_a_person_named_it(live: Live) -> None:
+    assert live.page.input_value("#file-name") == "encapsulating.toml"
+    live.start_from("embedded")
+    assert live.page.input_value("#file-name") == "embedded.toml"
+    live.page.fill("#file-name", "mine.toml")
+    live.start_from("three-layer")
+    assert live.page.input_value("#file-name") == "mine.toml"
+
+
+def test_words_stand_whole_and_buttons_clear_of_lines(running: Any, server: Server) -> None:
+    narrow = Live(running, server, width=390)
+    lines = (
+        "() => { const name = document.querySelector('h1');"
+        " return name.getClientRects()[0].height / parseFloat(getComputedStyle(name).lineHeight); }"
+    )
+    assert narrow.page.evaluate(lines) == pytest.approx(1, abs=0.1)
+    narrow.close()
+    wide = Live(running, server)
+    below = (
+        "() => [...document.querySelectorAll('.fields > button, #spec > .buttons')]"
+        ".map((one) => parseFloat(getComputedStyle(one).marginBottom))"
+    )
+    assert min(wide.page.evaluate(below)) >= 8
+    wide.close()
+
+
+def test_a_message_about_a_file_s_name_goes_with_a_newer_act(live: Live) -> None:
+    live.page.fill("#file-name", "/etc/x.toml")
+    live.page.click("text=Save spec")
+    live.until(lambda: "A file's name has" in live.page.inner_text("#do"))
+    live.page.fill("#file-name", "x.toml")
+    assert "A file's name has" not in live.page.inner_text("#do")
 
 
 def test_an_older_answer_does_not_replace_a_newer_one(live: Live) -> None:

@@ -9,14 +9,16 @@ import pytest
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
 from unitcad.arrays.array_names import array_templates
 from unitcad.serve.answers import answered
-from unitcad.serve.messages import Ask, Edit, Fault, Trusted
-from unitcad.validation import templates
+from unitcad.serve.messages import Ask, Edit, Fault, Trusted, What
+from unitcad.serve.server import _trusted
+from unitcad.spec import read_toml
+from unitcad.validation import custom_templates, templates
 
 
-def faults(template: str, edits: list[Edit], since: list[Edit]) -> list[Fault]:
+def faults(template: str, edits: list[Edit], since: list[Edit], what: What = "unit") -> list[Fault]:
     """The faults of a template after edits."""
     text = (templates() | array_templates())[template].read_text("utf-8")
-    return answered(Ask(text=text, edits=edits, since=since), Trusted()).faults
+    return answered(Ask(text=text, edits=edits, since=since, what=what), Trusted()).faults
 
 
 @pytest.mark.parametrize(
@@ -86,9 +88,9 @@ def test_a_default_that_was_changed_has_a_nearest_value_too() -> None:
 def test_what_is_offered_is_accepted_where_another_field_refuses_the_nearest_value() -> None:
     edit = Edit(path="layout.pitch_mm", value=10)
     fault = faults("forearm-pockets", [edit], [Edit(path="layout.pitch_mm", value=20)])[0]
-    assert "nearest accepted: 16" in fault.message
     assert fault.nearest is not None
     assert fault.nearest > 16
+    assert fault.message.endswith(f"; nearest accepted: {fault.nearest:g}")
     assert faults("forearm-pockets", [Edit(path="layout.pitch_mm", value=fault.nearest)], []) == []
 
 
@@ -107,3 +109,53 @@ def test_wires_begin_with_what_they_need_in_place_of_the_circuit() -> None:
     assert not wires.present
     edits = [Edit(path=wires.instead, remove=True), Edit(path="wires", value=wires.needs)]
     assert faults("encapsulating", edits, []) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "accepted"),
+    [
+        ("layers.0.wall_mm", 1.25),
+        ("motor.diameter_mm", 7.0),
+        ("moulds.layer_mm", 0.2),
+        ("diameter_mm", 14),
+        ("layers.0.cap_mm", 1.25),
+    ],
+)
+def test_the_value_that_is_offered_has_moulds_and_stands_in_the_sentence_too(path: str, accepted: float) -> None:
+    fault = faults("encapsulating", [Edit(path=path, value=99999)], [Edit(path=path, value=accepted)])[0]
+    assert fault.field == path
+    assert fault.message.endswith(f"; nearest accepted: {fault.nearest:g}")
+    assert faults("encapsulating", [Edit(path=path, value=fault.nearest)], [], "moulds") == []
+
+
+def test_the_nearest_value_is_the_same_whatever_was_typed() -> None:
+    path = "layers.0.wall_mm"
+    for typed in (9, 999, 99999, 1e12):
+        fault = faults("encapsulating", [Edit(path=path, value=typed)], [Edit(path=path, value=1.25)])[0]
+        assert (fault.at_nearest if fault.at else fault.nearest) == 2.15, typed
+
+
+def test_a_bed_that_is_too_small_is_refused_at_the_count_that_was_changed() -> None:
+    edits = [Edit(path="layout.pitch_mm", value=18), Edit(path="layout.columns", value=50)]
+    since = [Edit(path="layout.columns", value=3), Edit(path="layout.pitch_mm", value=18)]
+    fault = faults("forearm-patch", edits, since, "moulds")[0]
+    assert "layout.columns = 9 would do" in fault.message
+    assert (fault.field, fault.at, fault.at_nearest) == ("moulds.bed_x_mm", "layout.columns", 9)
+
+
+def test_no_option_of_the_command_line_is_told_on_the_page() -> None:
+    path = custom_templates()["custom/dome"]
+    known = Trusted([_trusted(read_toml(path), path, code=True)])
+    told = answered(Ask(text=path.read_text("utf-8"), what="moulds"), known).faults
+    assert [fault.field for fault in told] == ["design"]
+    assert "can't be cast" in told[0].message
+    assert "--only" not in told[0].message
+
+
+def test_the_form_of_an_array_says_what_its_numbers_are_and_what_holds() -> None:
+    text = array_templates()["forearm-pockets"].read_text("utf-8")
+    fields = {field.path: field for group in answered(Ask(text=text), Trusted()).groups for field in group.fields}
+    assert fields["sheet.strap_slot_mm.0"].label == "strap slot width"
+    assert fields["sheet.strap_slot_mm.1"].label == "strap slot length"
+    assert "stl" in fields["output.formats"].value
+    assert not fields["output.formats"].given

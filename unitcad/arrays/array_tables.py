@@ -49,7 +49,8 @@ class SheetTable(Table, frozen=True, kw_only=True):
         Annotated[float, Meta(ge=0.5, le=200)] | None, Meta(description="radius; left out, round the corner units")
     ] = None
     strap_slot_mm: Annotated[
-        tuple[Length, Length] | None, Meta(description="width along x and length along y, one at either end")
+        tuple[Annotated[Length, Meta(title="width")], Annotated[Length, Meta(title="length")]] | None,
+        Meta(description="width along x and length along y, one at either end"),
     ] = None
     strap_web_mm: Annotated[float, Meta(ge=1, le=200, description="from a strap slot to the end of the sheet")] = 5.0
     hold_mm: Annotated[

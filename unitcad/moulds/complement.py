@@ -24,7 +24,7 @@ from manifold3d import Manifold, OpType
 from unitcad.designs import design_of, dimensions, inserts
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Tooling
-from unitcad.errors import Refusal
+from unitcad.errors import UNIT_ALONE, Refusal
 from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_count
 from unitcad.kernels.sections import widest
 from unitcad.moulds.base import stand
@@ -244,4 +244,4 @@ def _place(piece: Manifold) -> str:
 
 
 def _refused(spec: Spec, layer: int, why: str) -> Refusal:
-    return Refusal("design", spec.design, f"pour {layer + 1} can't be cast: {why}; --only unit makes the unit alone")
+    return Refusal("design", spec.design, f"pour {layer + 1} can't be cast: {why}{UNIT_ALONE}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
 from unitcad.designs.tooling import Cell, Layout, Tooling
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
 from unitcad.moulds import lid
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.concentric import concentric
@@ -204,7 +204,7 @@ def cast_layers(spec: Spec) -> tuple[Shape, ...]:
     if len(bodies) != len(spec.layers):
         drawn = ", ".join(body.name for body in bodies) or "none"
         limit = f"moulds need each of the spec's {len(spec.layers)} [[layers]] drawn as layer1 ...; it draws {drawn}"
-        raise Refusal("design", spec.design, f"{limit}; --only unit makes the unit alone")
+        raise Refusal("design", spec.design, f"{limit}{UNIT_ALONE}")
     return tuple(body.shape for body in bodies)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from unitcad.arrays.array_names import is_array
-from unitcad.errors import Refusal, UnitcadError, UnknownKey
+from unitcad.errors import NEAREST, UNIT_ALONE, Refusal, UnitcadError, UnknownKey
 from unitcad.serve import array_answers, unit_answers
 from unitcad.serve.edits import edited
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted
@@ -50,9 +50,11 @@ def answered(ask: Ask, trusted: Trusted) -> Answer:
         kind.ANSWERS[ask.what](subject, answer)
     except Refusal as error:
         answer.faults = [_fault(error)]
-        if subject is None and whole is not None:  # else it is what the moulds or the estimate met
+        if whole is not None and subject is None:
             every = [_fault(one) for one in kind.faults_of(error, whole, text)]
-            answer.faults = remedied(every, whole, ask.since, kind.judge)
+            answer.faults = remedied(every, whole, ask.since, kind.judge, kind.makeable)
+        elif whole is not None and ask.what == "moulds":
+            answer.faults = remedied([_fault(error)], whole, ask.since, kind.makeable, kind.makeable)
     except UnitcadError as error:
         answer.faults = [_fault(error)]
     if ask.what == "unit":
@@ -79,14 +81,15 @@ def effective(text: bytes, trusted: bytes) -> bytes:
 
 
 def _fault(error: UnitcadError) -> Fault:
+    message = str(error).replace(UNIT_ALONE, "")  # the page shows the unit alone, and has no options
     if isinstance(error, Refusal):
         given = error.as_dict()
         if isinstance(error, UnknownKey):
             # What is nearest is a key's name; `remedied` tells whether the text is accepted with it.
             rename = (str(error.nearest), given["value"]) if error.nearest else None
-            return Fault(str(error), error.field, line=error.line, rename=rename)
-        return Fault(str(error), error.field, given["nearest"], error.line)
-    return Fault(str(error))
+            return Fault(message.partition(NEAREST)[0], error.field, line=error.line, rename=rename)
+        return Fault(message, error.field, given["nearest"], error.line)
+    return Fault(message)
 
 
 def _line_of(message: str) -> int | None:

@@ -191,7 +191,9 @@ class Live:
             raise Refusal("high", sweep.high, f"must be above low, {sweep.low:g}")
         given, code = await self._effective(sweep.text)
         step = (sweep.high - sweep.low) / (sweep.count - 1)
-        values = [round(sweep.low + i * step, 6) for i in range(sweep.count)]
+        values: list[float] = [round(sweep.low + i * step, 6) for i in range(sweep.count)]
+        if all(value.is_integer() for value in values):
+            values = [int(value) for value in values]  # a count of units takes no 3.0
         asked = f'base = "spec.toml"\n\n[sweep]\nmode = "product"\n{toml(sweep.key)} = {toml(values)}\n'
         # A folder of its own, in which the sweep file stays beside the results.
         folder = self._free_folder("sweep")

@@ -15,6 +15,7 @@ from unitcad.arrays.array_file import array_of, expanded, to_toml
 from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.array_tables import AskedArray, BodyTable, CircuitTable, SheetTable
 from unitcad.arrays.layouts import layouts
+from unitcad.arrays.made_plan import made_plan
 from unitcad.catalogue import materials
 from unitcad.errors import Refusal
 from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
@@ -36,6 +37,13 @@ as_toml = to_toml
 def judge(data: dict[str, Any]) -> Mapping[str, Any]:
     """Return an array's plain data with its units' whole specs, settled. Raises UnitcadError."""
     return array_of(data).asked
+
+
+def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
+    """Return what `judge` does. Raises UnitcadError also for an array whose tools or circuit can't be made."""
+    array = array_of(data)
+    made_plan(array)
+    return array.asked
 
 
 def asked_toml(text: str, data: Mapping[str, Any], array: Array, trusted: Trusted) -> str:
@@ -123,7 +131,8 @@ def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
     there = isinstance(data.get("circuit"), dict)
     rows = [*fields(CircuitTable, "circuit", data, holds, choices)] if there else []
     made.append(Group("circuit", "Common circuit", rows, there, optional=True))
-    return [*made, *table_groups(LAST_TABLES, data, holds, choices)]
+    # What the array's tables leave out its unit has.
+    return [*made, *table_groups(LAST_TABLES, data, array.asked["unit"] if array else {}, choices)]
 
 
 def _with_kinds(rows: Iterator[Field], choices: Mapping[str, list[tuple[str, str]]]) -> Iterator[Field]:

@@ -24,7 +24,7 @@ from unitcad.spec.asked import (
     OutputTable,
     WiresTable,
 )
-from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, notes
+from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, notes, titled
 from unitcad.text import number, toml
 from unitcad.validation.dotted import ABSENT, at
 
@@ -96,7 +96,8 @@ def fields(
         entries = _numbers_of(info.type, value)
         if entries and value is not None:
             for i, (kind, one) in enumerate(zip(entries, value, strict=True)):
-                made = _field(f"{where}.{i}", f"{_label(name)} {i + 1}", kind, one, given is not ABSENT, [])
+                label = f"{_label(name)} {titled(kind) or i + 1}"
+                made = _field(f"{where}.{i}", label, kind, one, given is not ABSENT, [])
                 yield replace(made, required=info.required, meaning=meaning(info.type))
             continue
         made = _field(where, _label(name), info.type, value, given is not ABSENT, choices.get(_place(where), []))

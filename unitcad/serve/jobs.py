@@ -121,7 +121,7 @@ class Jobs:
         job.state.code = await child.wait()
         folder = Path(printed[-1]) if printed and job.state.code in (0, 1) else None
         if folder and folder.is_dir():
-            job.state.folder = str(folder)
+            job.state.folder = str(folder.resolve())
             page = folder / "report.html"
             if page.is_file() and page.resolve().is_relative_to(self.out.resolve()):
                 file = page.resolve().relative_to(self.out.resolve()).as_posix()

@@ -17,7 +17,7 @@ SHARED = (
     "compare.js", "table.js", "batch.js",
 )  # fmt: skip
 """Programs of the report that the page runs."""
-PROGRAMS = ("server.js", "kept.js", "form.js", "pinned.js", "jobs.js", "live.js")
+PROGRAMS = ("server.js", "kept.js", "changes.js", "form.js", "pinned.js", "jobs.js", "refused_rows.js", "live.js")
 HEADER_POLICY = "frame-ancestors 'none'"
 """What a policy in the page itself can't say."""
 

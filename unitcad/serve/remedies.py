@@ -10,51 +10,107 @@ import tomlkit
 from msgspec.structs import replace
 from tomlkit.exceptions import TOMLKitError
 
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import NEAREST, Refusal, UnitcadError, shown
 from unitcad.serve.messages import Edit, Fault
 from unitcad.validation import put
 from unitcad.validation.dotted import ABSENT, at, drop
 
-_HALVINGS = 24
+_HALVINGS = 60
+_FINEST = 1e-7
+"""Two numbers so near to each other, for their size, are one."""
+_MOST_LIMITS = 5
+"""Limits of one field that are tried out in turn for a value to offer."""
 
 
 Judge = Callable[[dict[str, Any]], Mapping[str, Any]]
 """Validates plain data and returns it settled; raises UnitcadError for a fault."""
 
 
-def remedied(faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[Edit], judge: Judge) -> list[Fault]:
-    """Return the faults of plain data, each with its remedies: what `judge` accepts.
+def remedied(
+    faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[Edit], judge: Judge, whole: Judge
+) -> list[Fault]:
+    """Return the faults of plain data, each with its remedies: what `judge` accepts, and where it can be `whole` too.
 
     `since` takes back what was changed since the data was accepted, newest first. Where one of these changes alone is
-    to blame for a fault of another field, the fault stands `at` the changed one.
+    to blame for a fault of another field, the fault stands `at` the changed one. `whole` also refuses what no tools can
+    be made of.
     """
     changed = {edit.path for edit in since}
     blamed = None
     if any(fault.field not in changed for fault in faults):
         blamed = next((edit for edit in since if _accepted(_after(data, edit), judge)), None)
     own = {edit.path: edit for edit in since}
-    told = [_remedied(one, data, None if one.field in own else blamed, own.get(one.field), judge) for one in faults]
+    alone = len(faults) == 1
+    told = [
+        _remedied(one, data, None if one.field in own else blamed, own.get(one.field), alone, judge, whole)
+        for one in faults
+    ]
     return _left_out(told, data, judge)
 
 
-def _remedied(fault: Fault, data: Mapping[str, Any], blamed: Edit | None, own: Edit | None, judge: Judge) -> Fault:
+def _remedied(
+    fault: Fault,
+    data: Mapping[str, Any],
+    blamed: Edit | None,
+    own: Edit | None,
+    alone: bool,
+    judge: Judge,
+    whole: Judge,
+) -> Fault:
     """Return a fault with its remedy; `own` takes back the change of its field, `blamed` that of another one."""
     if fault.rename is not None:
         if _accepted(_renamed(data, fault.field, fault.rename[0]), judge):
             return fault
         fault = replace(fault, rename=None)
+    if fault.nearest is not None:
+        fault = _offering(fault, _tried(fault, data, own, alone, judge, whole))
+    elif own and (nearest := _nearest(data, own, judge, whole)) is not None:
+        fault = _offering(fault, nearest)
     if blamed is not None:
-        back = blamed.value if isinstance(blamed.value, str) and not blamed.toml else _nearest(data, blamed, judge)
+        back = blamed.value if isinstance(blamed.value, str) and not blamed.toml else None
+        back = _nearest(data, blamed, judge, whole) if back is None else back
         return replace(fault, at=blamed.path, at_nearest=back)
-    enough = fault.nearest is not None and _accepted(_after(data, Edit(path=fault.field, value=fault.nearest)), judge)
-    if own and not enough and (nearest := _nearest(data, own, judge)) is not None:
-        # Something else refuses what this field's own fault would accept.
-        return replace(fault, nearest=nearest)
     if fault.nearest is None and at(data, fault.field) is not ABSENT:
         without = copy.deepcopy(dict(data))
         if drop(without, fault.field) and _accepted(without, judge):
             return replace(fault, leave_out=True)
     return fault
+
+
+def _offering(fault: Fault, nearest: Any) -> Fault:
+    """Return a fault that offers a value, in its sentence too."""
+    if nearest == fault.nearest:
+        return fault
+    message, _, _ = fault.message.partition(NEAREST)
+    return replace(fault, nearest=nearest, message=message if nearest is None else message + NEAREST + shown(nearest))
+
+
+def _tried(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool, judge: Judge, whole: Judge) -> Any:
+    """Return what to offer for a fault in place of its nearest value, which meets its own limit; None for nothing."""
+    whole_too = _onwards(data, fault.field, fault.nearest, whole)
+    if whole_too is not None:
+        return whole_too
+    if own and (nearest := _nearest(data, own, judge, whole)) is not None:
+        return nearest
+    # Where nothing makes all of it accepted, or nothing says what was, it cures its own fault.
+    cures = not alone or not own or _accepted(_after(data, Edit(path=fault.field, value=fault.nearest)), judge)
+    return fault.nearest if cures else None
+
+
+def _onwards(data: Mapping[str, Any], path: str, value: Any, judge: Judge) -> Any:
+    """Return a value that is accepted at a path: the given one, or the one that its refusals offer in its place."""
+    for _ in range(_MOST_LIMITS):
+        try:
+            judge(_after(data, Edit(path=path, value=value)))
+        except Refusal as refusal:
+            if refusal.field != path or refusal.nearest is None:
+                return None
+            value = refusal.nearest
+        except UnitcadError:
+            return None
+        else:
+            return value
+    return None
 
 
 def _renamed(data: Mapping[str, Any], path: str, right: str) -> dict[str, Any]:
@@ -75,7 +131,7 @@ def _left_out(faults: Sequence[Fault], data: Mapping[str, Any], judge: Judge) ->
     return [replace(one, leave_out=True, together=[field for field in fields if field != one.field]) for one in faults]
 
 
-def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge) -> float | None:
+def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge, whole: Judge) -> float | None:
     """Return the accepted number nearest to the refused one, on the way from the one that was accepted before."""
     refused, accepted = at(data, edit.path), edit.value
     if edit.remove:
@@ -89,15 +145,29 @@ def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge) -> float | None:
     def taken(value: float) -> bool:
         return _accepted(_after(data, Edit(path=edit.path, value=value)), judge)
 
-    if not taken(accepted):
+    if _accepted(_after(data, Edit(path=edit.path, value=accepted)), whole):
+        judge = whole
+    elif not taken(accepted):
         return None
+    if isinstance(refused, int) and isinstance(accepted, int) and not taken(accepted + (refused > accepted) - 0.5):
+        return _last(taken, accepted, refused)
     least, most = sorted((accepted, refused))
     low, high = float(accepted), float(refused)
     for _ in range(_HALVINGS):
+        if abs(high - low) <= _FINEST * max(1.0, abs(low)):
+            break
         middle = (low + high) / 2
         low, high = (middle, high) if taken(middle) else (low, middle)
     rounded = (round(low + shift, digits) for digits in (2, 3, 4) for shift in (0.0, -(10.0**-digits), 10.0**-digits))
     return next((value for value in rounded if least <= value <= most and taken(value)), low)
+
+
+def _last(taken: Callable[[float], bool], accepted: int, refused: int) -> int:
+    """Return the last whole number that is taken on the way from an accepted to a refused one."""
+    while abs(refused - accepted) > 1:
+        middle = (accepted + refused) // 2
+        accepted, refused = (middle, refused) if taken(middle) else (accepted, middle)
+    return accepted
 
 
 def _is_float(value: object) -> TypeGuard[float]:

@@ -12,7 +12,7 @@ from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Trusted
 from unitcad.spec import Spec, convert, to_data, to_toml
 from unitcad.spec.asked import AskedSpec
-from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, with_source
+from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, is_custom, with_source
 from unitcad.validation import from_data
 from unitcad.validation.defaults import effective
 from unitcad.validation.load import all_faults
@@ -43,6 +43,15 @@ def judge(data: dict[str, Any]) -> Mapping[str, Any]:
     return to_data(effective(convert(data, AskedSpec)))
 
 
+def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
+    """Return what `judge` does. Raises UnitcadError also for a unit that has no moulds."""
+    from unitcad.moulds.mould_set import MouldSet
+
+    spec = effective(convert(data, AskedSpec))
+    _ = MouldSet(spec).plan
+    return to_data(spec)
+
+
 def asked_toml(text: str, data: Mapping[str, Any], spec: Spec, trusted: Trusted) -> str:
     """Return what a text asks for as TOML that names no file: the text itself where it names none."""
     import tomlkit
@@ -59,9 +68,16 @@ def holds_code(spec: Spec) -> bool:
 
 
 def folder_for(data: Mapping[str, Any], trusted: Trusted) -> Path | None:
-    """Return the folder that a text's files start at; None unless it names those of a trusted spec alone."""
-    named = files_named(data)
-    return next((Path(source.folder) for source in trusted.sources if source.named == named), None) if named else None
+    """Return the folder that a text's files start at; None unless it names those of a trusted spec alone.
+
+    Raises Refusal for a design's file that no trusted spec names.
+    """
+    named, design = files_named(data), data.get("design")
+    folders = [Path(source.folder) for source in trusted.sources if source.named == named]
+    if not folders and is_custom(design) and data.get("design_source") is None:
+        limit = "a design's file is read only where the spec that the server was started with names it"
+        raise Refusal("design", design, limit)
+    return folders[0] if named and folders else None
 
 
 def _unit(spec: Spec, answer: Answer) -> None:

@@ -71,6 +71,11 @@ def notes(kind: Any) -> Iterator[msgspec.Meta]:
             yield from notes(member)
 
 
+def titled(kind: Any) -> str:
+    """Return the title that a kind is annotated with, or nothing."""
+    return next((note.title for note in notes(kind) if note.title), "")
+
+
 def meaning(kind: Any) -> str:
     """Return the description that a kind is annotated with, or nothing."""
     return next((note.description for note in notes(kind) if note.description), "")

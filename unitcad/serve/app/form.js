@@ -89,7 +89,7 @@
         set(next) {
           const text = next.value === null || next.value === undefined ? "" : String(next.value);
           if (document.activeElement !== input || Number(input.value) !== next.value) input.value = text;
-          input.placeholder = text ? "" : "default";
+          input.placeholder = text || next.required ? "" : "default";
           place(next.value);
         },
       };
@@ -114,7 +114,7 @@
       const input = el("input", { type: "text", id, spellcheck: "false", onchange: () => options.change(field.path, input.value, { toml: field.kind === "toml" }) });
       return { main: input, others: [], set: (next) => {
         if (document.activeElement !== input) input.value = next.value ?? "";
-        input.placeholder = next.value ? "" : "default";
+        input.placeholder = next.value || next.required ? "" : "default";
       } };
     }
 
@@ -130,21 +130,26 @@
       return { main: box, others: [], set: (next) => { box.checked = Boolean(next.value); } };
     }
 
-    // What would make a refused text accepted, as words and what they do: a value here, one in another field, none.
-    function remedies(one, path) {
-      const out = [one.field, ...(one.together || [])];
-      const use = (at, value, where) => value !== undefined && value !== null && [`Use ${where}${typeof value === "number" ? number(value, 6) : value}`, () => options.change(at, value)];
+    // What would make a refused text accepted, as words, what they do and its name: a value in the field of `place`, one in another, none.
+    function remedies(one, place) {
+      const out = [one.field, ...(one.together || [])].sort();
+      const use = (at, value) => value !== undefined && value !== null && [`Use ${at === place ? "" : `${at} = `}${typeof value === "number" ? number(value, 6) : Array.isArray(value) ? `[${value.join(", ")}]` : value}`, () => options.change(at, value), `${at} = ${value}`];
       return [
-        one.at && use(one.at, one.at_nearest, ""),
-        use(one.field || path, one.nearest, one.at ? `${one.field} = ` : ""),
-        one.rename && [`Rename it ${one.rename[0]}`, () => options.rename(one.field, ...one.rename)],
-        one.leave_out && [out.length > 1 ? `Leave out ${out.join(" and ")}` : "Leave it out", () => options.remove(...out)],
+        one.at && use(one.at, one.at_nearest),
+        use(one.field, one.nearest),
+        one.rename && [`Rename it ${one.rename[0]}`, () => options.rename(one.field, ...one.rename), `${one.field} as ${one.rename[0]}`],
+        one.leave_out && [out.length > 1 ? `Leave out ${out.join(" and ")}` : "Leave it out", () => options.remove(...out), `without ${out}`],
       ].filter(Boolean);
     }
 
-    // A refusal with its reason and a button for each remedy; `then` puts the focus where the button no longer is.
-    function told(one, path, then) {
-      return [one.message, remedies(one, path).map(([words, act]) => el("button", { type: "button", onclick: () => {
+    // The remedies of what is refused now that have a button: the same one has it once.
+    let offered = new Set();
+
+    // A refusal at the field of `place`, with its reason and a button for each remedy; `then` puts the focus where the button no longer is.
+    function told(one, place, then) {
+      const fresh = remedies(one, place).filter(([, , what]) => !offered.has(what));
+      for (const [, , what] of fresh) offered.add(what);
+      return [one.message, fresh.map(([words, act]) => el("button", { type: "button", onclick: () => {
         act();
         then();
       } }, words))];
@@ -217,6 +222,7 @@
     function refuse(faults) {
       const left = [];
       const at = new Map();
+      offered = new Set();
       for (const one of faults) {
         const field = one.field || "";
         const place = [one.at, field, field.replace(/\.\d+$/, "")].find((path) => controls.has(path));

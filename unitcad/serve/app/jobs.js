@@ -3,16 +3,33 @@
   "use strict";
   const { el, clear, section, number } = window.unitcad;
   const EVERY_MS = 400;
+  // What a build's stages do, in words.
+  const STAGES = {
+    plan: "laying out the tools and the pours", meshes: "making the solids", drawing: "drawing the section", "step pictures": "drawing the steps of casting",
+    step: "writing the STEP files", pictures: "drawing pictures", "mould checks": "checking the moulds", check: "checking the printable files", estimate: "estimating the edge level",
+    patch: "making the patch", casting: "writing the casting procedure", "circuit and crosstalk": "drawing the circuit and the crosstalk", page: "writing the page",
+  };
+  const inWords = (stage) => {
+    const [, of = "", name] = /^(unit: )?(.*)$/.exec(stage);
+    return of + (STAGES[name] || name);
+  };
 
-  // options: server, text(), name, folder, numbers() gives [{path, value, low, high}] of the form's numbers.
+  // options: server, text(), name, folder, numbers() gives [{path, kind, value, low, high}] of the form's numbers.
   function createJobs({ server, text, name, folder, numbers }) {
     const progress = el("div", { className: "job", role: "status", tabindex: "-1" });
     // Beside what is written anew, so that it keeps the focus.
     const cancel = el("button", { type: "button", hidden: true, onclick: () => server.send("/cancel", { job: running }) }, "Cancel");
     const log = el("div", { className: "job" });
-    const file = el("input", { type: "text", id: "file-name", value: name, spellcheck: "false" });
+    const file = el("input", { type: "text", id: "file-name", value: name, spellcheck: "false", oninput: () => { typed = true; clear(said); } });
+    let typed = false;
     const said = el("p", { className: "note", role: "status" });
     let running = null;
+
+    // Another spec has another file, unless a person named one.
+    function suggest(other) {
+      if (!typed) file.value = other;
+      clear(said);
+    }
 
     async function save(replace) {
       const named = file.value.trim();
@@ -58,7 +75,7 @@
       const done = state.ended && (state.code === 0 || state.code === 1);
       // A count of variants is a length of the bar.
       const [, count, of] = /^(\d+) of (\d+) /.exec(state.stage) || [];
-      const words = !state.ended ? `${state.title} is under way: ${state.stage || "starting"}` : state.code === 0 ? `${state.title} is done.` : state.code === 1 ? `${state.title} is done, with findings.` : state.code === 130 || state.code < 0 ? `${state.title} was cancelled.` : `${state.title} failed.`;
+      const words = !state.ended ? `${state.title} is under way: ${state.stage ? inWords(state.stage) : "starting"}` : state.code === 0 ? `${state.title} is done.` : state.code === 1 ? `${state.title} is done, with findings.` : state.code === 130 || state.code < 0 ? `${state.title} was cancelled.` : `${state.title} failed.`;
       progress.dataset.ended = String(Boolean(state.ended));
       clear(progress, el("p", { className: "lead" }, words[0].toUpperCase() + words.slice(1)),
         !state.ended && el("progress", { "aria-label": state.title, ...(of ? { max: Number(of), value: Number(count) } : {}) }),
@@ -80,6 +97,15 @@
     const offer = () => {
       const one = numbers().find((each) => each.path === key.value);
       if (!one) return;
+      const whole = one.kind === "integer";
+      low.step = high.step = whole ? "1" : "any";
+      if (whole) {
+        low.value = String(Math.max(one.low ?? 0, one.value - 2));
+        high.value = String(Math.min(one.high ?? Infinity, one.value + 2));
+        count.value = String(Math.max(2, high.valueAsNumber - low.valueAsNumber + 1));
+        return;
+      }
+      count.value = "5";
       low.value = String(Number(Math.max(one.low ?? -Infinity, one.value * 0.8).toPrecision(4)));
       high.value = String(Number(Math.min(one.high ?? Infinity, one.value * 1.2).toPrecision(4)));
     };
@@ -95,9 +121,20 @@
       }
     }
 
+    const build = async () => {
+      clear(said);
+      follow(await server.send("/build", { text: text() }));
+    };
     const sweep = async () => {
+      clear(said);
       if (![low, high, count].every((one) => one.value !== "" && one.checkValidity())) {
         clear(progress, el("p", { className: "fault" }, "A sweep needs its two ends, and from 2 to 50 values."));
+        return;
+      }
+      const across = high.valueAsNumber - low.valueAsNumber;
+      if (low.step === "1" && across > 0 && across % (count.valueAsNumber - 1)) {
+        const counts = Array.from({ length: Math.min(across, 49) }, (_, i) => i + 1).filter((steps) => across % steps === 0).map((steps) => steps + 1);
+        clear(progress, el("p", { className: "fault" }, `${key.value} is a whole number: from ${low.value} to ${high.value} there can be ${counts.join(" or ")} values.`));
         return;
       }
       follow(await server.send("/sweep", { text: text(), key: key.value, low: low.valueAsNumber, high: high.valueAsNumber, count: count.valueAsNumber }));
@@ -105,11 +142,11 @@
     const field = (label, control) => el("label", {}, `${label} `, control);
     const node = section("do", "Save, build, sweep",
       el("div", { className: "tools" }, field(`Spec file in ${folder}`, file), el("button", { type: "button", onclick: () => save(false) }, "Save spec")), said,
-      el("div", { className: "tools" }, el("button", { type: "button", className: "main", onclick: async () => follow(await server.send("/build", { text: text() })) }, "Build this")),
+      el("div", { className: "tools" }, el("button", { type: "button", className: "main", onclick: build }, "Build this")),
       el("details", {}, el("summary", {}, "Sweep this"), el("div", { className: "tools" }, field("Key", key), field("from", low), field("to", high), field("values", count),
         el("button", { type: "button", onclick: sweep }, "Run the sweep"))),
       progress, cancel, log);
-    return { node, keys };
+    return { node, keys, suggest };
   }
 
   Object.assign(window.unitcad, { createJobs });

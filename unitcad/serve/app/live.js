@@ -13,7 +13,7 @@
     const data = JSON.parse(new TextDecoder().decode(packed));
     const server = U.createServer();
     const kept = U.keepText(data.text);
-    const state = { text: kept.text, pending: [], past: kept.past, future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], opened: "", later: 0, asked: 0 };
+    const state = { text: kept.text, pending: [], past: kept.past, future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], made: new Map(), unmade: [], opened: "", later: 0, asked: 0 };
     window.unitcad.timings = [];
 
     const form = U.createForm({
@@ -38,7 +38,7 @@
     const textFault = el("p", { className: "refusal", id: "text-fault", role: "status" });
     const undo = el("button", { type: "button", onclick: () => step(state.past, state.future) }, "Undo");
     const redo = el("button", { type: "button", onclick: () => step(state.future, state.past) }, "Redo");
-    const template = el("select", { name: "template", "aria-label": "Start from a template", onchange: () => { if (template.value) startFrom(data.templates[template.value]); template.value = ""; } },
+    const template = el("select", { name: "template", "aria-label": "Start from a template", onchange: () => { if (template.value) startFrom(data.templates[template.value], `${template.value.split("/").pop()}.toml`); template.value = ""; } },
       el("option", { value: "" }, "Start from ..."), Object.entries(data.templates).map(([name, text]) => el("option", { value: name, disabled: text === null }, text === null ? `${name}: its code needs --allow-code` : name)));
     const title = el("h1", { tabindex: "-1" }, data.name);
     const opened = el("p", { className: "line" }, UNWRITTEN);
@@ -75,8 +75,10 @@
     // The text as the page knows it; edits that are under way are in the next one.
     function now() { return state.text; }
 
+    function noun() { return state.groups.some((group) => group.title === "Array") ? "array" : "unit"; }
+
     function numbers() {
-      return state.groups.flatMap((group) => group.fields).filter((field) => field.kind === "number" && typeof field.value === "number");
+      return state.groups.flatMap((group) => group.fields).filter((field) => ["number", "integer"].includes(field.kind) && typeof field.value === "number");
     }
 
     // What is shown, each with the spec that it is of: of a refused text the last unit that could be made.
@@ -112,17 +114,10 @@
         // Only the newest value of a key that is being dragged is worth sending.
         state.pending = state.pending.filter((one) => one.path !== change.path || one.remove || change.remove);
         state.pending.push(change);
-        state.changed = [change.path, ...state.changed.filter((one) => one !== change.path)].slice(0, 5);
+        state.changed = U.newestFirst(change.path, state.changed);
+        state.unmade = U.newestFirst(change.path, state.unmade);
       }
       ask();
-    }
-
-    // Edits that take back what was changed since the text was last accepted, newest first.
-    function since() {
-      return state.changed.filter((path) => state.accepted.has(path)).map((path) => {
-        const field = state.accepted.get(path);
-        return field.given ? { path, value: field.value, ...(field.kind === "toml" ? { toml: true } : {}) } : { path, remove: true };
-      });
     }
 
     // A default that follows from other values is not known while one of them is refused: the last one stays in its field.
@@ -131,8 +126,9 @@
       return (field.value === undefined || field.value === null) && before && !field.required ? { ...field, value: before.value } : field;
     }
 
-    function startFrom(text) {
+    function startFrom(text, file = data.name) {
       state.opened = "";
+      jobs.suggest(file);
       replaceText(text);
     }
 
@@ -167,7 +163,7 @@
       chip.textContent = "working";
       page.setAttribute("aria-busy", "true");
       const sent = state.pending.length;
-      const answer = await server.ask("unit", state.text, state.pending, since());
+      const answer = await server.ask("unit", state.text, state.pending, U.takenBack(state.changed, state.accepted));
       if (!answer || mine !== state.asked) return;
       if (answer.lost || answer.text === undefined) {
         said("bad", answer.faults[0].message);
@@ -180,6 +176,11 @@
       state.pending = state.pending.slice(sent);
       keep();
       const faults = answer.faults || [];
+      // What undo or the text changed is known once its form is there.
+      if (faults.length && answer.groups && !state.changed.length && document.activeElement !== text) {
+        state.changed = U.unlike(answer.groups, state.accepted);
+        if (state.changed.length) return ask();
+      }
       state.layers = answer.layers || 0;
       if (answer.groups) {
         state.groups = faults.length ? answer.groups.map((group) => ({ ...group, fields: (group.fields || []).map(held) })) : answer.groups;
@@ -190,13 +191,15 @@
         state.accepted = new Map(answer.groups.flatMap((group) => group.fields || []).map((field) => [field.path, field]));
         state.changed = [];
       }
+      // A newer answer takes away why there were no moulds.
+      if (page.dataset.moulds === "none") clear(judged);
       // What is wrong with the text itself stands under it alone, a value's fault at its field; who types the text has all there.
       const unread = faults.filter((one) => !one.field);
       const homeless = form.refuse(faults.filter((one) => one.field));
       const typing = document.activeElement === text;
       textFault.textContent = !typing && !unread.length ? "" : faults.map((one) => (one.field && one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
       if (unread.length) tabs.open = true;
-      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, form.told(one, one.field, toForm))), faults.length > 0 && el("p", { className: "note" }, state.unit.text ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
+      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), faults.length > 0 && el("p", { className: "note" }, state.unit.text ? `What is shown is the last ${noun()} that could be made.` : "Nothing could be made yet."));
       page.dataset.stale = String(faults.length > 0);
       buttons();
       if (!faults.length) await shown(answer);
@@ -251,7 +254,7 @@
           time("estimate", answer);
           showEstimate(answer);
         }),
-        server.ask("moulds", state.text).then(async (answer) => {
+        server.ask("moulds", state.text, [], U.takenBack(state.unmade, state.made)).then(async (answer) => {
           if (!answer || mine !== state.asked) return;
           state.moulds = { ...answer, of: state.unit.text };
           await showMoulds(answer);
@@ -285,6 +288,7 @@
         const list = U.parts.checks({ manifest });
         clear(judged, (answer.lines || []).map((line) => el("p", {}, line)), [...list.childNodes].slice(1));
       } else clear(judged, faults.map((one) => el("p", { className: "refusal" }, one.message)));
+      if (!faults.length) [state.made, state.unmade] = [state.accepted, []];
       if (answer.model && state.model) {
         state.model = { ...state.model, ...answer.model };
         if (stage) await stage.update(state.model).catch(() => {});
@@ -297,7 +301,7 @@
       } else if (faults.length) {
         said("bad", "no moulds");
         const left = form.refuse(faults);
-        clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, one.field, toForm))), el("p", { className: "note" }, "This unit has no moulds; the view keeps the unit alone."));
+        clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, `This ${noun()} has no moulds; the view keeps it alone.`));
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
       } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.laws.length} mould checks failed` : `${manifest.laws.length} mould checks passed`);
@@ -323,17 +327,35 @@
       else return;
       event.preventDefault();
     });
+    function variant(folder) { return server.send(`/variant/${encodeURIComponent(folder)}`); }
+
+    // What a refused row starts from: its base where that is a template, else the first variant that was made.
+    async function startOf({ base }) {
+      return data.templates[base] ? { text: data.templates[base] } : variant(batch.first);
+    }
+
+    // What the row starts from is accepted, so its values are refused where they stand, with what would do.
+    async function openRefused(text, changes) {
+      remember("", false);
+      state.text = text;
+      state.pending = [];
+      await ask();
+      edit(changes);
+    }
+
     // A row of the batch that is opened: its spec becomes the one that is changed.
     async function openVariant() {
       const folder = U.variantAsked();
       if (!folder) return;
-      const answer = await server.send(`/variant/${encodeURIComponent(folder)}`);
+      const refused = batch.refused.get(folder);
+      const answer = refused ? await startOf(refused) : await variant(folder);
       if (answer.text === undefined) {
         clear(others, el("p", { className: "refusal" }, answer.faults[0].message));
         return;
       }
       state.opened = folder;
-      replaceText(answer.text);
+      if (refused) await openRefused(answer.text, refused.changes);
+      else replaceText(answer.text);
       // The same row may be opened again.
       history.replaceState(null, "", location.pathname);
       page.querySelector(".columns").scrollIntoView();
@@ -342,9 +364,8 @@
 
     // A batch's page begins with its first variant.
     async function openFirst() {
-      // A row begins with its folder.
-      const [[folder] = []] = (data.batch.table || { rows: [] }).rows;
-      const answer = folder ? await server.send(`/variant/${encodeURIComponent(folder)}`) : {};
+      const folder = batch.first;
+      const answer = folder ? await variant(folder) : {};
       if (answer.text !== undefined) [state.text, state.opened] = [answer.text, folder];
       text.value = state.text;
       ask();
@@ -361,8 +382,11 @@
 
   function createBatch(data) {
     const { variant, why } = U.records(data);
-    const made = U.batch(data, why, variant);
-    return { plot: made.plot, node: el("details", { id: "of-batch", open: true }, el("summary", {}, `${data.title}: a name opens the variant live`), made.sections) };
+    const { table, refused } = data.table ? U.refusedRows(data) : { table: { rows: [] }, refused: new Map() };
+    // A row begins with its folder.
+    const [first] = table.rows.map(([folder]) => folder).filter((folder) => folder && !refused.has(folder));
+    const made = U.batch({ ...data, table }, why, variant);
+    return { plot: made.plot, refused, first, node: el("details", { id: "of-batch", open: true }, el("summary", {}, `${data.title}: a name opens the variant live`), made.sections) };
   }
 
   try {

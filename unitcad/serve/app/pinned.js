@@ -11,7 +11,7 @@
     const pin = el("button", { type: "button", onclick: () => set({ ...current() }) }, "Pin this variant");
     const back = el("button", { type: "button", hidden: true, onclick: () => restore(pinned.text) }, "Go back to it");
     const unpin = el("button", { type: "button", hidden: true, onclick: () => { set(null); pin.focus(); } }, "Unpin");
-    const node = section("pinned", "Side by side", el("div", { className: "buttons" }, pin, back, unpin), host);
+    const node = section("pinned", "A pinned variant beside this one", el("div", { className: "buttons" }, pin, back, unpin), host);
 
     function set(one) {
       pinned = one;
@@ -44,7 +44,7 @@
       clear(host, sideBySide(heads, [
         ["Section and estimate", [["Section", columns.map((one) => one.section)], ["Estimate", columns.map((one) => one.answer)]]],
         ["Figures", names.map((name) => [name, columns.map((one) => one.figures.get(name) || "–")])],
-        ["What differs in the specs", unlike],
+        ["What differs in the specs", unlike.map(([path, cells]) => [path.split(/(?<=[._])/).flatMap((piece) => [piece, el("wbr")]), cells])],
       ]), !now.refused && !unlike.length && el("p", { className: "note" }, "The specs are the same."));
     }
 
