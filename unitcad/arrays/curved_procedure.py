@@ -20,7 +20,8 @@ from unitcad.casting.bill import Item, bill, injecting
 from unitcad.casting.finishing import motor_in, never_pushed
 from unitcad.casting.finishing import release as flat_release
 from unitcad.casting.finishing import shown as grams_shown
-from unitcad.casting.instructions import cure, draw_up, inject, lid_held, mixed, pour_steps, rest
+from unitcad.casting.holding import lid_held
+from unitcad.casting.instructions import cure, draw_up, inject, mixed, pour_steps, rest
 from unitcad.casting.needs import needs
 from unitcad.casting.preparation import printing
 from unitcad.casting.procedure import Procedure, bubbles, pour_of, procedure

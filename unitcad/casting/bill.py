@@ -7,9 +7,9 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from unitcad.casting.bench_extras import tape_places
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Mix
 from unitcad.casting.needs import Need
+from unitcad.casting.tape import side_places, tape_places
 from unitcad.casting.tongue_prop import grip_of, tongue_prop
 from unitcad.catalogue import Material, motors
 from unitcad.moulds.base import PRY_HALF_WIDTH
@@ -145,5 +145,5 @@ def consumed(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> Itera
     if lengths.pour == "injected":
         yield from injecting(moulds.spec, mixes)
     elif cups:
-        strips = 2 * len(tape_places(moulds)) * pours
+        strips = 2 * (len(tape_places(moulds)) + len(side_places(moulds))) * pours
         yield Item("adhesive tape", strips, "strip", "bought", "holds each cup down; 8 mm wide, 30 mm long")
