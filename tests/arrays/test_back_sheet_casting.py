@@ -180,3 +180,14 @@ def test_pins_hold_no_cup_in_line_that_is_cut_where_the_base_is(changes: list[st
     (join,) = [step.text for step in made.preparation if step.title == "Join the pieces"]
     assert ("The pins hold the pieces of each cup in line" in join) is not cut_alike
     assert ("cut at the same gap" in join) is cut_alike
+
+
+def test_agent_goes_into_the_last_cup_alone(made: Procedure) -> None:
+    """Nothing bonds to the sheet's skin side; Layer 1 and the core's face bond later."""
+    assert [[(face.tool, face.face) for face in pour.agent] for pour in made.pours] == [[], [("cup2", "bore")]]
+    on = [next(step.text for step in pour.steps if step.title.endswith(" on")) for pour in made.pours]
+    assert on[0].startswith("No release agent on any piece: what is cast here bonds later")
+    assert "only on the sheet's bed and the bores of cup 2" in on[1]
+    assert "none on base or Layer 1, ever" in on[1]
+    assert "release agent" in {item.item for item in made.bill}
+    assert not any(bond.face.tool == "cup2" for bond in made.bonds)
