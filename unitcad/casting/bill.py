@@ -116,8 +116,8 @@ def _ratings(spec: Spec) -> Iterator[str]:
 
 def injecting(spec: Spec, mixes: Sequence[Mix]) -> Iterator[Item]:
     """List what pours under a lid take, each with its mix."""
-    most, tip = max(mix.syringe_ml for mix in mixes), number(spec.moulds.sprue_mm, 3)
-    yield Item("syringe", len(mixes), "piece", "bought", f"{number(most, 2)} ml or more, tip up to {tip} mm")
+    size, tip = max(mix.syringe_size_ml for mix in mixes), number(spec.moulds.sprue_mm, 3)
+    yield Item("syringe", len(mixes), "piece", "bought", f"{number(size, 3)} ml, tip up to {tip} mm")
     yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
 
 

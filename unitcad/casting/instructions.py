@@ -241,11 +241,18 @@ def draw_up(mix: Mix) -> BenchStep:
     """Say how the mix gets into the syringe."""
     return BenchStep(
         "Draw up",
-        f"Draw at least {number(mix.syringe_ml, 2)} ml into a syringe: tip and plunger hold back some "
-        f"{number(fig.HELD_BACK_ML, 2)} ml of it (assumed). Point it up and push until silicone, no air, stands at the "
+        f"Draw all of it into a syringe of {number(mix.syringe_size_ml, 3)} ml: {number(mix.syringe_ml, 3)} ml fill "
+        f"the cavities and what tip and plunger hold back, some {number(fig.HELD_BACK_ML, 2)} ml (assumed). The rest "
+        f"of the {number(mix.millilitres, 3)} ml is for the beads at the vents, for leaks, and for what stays in the "
+        f"mixing cup.{_refilled(mix)} Point it up and push until silicone, no air, stands at the "
         "tip.",
         minutes=fig.STRIKE_MIN,
     )
+
+
+def _refilled(mix: Mix) -> str:
+    """Say so where no syringe holds the whole mix."""
+    return " Fill it again while the mix flows." if mix.syringe_size_ml < mix.millilitres else ""
 
 
 def inject(moulds: MouldSet, picture: str) -> BenchStep:
@@ -356,9 +363,9 @@ def _release_agent(moulds: MouldSet, step: Step) -> str:
     if moulds.plan.pins:
         earlier = f" or Layer {step.index - 1}" if step.index > 1 else ""
         return (
-            f"Release agent, if any, sparingly and only on the sheet's bed and the bores of cup {step.index}: a printed "
-            "cup holds a thin sheet fast. Put it on away from the base and let it dry. None in the slots for the fins, "
-            f"and none on base{earlier}, ever: what bonds later is cast there."
+            f"Release agent, if any, sparingly and only on the sheet's bed and the bores of cup {step.index}: a "
+            "printed cup holds a thin sheet fast. Put it on away from the base and let it dry. None in the slots for the "
+            f"fins, and none on base{earlier}, ever: what bonds later is cast there."
         )
     where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)
     return (
