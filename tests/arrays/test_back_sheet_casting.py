@@ -11,11 +11,12 @@ import pytest
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.casting.bench_extras import HELD, TAPE_WIDTH, tape_places
 from unitcad.casting.in_short import pour_warnings
 from unitcad.casting.instructions import GREASE
 from unitcad.casting.procedure import Procedure
+from unitcad.casting.tape import HELD, TAPE_WIDTH, side_places, tape_places
 from unitcad.casting.written import to_markdown
+from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.shape.lettering import seen
 
 
@@ -117,7 +118,7 @@ def test_each_piece_of_a_long_tool_is_held_down() -> None:
     hold = next(step.text for step in made.pours[0].steps if step.title == "Hold cup 1 down")
     assert len(places) >= 2 * half / HELD
     assert f"run {len(places)} strips of tape from" in hold
-    (inner,) = re.findall(r"one at either end, the others ([^;]*) mm from the left one; each piece", hold)
+    (inner,) = re.findall(r"one at either end, the others ([^.;]*) mm from the left one[.] Each piece", hold)
     assert [float(at) for at in re.findall(r"\d+", inner)] == pytest.approx(
         [at - places[0] for at in places[1:-1]], rel=0.05
     )
@@ -137,3 +138,56 @@ def test_a_pour_that_outlasts_its_pot_life_is_warned_of() -> None:
         pours = back_sheet_procedure(moulds, [100.0] * 2, 1000.0).pours
         warned = list(pour_warnings((f"pour {pour.index}", pour.verdict) for pour in pours))
         assert [line.split(" in pour")[0] for line in warned] == ["mixing and pouring outlast the pot life"] * late
+
+
+def test_each_piece_of_a_base_in_three_is_held_and_levered() -> None:
+    """The middle piece is too narrow for a strip beside its filaments: one reaches 1 mm over a seam."""
+    moulds = patch_moulds(load_array("forearm-patch", ["moulds.bed_x_mm=60"]))
+    (base, *_), places = moulds.plan.splits, tape_places(moulds)
+    half = moulds.plan.layout.cup[0]
+    assert len(base.pieces) == 3
+    for low, high in pairwise((-half, *(seam.line[0][0] for seam in base.seams), half)):
+        assert max(min(high, at + TAPE_WIDTH) - max(low, at) for at in places) >= TAPE_WIDTH - 1
+    made = back_sheet_procedure(moulds, [100.0] * 2, 1000.0)
+    (off,) = [step.text for step in made.release if step.title == "Base off, downwards"]
+    assert "in every pry slot; at a piece that has none" in off
+    assert "Leave the tape over the seams of the underside on" in off
+    assert "The tape stays on until the base is off" in " ".join(step.text for step in made.preparation)
+
+
+def test_pieces_between_others_have_tape_on_the_other_sides() -> None:
+    """A base in three rows: the middle one reaches neither front nor back; its strip leaves the pry slot free."""
+    moulds = patch_moulds(load_array("forearm-patch", ["layout.rows=12", "moulds.bed_y_mm=100"]))
+    (base, *_) = moulds.plan.splits
+    assert (len(base.pieces), base.columns) == (3, 1)
+    assert side_places(moulds)
+    for at in side_places(moulds):
+        assert at >= PRY_HALF_WIDTH or at + TAPE_WIDTH <= -PRY_HALF_WIDTH
+    low, high = (seam.line[0][0] for seam in base.seams)
+    assert any(low <= at and at + TAPE_WIDTH <= high for at in side_places(moulds))
+    made = back_sheet_procedure(moulds, [100.0] * 2, 1000.0)
+    hold = next(step.text for step in made.pours[0].steps if step.title == "Hold cup 1 down")
+    assert "On each of the two other sides" in hold
+    (tape,) = [item for item in made.bill if item.item == "adhesive tape"]
+    assert tape.quantity == 2 * 2 * (len(tape_places(moulds)) + len(side_places(moulds)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "cut_alike"), [(["layout.columns=8", "moulds.bed_x_mm=140"], False), (["moulds.bed_x_mm=60"], True)]
+)
+def test_pins_hold_no_cup_in_line_that_is_cut_where_the_base_is(changes: list[str], cut_alike: bool) -> None:
+    made = back_sheet_procedure(patch_moulds(load_array("forearm-patch", changes)), [100.0] * 2, 1000.0)
+    (join,) = [step.text for step in made.preparation if step.title == "Join the pieces"]
+    assert ("The pins hold the pieces of each cup in line" in join) is not cut_alike
+    assert ("cut at the same gap" in join) is cut_alike
+
+
+def test_agent_goes_into_the_last_cup_alone(made: Procedure) -> None:
+    """Nothing bonds to the sheet's skin side; Layer 1 and the core's face bond later."""
+    assert [[(face.tool, face.face) for face in pour.agent] for pour in made.pours] == [[], [("cup2", "bore")]]
+    on = [next(step.text for step in pour.steps if step.title.endswith(" on")) for pour in made.pours]
+    assert on[0].startswith("No release agent on any piece: what is cast here bonds later")
+    assert "only on the sheet's bed and the bores of cup 2" in on[1]
+    assert "none on base or Layer 1, ever" in on[1]
+    assert "release agent" in {item.item for item in made.bill}
+    assert not any(bond.face.tool == "cup2" for bond in made.bonds)

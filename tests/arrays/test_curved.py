@@ -272,6 +272,16 @@ def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> No
     assert "flat pliers" not in items  # for tongues that are cut
 
 
+def test_the_syringe_takes_the_whole_mix_and_the_filaments_go_in_before_the_base_stands(made: Procedure) -> None:
+    """9.7 ml are mixed for cavities of 6.1 ml: the next syringe that is sold has 10."""
+    text = {step.title: step.text for step in made.pours[1].steps}
+    assert text["Draw up"].startswith("Draw all of it into a syringe of 10 ml")
+    (syringe,) = [item for item in made.bill if item.item == "syringe"]
+    assert syringe.note.startswith("10 ml")
+    filament = text["Filament into base 2"]
+    assert filament.index("push one up") < filament.index("Then stand it down")
+
+
 def test_the_flat_circuit_goes_whole_into_the_sleeve_laid_flat(made: Procedure) -> None:
     solder, lay_in, _ = made.assembly
     assert "until it lies flat" in solder.text

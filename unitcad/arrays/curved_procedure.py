@@ -20,7 +20,8 @@ from unitcad.casting.bill import Item, bill, injecting
 from unitcad.casting.finishing import motor_in, never_pushed
 from unitcad.casting.finishing import release as flat_release
 from unitcad.casting.finishing import shown as grams_shown
-from unitcad.casting.instructions import cure, draw_up, inject, lid_held, mixed, pour_steps, rest
+from unitcad.casting.holding import lid_held
+from unitcad.casting.instructions import cure, draw_up, inject, mixed, pour_steps, rest
 from unitcad.casting.needs import needs
 from unitcad.casting.preparation import printing
 from unitcad.casting.procedure import Procedure, bubbles, pour_of, procedure
@@ -148,9 +149,10 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
     )
     yield BenchStep(
         f"Filament into {base}",
-        f"Cut {units} straight pieces of filament, {_lengths(moulds)} mm long. Stand {base} on a board and push one up "
-        "through each core from below, until its lower end is flush with the underside: it stands on the bench and "
-        "can't sink. Trim the upper end flush with the core's top with a knife.",
+        f"Cut {units} straight pieces of filament, {_lengths(moulds)} mm long. Hold {base} in the hand and push one "
+        "up through each core from below, until its lower end is flush with the underside. Then stand it down on a "
+        "flat board: it bears the filaments, so none can sink. Trim the upper end flush with the core's top with a "
+        "knife.",
         _picture(step, "filament"),
         minutes=fig.FILAMENT_MIN * units,
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 
 from unitcad.moulds.base import outline, plate_bottom, plate_top, pry_floor
 from unitcad.moulds.cup import skirt_end
@@ -20,11 +19,6 @@ CARD, PAPER, GREASE, INK = (0.45, 0.72, 0.38), (0.96, 0.93, 0.62), (0.98, 0.72, 
 TAB = (0.93, 0.90, 0.78)
 CLEAR = 5.0
 """Between a piece that is lifted off and what it was on, mm."""
-BESIDE = 3.0
-"""From a filament's middle to tape, mm."""
-HELD = 60.0
-"""Length of a cup's side that one strip of tape holds down, mm (assumed)."""
-TAPE_WIDTH, TAPE_THICKNESS, BELOW_RIM = 8.0, 0.4, 0.8
 _FILM, _MARK = 0.15, 0.6
 """Grease on a tongue, and the width of a pen's mark on it, mm."""
 
@@ -64,53 +58,6 @@ def sideways(side: int, x: float, y: float, z: float, length: float) -> Extra:
 def along(way: tuple[float, float, float], x: float, y: float, z: float, length: float) -> Extra:
     """Draw an arrow along a direction square to y, its middle at (x, y, z)."""
     return Extra(moved(rotated(_arrow(length), "y", math.degrees(math.atan2(way[0], way[2]))), x, y, z), ARROW)
-
-
-def tape_places(moulds: MouldSet) -> tuple[float, ...]:
-    """Return where the strips of tape that hold a cup down begin along x, mm.
-
-    One for each `HELD` mm of it, the outer two at its ends, the others beside filaments, which leave in the middle;
-    one on each piece of split tools.
-    """
-    plan, half = moulds.plan, moulds.plan.layout.cup[0]
-    left, right, count = CORNER_RADIUS - half, half - MARK - TAPE_WIDTH, math.ceil(2 * half / HELD)
-    if count == 1:
-        return (left,)
-    beside = [at for cell in plan.layout.cells for at in (cell.x + BESIDE, cell.x - BESIDE - TAPE_WIDTH)]
-    free = [at for at in beside if all(not at < cell.x < at + TAPE_WIDTH for cell in plan.layout.cells)]
-
-    def nearest(wanted: float, among: list[float]) -> float:
-        return min(among, key=lambda at: (abs(at - wanted), at))
-
-    inner = [left + (right - left) * i / (count - 1) for i in range(1, count - 1)]
-    places = {left, right, *(nearest(wanted, free) for wanted in inner if free)}
-    seams = sorted({seam.at for split in plan.splits for seam in split.seams if seam.across == "x"})
-    for low, high in pairwise((-half, *seams, half)):
-        there = [at for at in free if low <= at <= high - TAPE_WIDTH]
-        if there and not any(low <= at <= high - TAPE_WIDTH for at in places):
-            places.add(nearest((low + high - TAPE_WIDTH) / 2, there))
-    return tuple(sorted(places))
-
-
-def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
-    """Draw the strips of tape on the two sides without a pry slot: cup's wall, plate, plate's edge, underside."""
-    lay = moulds.plan.layout
-    (bottom, top), thick = moulds.plate, TAPE_THICKNESS
-    strips: list[Extra] = []
-    for side in (1, -1):
-        runs = [
-            (lay.cup[1], lay.cup[1] + thick, top, step.rim - BELOW_RIM),
-            (lay.cup[1], lay.plate[1] + thick, top, top + thick),
-            (lay.plate[1], lay.plate[1] + thick, bottom - thick, top + thick),
-            (lay.plate[1] - 5.0, lay.plate[1] + thick, bottom - thick, bottom),
-        ]
-        boxes = [
-            box(left, left + TAPE_WIDTH, min(side * a, side * b), max(side * a, side * b), low, high)
-            for left in tape_places(moulds)
-            for a, b, low, high in runs
-        ]
-        strips.append(Extra(union(boxes), TAPE))
-    return tuple(strips)
 
 
 def bands(x: float, y: float, low: float, high: float) -> tuple[Extra, ...]:

@@ -8,6 +8,7 @@ A view's name is the name of its file.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from unitcad.casting.figures import window_length
 from unitcad.casting.laid_in_views import laid_in_views
 from unitcad.casting.mouths import sprue_and_vent
 from unitcad.casting.piece_views import joining_views, resin_views
+from unitcad.casting.tape import tape, tape_places
 from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.casting.tray_views import tray_views
 from unitcad.casting.way_out import motor_views, way_out
@@ -165,13 +167,19 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         yield "filled", View((*closed, poured), (*held, *tabs, filled), names=(Name("touch here", vent, ring=True),))
         held = (*held, filled)
     else:
-        held = (*pads, *draw.tape(moulds, step))
+        held = (*pads, *tape(moulds, step))
+        # In pieces, to show that each has its tape.
+        pieces = tuple(
+            replace(part, name=piece.name)
+            for part in closed
+            for piece in (plan.pieces_of(part.name) if any(part.name == s.tool for s in plan.splits) else (part,))
+        )
         yield (
             "hold",
             View(
-                closed,
+                pieces,
                 (*held, *tabs),
-                names=(Name("tape", (draw.tape_places(moulds)[0] + 4.0, -lay.plate[1], moulds.plate[1])),),
+                names=(Name("tape", (tape_places(moulds)[0] + 4.0, -lay.plate[1], moulds.plate[1])),),
             ),
         )
         thread = cylinder(0.6, step.rim - 1.0, step.rim + 14.0)

@@ -7,9 +7,9 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from unitcad.casting.bench_extras import tape_places
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Mix
 from unitcad.casting.needs import Need
+from unitcad.casting.tape import side_places, tape_places
 from unitcad.casting.tongue_prop import grip_of, tongue_prop
 from unitcad.catalogue import Material, motors
 from unitcad.moulds.base import PRY_HALF_WIDTH
@@ -116,8 +116,8 @@ def _ratings(spec: Spec) -> Iterator[str]:
 
 def injecting(spec: Spec, mixes: Sequence[Mix]) -> Iterator[Item]:
     """List what pours under a lid take, each with its mix."""
-    most, tip = max(mix.syringe_ml for mix in mixes), number(spec.moulds.sprue_mm, 3)
-    yield Item("syringe", len(mixes), "piece", "bought", f"{number(most, 2)} ml or more, tip up to {tip} mm")
+    size, tip = max(mix.syringe_size_ml for mix in mixes), number(spec.moulds.sprue_mm, 3)
+    yield Item("syringe", len(mixes), "piece", "bought", f"{number(size, 3)} ml, tip up to {tip} mm")
     yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
 
 
@@ -145,5 +145,5 @@ def consumed(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> Itera
     if lengths.pour == "injected":
         yield from injecting(moulds.spec, mixes)
     elif cups:
-        strips = 2 * len(tape_places(moulds)) * pours
+        strips = 2 * (len(tape_places(moulds)) + len(side_places(moulds))) * pours
         yield Item("adhesive tape", strips, "strip", "bought", "holds each cup down; 8 mm wide, 30 mm long")

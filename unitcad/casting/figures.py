@@ -62,6 +62,10 @@ def sourced(value: Value) -> str:
     return f"{value.status}: {value.source}"
 
 
+SYRINGES_ML = 5.0, 10.0, 20.0, 30.0, 60.0, 100.0
+"""The sizes that syringes are sold in, ml; larger mixes take more than one filling."""
+
+
 @dataclass(frozen=True)
 class Mix:
     """Grams of one pour: in all cavities (and channels), to weigh in, of each part, and what half a digit does.
@@ -77,6 +81,11 @@ class Mix:
     mix_error_pct: float
     millilitres: float
     syringe_ml: float = 0.0
+
+    @property
+    def syringe_size_ml(self) -> float:
+        """The smallest syringe that holds all that is mixed, else the largest there is, ml."""
+        return next((size for size in SYRINGES_ML if size >= self.millilitres), SYRINGES_ML[-1])
 
 
 def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:

@@ -11,6 +11,7 @@ from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import picture_path
 from unitcad.casting.eccentricity import eccentricity
 from unitcad.casting.figures import at_room
+from unitcad.casting.joining import inner
 from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.removal import CAST
@@ -45,9 +46,7 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
         yield BenchStep(
             "Base off, downwards",
             f"Take off what held the cup down. Leave {cup} on: it can't be lifted past the silicone that lies over it. "
-            f"Hold the mould off the bench by {cup}, put a screwdriver in each of the two pry slots, and lever the "
-            "base off downwards, on both sides at once and a little at a time, until it comes free of the silicone. It "
-            f"must come straight. The {moulds.makes} stays in {cup}.",
+            f"{_levered(moulds, cup)} The {moulds.makes} stays in {cup}.",
             picture_path("base-off"),
             minutes=fig.LIFT_MIN * 2,
         )
@@ -69,6 +68,31 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
         picture_path("peel"),
         minutes=fig.PEEL_MIN * len(moulds.plan.layout.cells),
     )
+
+
+def _levered(moulds: MouldSet, cup: str) -> str:
+    """Say how the base is levered off downwards: in pieces, all of them together."""
+    held = f"Hold the mould off the bench by {cup}"
+    split = next((split for split in moulds.plan.splits if split.tool == "base"), None)
+    if not split:
+        return (
+            f"{held}, put a screwdriver in each of the two pry slots, and lever the base off downwards, on both sides "
+            "at once and a little at a time, until it comes free of the silicone. It must come straight."
+        )
+    text = (
+        "Leave the tape over the seams of the underside on: it ties the pieces together. Dovetails slide up and down, "
+        f"so a piece that nothing levers stays on its cores. {held}. Lever the base off downwards with a screwdriver "
+        "in every pry slot; at a piece that has none, push a blunt spatula in between it and the cup, at its outer "
+        "edge, and turn it. Go round and round, a little at each place, so that no piece runs ahead of the next one "
+        "and all come free of the silicone together. The base must come straight."
+    )
+    if inner(split):
+        text += (
+            " A piece without an outer edge hangs by the tape alone: before you lever, stick more tape across it from "
+            "neighbour to neighbour, both ways, but not over the holes of the filaments, which let air in. Let its "
+            "neighbours get a millimetre ahead at most, and pull at the tape under it."
+        )
+    return text
 
 
 def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:

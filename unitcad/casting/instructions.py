@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from unitcad.casting import figures as fig
-from unitcad.casting.bench_extras import tape_places
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import View, picture_path
 from unitcad.casting.figures import MOST_ERROR_PCT, STRIKE_AGAIN_MIN, Mix, at_room, window_length
 from unitcad.casting.finishing import assembly, holds, lead, shown
+from unitcad.casting.holding import cup_held, lid_held
 from unitcad.casting.release_agent import agent_faces
 from unitcad.casting.tongue_prop import grip_of, tongue_prop
 from unitcad.catalogue import Material
@@ -17,16 +17,10 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.ribs import ribs
 from unitcad.spec import Spec
-from unitcad.text import listed, number, spaced
+from unitcad.text import number, spaced
 
 GREASE = "Grease the flanks"
 """The step that seals slits beside the cavity before the cup hides them."""
-HOLD = "Hold"
-"""How the step begins that keeps an open cup on its base under the blade."""
-LEVEL_AGAIN = (
-    "What runs under the plate may tilt it: look at the level once more, and put paper under until it is right."
-)
-"""How the step that holds a cup or a lid ends: nothing is moved between it and the cure."""
 TACK = (
     "it is done when a gloved fingertip, pressed on lightly and lifted, comes off without a pull and without a trace, "
     "and the dent of a fingernail springs back. If it still pulls or draws threads, wait half an hour and try again"
@@ -108,16 +102,7 @@ def pour_steps(
         )
         yield lid_held(step, picture("lid-held"))
     else:
-        strips, where = _strips(moulds)
-        yield BenchStep(
-            f"Hold cup {step.index} down",
-            f"{HOLD} cup {step.index} down while it is struck off: on each of the two sides without a pry slot run "
-            f"{strips} from the cup's wall, below the rim, round the plate's edge to its underside, beside the "
-            f"filament where there is one{where}. Clamps or weights do as well where they leave the rim free for the "
-            f"blade. {LEVEL_AGAIN}",
-            picture("hold"),
-            minutes=fig.HOLD_MIN,
-        )
+        yield cup_held(moulds, step, picture("hold"))
     if not wet:
         yield from mixed(moulds, step, silicone, mix, verdict)
     rests = rest(moulds.spec, step, silicone, verdict)
@@ -166,31 +151,9 @@ def pour_steps(
     yield from _cure_and_open(moulds, step, silicone, picture)
 
 
-def lid_held(step: Step, picture: str) -> BenchStep:
-    """Say how a lid is held down while silicone is injected."""
-    return BenchStep(
-        f"{HOLD} lid {step.index} down",
-        f"{HOLD} it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. "
-        f"{LEVEL_AGAIN}",
-        picture,
-        minutes=fig.HOLD_MIN,
-    )
-
-
 def rest(spec: Spec, step: Step, silicone: Material, verdict: str) -> BenchStep:
     """Say how bubbles rise where there is no vacuum, in the words of the verdict on them."""
     return BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=fig.rest_min(spec, step.rim, silicone))
-
-
-def _strips(moulds: MouldSet) -> tuple[str, str]:
-    """Say how many strips of tape hold a cup on each of two sides, and where they stick."""
-    first, *others = tape_places(moulds)
-    if not others:
-        return "a strip of tape", ""
-    *inner, _ = (number(at - first, 2) for at in others)
-    between = f", {'one' if len(inner) == 1 else 'the others'} {listed(inner)} mm from the left one" if inner else ""
-    each = "; each piece of cup and base has one" if moulds.plan.splits else ""
-    return f"{len(others) + 1} strips of tape", f": one at either end{between}{each}"
 
 
 def _groove(step: Step) -> str:
@@ -278,11 +241,18 @@ def draw_up(mix: Mix) -> BenchStep:
     """Say how the mix gets into the syringe."""
     return BenchStep(
         "Draw up",
-        f"Draw at least {number(mix.syringe_ml, 2)} ml into a syringe: tip and plunger hold back some "
-        f"{number(fig.HELD_BACK_ML, 2)} ml of it (assumed). Point it up and push until silicone, no air, stands at the "
+        f"Draw all of it into a syringe of {number(mix.syringe_size_ml, 3)} ml: {number(mix.syringe_ml, 3)} ml fill "
+        f"the cavities and what tip and plunger hold back, some {number(fig.HELD_BACK_ML, 2)} ml (assumed). The rest "
+        f"of the {number(mix.millilitres, 3)} ml is for the beads at the vents, for leaks, and for what stays in the "
+        f"mixing cup.{_refilled(mix)} Point it up and push until silicone, no air, stands at the "
         "tip.",
         minutes=fig.STRIKE_MIN,
     )
+
+
+def _refilled(mix: Mix) -> str:
+    """Say so where no syringe holds the whole mix."""
+    return " Fill it again while the mix flows." if mix.syringe_size_ml < mix.millilitres else ""
 
 
 def inject(moulds: MouldSet, picture: str) -> BenchStep:
@@ -326,11 +296,24 @@ def _cure_and_open(
     seat = "base" if moulds.plan.pins else "plinth"
     yield BenchStep(
         f"Cup {step.index} off",
-        f"{free}Lay a screwdriver in each of the two pry slots, its tip under the cup. Press both handles down at "
-        f"once, a little at a time, until the cup comes free of the {seat}. Lift cup {step.index} straight up. "
+        f"{free}{_pried(moulds, step, seat)} Lift cup {step.index} straight up. "
         f"Layer {step.index} stays on the {holds(moulds)}.",
         picture("cup-off"),
         minutes=fig.LIFT_MIN,
+    )
+
+
+def _pried(moulds: MouldSet, step: Step, seat: str) -> str:
+    """Say how a cup is levered off its seat: in pieces, all of them."""
+    if len(moulds.plan.pieces_of(step.cup)) > 1:
+        return (
+            "Lay a screwdriver in every pry slot, its tip under the cup, and press the handles down a little at a "
+            "time, one after the other and round again; at a piece of the cup over no slot turn a blunt spatula under "
+            f"its outer edge. Its dovetails slide up and down: go on until every piece has come free of the {seat}."
+        )
+    return (
+        "Lay a screwdriver in each of the two pry slots, its tip under the cup. Press both handles down at once, a "
+        f"little at a time, until the cup comes free of the {seat}."
     )
 
 
@@ -377,6 +360,13 @@ def _release_agent(moulds: MouldSet, step: Step) -> str:
     faces = agent_faces(moulds, step)
     if not faces:
         return "No release agent on any piece: what is cast here bonds later."
+    if moulds.plan.pins:
+        earlier = f" or Layer {step.index - 1}" if step.index > 1 else ""
+        return (
+            f"Release agent, if any, sparingly and only on the sheet's bed and the bores of cup {step.index}: a "
+            "printed cup holds a thin sheet fast. Put it on away from the base and let it dry. None in the slots for the "
+            f"fins, and none on base{earlier}, ever: what bonds later is cast there."
+        )
     where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)
     return (
         f"Release agent, if any, sparingly and only on {where}: put it on away from the base and let it dry. No "

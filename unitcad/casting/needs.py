@@ -38,9 +38,7 @@ NEEDS = (
     Need(r"\bflat pliers", "flat pliers", 1, "piece", "tool", "to pull cut tongues"),
     Need(r"\bwith pliers", "narrow pliers", 1, "piece", "tool", "to pull filament out of its pocket"),
     Need(r"\bsolder (the|on|wires)", "soldering iron and solder", 1, "set", "tool", "joins motors, circuits and wires"),
-    Need(
-        r"release agent, if any", "release agent", 1, "dab", "bought", "for the last cup's bore only; may be left out"
-    ),
+    Need(r"release agent, if any", "release agent", 1, "dab", "bought", "inside the last cup alone; may be left out"),
     Need(r"tape over the underside", "wide adhesive tape", 1, "roll", "bought", "under the seams of split tools"),
     Need(r"petroleum jelly|\bgrease the", "petroleum jelly", 1, "dab", "bought", "only where a step says so"),
     Need(

@@ -37,8 +37,9 @@ def _bond_faces(moulds: MouldSet) -> Iterator[BondFace]:
             yield BondFace(Face(step.cup, "bore"), f"layer {step.index + 1}")
         if step.lid:
             yield BondFace(Face(step.lid, "underside"), "circuit" if step is last else f"layer {step.index + 1}")
-    if not plan.concentric and len(plan.steps) > 1:
-        # Its bore may meet a layer that is cured already, where the last one has to bond.
+    if not plan.concentric and not plan.pins and len(plan.steps) > 1:
+        # Its bore may meet a layer that is cured already, where the last one has to bond; a back sheet's, whose cups
+        # stand on pins, meets none.
         yield BondFace(Face(last.cup, "bore"), f"layer {last.index - 1}")
     yield BondFace(Face("base", "core"), "motor")
     if len(plan.steps) > 1:

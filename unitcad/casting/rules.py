@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.finishing import layers_named
-from unitcad.casting.instructions import GREASE, HOLD, LEVEL_AGAIN, TACK
+from unitcad.casting.holding import HOLD, LEVEL_AGAIN
+from unitcad.casting.instructions import GREASE, TACK
 from unitcad.casting.needs import needs
 from unitcad.casting.procedure import Procedure
 from unitcad.text import spaced

@@ -30,8 +30,14 @@ def way_out(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     x, y = plan.layout.cup
     if stays:
         down = moulds.dimensions.core_height + max(last.rim, 2 * CLEAR)
-        below = tuple(Placed(part.name, (0.0, 0.0, -down)) for part in base)
-        pulled = tuple(draw.downward(side * (x + 5.0), -y, moulds.plate[1] - down / 2, down * 0.6) for side in (1, -1))
+        parts = [piece for tool in plan.of_kind("base") for piece in plan.pieces_of(tool.name)]
+        below = tuple(Placed(part.name, (0.0, 0.0, -down)) for part in parts)
+        boxes = [bounds(moulds.mesh(piece)) for piece in parts if plan.splits]
+        front = min((box[1] for box in boxes), default=0.0)
+        # Every piece of a split base is pulled at.
+        between = sorted((box[0] + box[3]) / 2 for box in boxes if box[1] == front)[1:-1]
+        at = (x + 5.0, *between, -x - 5.0)
+        pulled = tuple(draw.downward(each, -y, moulds.plate[1] - down / 2, down * 0.6) for each in at)
         levered = Name("base", (0.0, -plan.layout.plate[1], moulds.plate[1] - down))
         held = Name("cup stays on", (0.0, -y, last.rim / 2))
         yield "base-off", View((*below, *map(Placed, cast), Placed(stays)), pulled, names=(levered, held))
