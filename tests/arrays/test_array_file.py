@@ -78,10 +78,10 @@ def test_listed_points_keep_their_distances() -> None:
 
 _GRID = {"kind": "grid", "columns": 3, "rows": 3, "pitch_mm": 20}
 REFUSED = [
-    ({"layout": {**_GRID, "pitch_mm": 12}}, "layout.pitch_mm", 16),
+    ({"layout": {**_GRID, "pitch_mm": 12}}, "layout.pitch_mm", 18),
     ({"layout": {**_GRID, "pitch_mm": [20, 12]}}, "layout.pitch_mm.1", 16),
-    ({"layout": {**_GRID, "pitch_mm": -3}}, "layout.pitch_mm", 16),
-    ({"layout": {"kind": "hex", "pitch_mm": 10}}, "layout.pitch_mm", 16),
+    ({"layout": {**_GRID, "pitch_mm": -3}}, "layout.pitch_mm", 18),
+    ({"layout": {"kind": "hex", "pitch_mm": 10}}, "layout.pitch_mm", 18),
     ({"layout": {"kind": "ring", "count": 30}, "body": {"radius_mm": 40}}, "layout.count", 13),
     ({"layout": {"kind": "ring", "count": 4}}, "body.radius_mm", 40),
     ({"layout": {"kind": "ring", "count": 4, "bands": 2}, "body": {"radius_mm": 40}}, "layout.band_pitch_mm", 40),

@@ -25,12 +25,28 @@ from unitcad.shape import Extrude, box, moved, rotated
 SIDES = ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3, 8]", "unit.fpcb.tail_length_mm=2"]
 
 
-def test_three_tails_of_the_template_come_out() -> None:
-    hidden = {tail.place: tail for tail in hidden_tails(load_array("forearm-pockets"))}
-    assert set(hidden) == {"A3", "B1", "B2", "B3", "C1", "C3"}
+TURNED = [{"at": "A3", "angle_deg": 0}, {"at": "C1", "angle_deg": 180}, {"at": "C3", "angle_deg": 0}]
+
+
+def test_tails_of_the_template_come_out_where_a_quarter_turn_lets_them() -> None:
+    array = load_array("forearm-pockets")
+    assert [place.angle_deg for place in array.places] == [90, 90, 90, 45, 45, 225, 270, 270, 270]
+    assert [(tail.place, bool(tail.blocked_by), tail.angle_deg) for tail in hidden_tails(array)] == [
+        (name, True, None) for name in ("B1", "B2", "B3")
+    ]
+
+
+def test_a_tail_that_comes_out_at_another_angle_is_told_it() -> None:
+    array = load_array("forearm-pockets", {"place": TURNED})
+    hidden = {tail.place: tail for tail in hidden_tails(array)}
     # The ends lie at 20 + 7 + 10 = 37 mm, the sheet's edge at 38.
-    assert [(hidden[name].short_mm, hidden[name].length_mm) for name in ("A3", "C1", "C3")] == [(1.0, 11.0)] * 3
-    assert {name for name, tail in hidden.items() if tail.blocked_by} == {"B1", "B2", "B3"}
+    found = [(hidden[name].short_mm, hidden[name].length_mm, hidden[name].angle_deg) for name in ("A3", "C1", "C3")]
+    assert found == [(1.0, 11.0, 90.0), (1.0, 11.0, 270.0), (1.0, 11.0, 270.0)]
+    (said,) = hidden_tails_warning(array)
+    assert "With angle_deg = 90 A3 would come out as it is. With angle_deg = 270 C1 and C3 would" in said
+    assert "fpcb.tail_length_mm" not in said
+    turned = [{**place, "angle_deg": hidden[place["at"]].angle_deg} for place in TURNED]
+    assert {tail.place for tail in hidden_tails(load_array("forearm-pockets", {"place": turned}))} == {"B1", "B2", "B3"}
 
 
 @pytest.mark.parametrize("name", ["forearm-pockets", "hex-19"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -87,3 +88,38 @@ def test_another_unit_in_a_back_sheet_is_named() -> None:
     refused = refusal_of("forearm-patch", {"place": [{"at": "B2", "unit": "motor-10mm"}]})
     assert (refused.field, refused.value, refused.nearest) == ("place.0.unit", "motor-10mm", None)
     assert "leave it out" in refused.limit
+
+
+@pytest.mark.parametrize(("name", "tail"), [("hex-19", 2.7), ("forearm-pockets", 6.6)])
+def test_the_pitch_offered_is_the_nearest_that_needs_nothing_else(name: str, tail: float) -> None:
+    refused = refusal_of(name, {"layout.pitch_mm": 12})
+    assert refused.nearest == 18
+    assert f"layout.pitch_mm = 16 would also need unit.fpcb.tail_length_mm = {tail}" in refused.limit
+    assert load_array(name, {"layout.pitch_mm": 18})
+    assert load_array(name, {"layout.pitch_mm": 16, "unit.fpcb.tail_length_mm": tail})
+    assert refusal_of(name, {"layout.pitch_mm": 17.9}).field == "unit.fpcb.tail_length_mm"
+
+
+def test_where_no_pitch_does_alone_the_combination_is_offered() -> None:
+    changes = {"layout.pitch_mm": 12, "unit.fpcb.tail_length_mm": 60}
+    refused = refusal_of("forearm-pockets", changes)
+    assert refused.nearest == 16
+    assert load_array("forearm-pockets", {**changes, "layout.pitch_mm": 16, "unit.fpcb.tail_length_mm": 6.6})
+    assert "the value offered here also needs unit.fpcb.tail_length_mm = 6.6" in refused.limit
+
+
+@pytest.mark.parametrize("pitch", [0, -3])
+@pytest.mark.parametrize("name", ["forearm-pockets", "hex-19"])
+def test_a_pitch_out_of_range_is_refused_before_what_follows_from_it(name: str, pitch: float) -> None:
+    refused = refusal_of(name, {"layout.pitch_mm": pitch})
+    assert (refused.field, refused.limit.partition(";")[0], refused.file) == (
+        "layout.pitch_mm",
+        "must be at least 1",
+        None,
+    )
+
+
+def test_the_docs_quote_refusals_as_they_are() -> None:
+    text = " ".join((Path(__file__).parents[2] / "docs" / "arrays.md").read_text("utf-8").split())
+    for name, changes in (("hex-19", {"layout.pitch_mm": 12}), ("sleeve-curved", {"body.radius_mm": 25})):
+        assert f"is refused: `{refusal_of(name, changes)}`" in text

@@ -182,7 +182,7 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
         places=tuple(
             Placed(name=p.name, x=p.x, y=p.y, angle_deg=angle, unit=each)
             for p, each, angle in zip(
-                points, units, _angles(asked, way, points, units, places, sheet.strap_slots, lay_tails), strict=True
+                points, units, _angles(asked, way, points, units, places, sheet, lay_tails), strict=True
             )
         ),
         sheet=sheet,
@@ -317,7 +317,7 @@ def _angles(
     points: list[Point],
     units: list[Spec],
     places: dict[int, int],
-    slots: Any,
+    sheet: Sheet,
     lay_tails: bool,
 ) -> list[float]:
     """Return the units' angles, degrees. Raises Refusal for a tail that finds no way."""
@@ -326,7 +326,7 @@ def _angles(
     if not (way.own_tails and lay_tails):
         return [wanted.get(n, 0.0) for n in range(len(points))]
     try:
-        return angles(points, units, wanted, slots)
+        return angles(points, units, wanted, sheet)
     except Blocked as blocked:
         n, unit = blocked.owner, units[blocked.owner]
         name, i = points[n].name, places.get(blocked.owner)

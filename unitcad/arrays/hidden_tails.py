@@ -7,13 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from unitcad.arrays.array import Array, Placed, Sheet
+from unitcad.arrays.array import Array, Placed
 from unitcad.arrays.construction import construction_of
 from unitcad.arrays.layouts import Point
-from unitcad.arrays.tail_ways import Tail, in_the_way, tail_length, tails
-from unitcad.designs import dimensions
-from unitcad.designs.limits import EPS
-from unitcad.geometry.segments import to_box
+from unitcad.arrays.tail_ways import Tail, candidates, ends_hidden, in_the_way, tail_length, tails, to_edge
 from unitcad.text import listed, number
 
 MOST_NAMES = 12
@@ -28,6 +25,7 @@ class HiddenTail:
     length_mm   of the tail that would come out, beyond the unit's edge
     field       the spec's key of that length
     blocked_by  what stands in the straight way there; "" where it is free
+    angle_deg   at which the tail as it is would come out; None where none of the angles that are tried is free
     """
 
     place: str
@@ -35,6 +33,7 @@ class HiddenTail:
     length_mm: float
     field: str
     blocked_by: str
+    angle_deg: float | None
 
 
 def hidden_tails(array: Array) -> tuple[HiddenTail, ...]:
@@ -46,19 +45,25 @@ def hidden_tails(array: Array) -> tuple[HiddenTail, ...]:
     laid = [_tails(place, i) for i, place in enumerate(array.places)]
     found = []
     for i, place in enumerate(array.places):
-        exit = dimensions(place.unit).exit
-        if exit is None or exit.high > array.sheet.low + EPS:
-            continue  # the tail lies on the sheet
-        ahead = [_short(tail, array.sheet) for tail in laid[i]]
-        if max(ahead, default=0.0) <= EPS:
+        if not ends_hidden(place.unit, laid[i], array.sheet):
             continue
-        length = tail_length(place.unit) + max(ahead)
+        short = to_edge(laid[i], array.sheet)
+        length = tail_length(place.unit) + short
         near = sorted(
             (j for j in range(len(points)) if j != i), key=lambda j: math.dist(points[i][1:3], points[j][1:3])
         )
         blocked = in_the_way(_tails(place, i, length), i, points, radii, near, laid, array.sheet.strap_slots)
         field = "fpcb.tail_length_mm" if place.unit.fpcb else "wires.length_mm"
-        found.append(HiddenTail(place.name, round(max(ahead), 2), _typed(length), field, blocked))
+
+        def free(angle: float, place: Placed = place, i: int = i, near: Sequence[int] = near) -> bool:
+            """Tell whether the tail as it is comes out at an angle."""
+            turned = tails(place.unit, place.x, place.y, angle, i)
+            if ends_hidden(place.unit, turned, array.sheet):
+                return False
+            return not in_the_way(turned, i, points, radii, near, laid, array.sheet.strap_slots)
+
+        turn = next((angle for angle in candidates(points[i]) if free(angle)), None)
+        found.append(HiddenTail(place.name, round(short, 2), _typed(length), field, blocked, turn))
     return tuple(found)
 
 
@@ -74,17 +79,23 @@ def where_they_end(hidden: Sequence[HiddenTail], most_names: int = 0) -> str:
 
 
 def longer_tails(hidden: Sequence[HiddenTail], most_names: int = 0) -> str:
-    """Say which tails would reach the sheet's edge if they were longer, and which have no straight way there."""
+    """Say which tails would come out turned, which if they were longer, and which have no straight way there."""
 
     def wanted(tail: HiddenTail) -> tuple[str, float]:
         return tail.field, tail.length_mm
 
-    free = sorted((tail for tail in hidden if not tail.blocked_by), key=wanted)
+    turned = [(tail.angle_deg, tail) for tail in hidden if tail.angle_deg is not None]
     said = [
+        f"With angle_deg = {number(angle)} {_names((tail for _, tail in same), most_names)} would come out as it is."
+        for angle, same in groupby(sorted(turned, key=lambda pair: pair[0]), key=lambda pair: pair[0])
+    ]
+    straight = [tail for tail in hidden if tail.angle_deg is None]
+    free = sorted((tail for tail in straight if not tail.blocked_by), key=wanted)
+    said += [
         f"With {field} = {number(length)} {_names(same, most_names)} would reach the edge."
         for (field, length), same in groupby(free, key=wanted)
     ]
-    if stopped := [tail for tail in hidden if tail.blocked_by]:
+    if stopped := [tail for tail in straight if tail.blocked_by]:
         said.append(f"No straight way out is free at {_names(stopped, most_names)}.")
     return " ".join(said)
 
@@ -102,37 +113,6 @@ def hidden_tails_warning(array: Array) -> list[str]:
 
 def _tails(place: Placed, owner: int, length: float | None = None) -> list[Tail]:
     return tails(place.unit, place.x, place.y, place.angle_deg, owner, length)
-
-
-def _short(tail: Tail, sheet: Sheet) -> float:
-    """Return how far a tail has to go on until all of its width is out of the sheet's outline, mm."""
-    long = math.hypot(tail.x1 - tail.x0, tail.y1 - tail.y0)
-    along = (tail.x1 - tail.x0) / long, (tail.y1 - tail.y0) / long
-    aside = -along[1] * tail.half, along[0] * tail.half
-    starts = ((tail.x1 + side * aside[0], tail.y1 + side * aside[1]) for side in (-1, 0, 1))
-    return max(_out(start, along, sheet) for start in starts)
-
-
-def _out(start: tuple[float, float], along: tuple[float, float], sheet: Sheet) -> float:
-    """Return the way from a point along a direction out of the sheet's outline, mm; 0 from a point outside.
-
-    The outline is convex, so the way is halved until it is known.
-    """
-    x0, y0, x1, y1 = sheet.outline
-    r = sheet.corner_mm
-    inner = x0 + r, y0 + r, x1 - r, y1 - r
-
-    def inside(way: float) -> bool:
-        at = start[0] + way * along[0], start[1] + way * along[1]
-        return to_box(at, at, inner) <= r
-
-    low, high = 0.0, math.hypot(x1 - x0, y1 - y0)
-    if not inside(low):
-        return 0.0
-    while high - low > EPS / 2:
-        middle = (low + high) / 2
-        low, high = (middle, high) if inside(middle) else (low, middle)
-    return high
 
 
 def _typed(length: float) -> float:

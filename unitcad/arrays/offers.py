@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -14,6 +15,9 @@ Judge = Callable[[dict[str, Any]], object]
 """Makes an array of plain data; raises Refusal for what can't be made."""
 _MOST = 8
 """Changes that are tried together."""
+_PITCH = "layout.pitch_mm"
+_WIDEST = 16
+"""How much wider a pitch may be that needs no other change, mm."""
 _PITCHES = 3
 """Pitches to either side of the present one that are tried."""
 _MANY = 64
@@ -32,21 +36,41 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
     if type(refusal) is not Refusal or refusal.nearest is None:
         return refusal
     changes: dict[str, object] = {refusal.field: refusal.nearest}
-    met = _met(data, changes, judge)
+    limit, met = refusal.limit, _met(data, changes, judge)
     for _ in range(_MOST):
         if met is None or met.nearest is None or changes.get(met.field) == met.nearest:
             break
         changes[met.field] = met.nearest
         met = _met(data, changes, judge)
+    # A bed's size grows with the pitch, and a try of so large an array takes seconds.
+    if (met is not None or len(changes) > 1) and not any(path.startswith(_OF_BED) for path in changes):
+        pitches = {path: value for path, value in changes.items() if path.startswith(_PITCH)}
+        if refusal.field in pitches and (wider := _wider(pitches, data, judge)):
+            if met is None:
+                rest = {path: value for path, value in changes.items() if path not in pitches}
+                limit += f"; {_listed(pitches, 'and')} would also need {_listed(rest, 'and')}"
+            changes, met = wider, None
     nearest = changes.pop(refusal.field)
     if met is not None and met.field == refusal.field:
         return Refusal(refusal.field, refusal.value, refusal.limit)
-    limit = refusal.limit
     if changes:
         limit += f"; the value offered here also needs {_listed(changes, 'and')}"
     if met is not None:
         limit += f"; then {met.field} is refused: {met.limit}"
     return Refusal(refusal.field, refusal.value, limit, nearest)
+
+
+def _wider(pitches: Mapping[str, Any], data: Mapping[str, Any], judge: Judge) -> dict[str, object]:
+    """Return pitches raised together, by as few tenths of a mm as can be, that need no other change; {}: none found."""
+
+    def raised(tenths: int) -> dict[str, object]:
+        return {path: (math.ceil(pitch * 10 - 1e-6) + tenths) / 10 for path, pitch in pitches.items()}
+
+    def fits(tenths: int) -> bool:
+        return _met(data, raised(tenths), judge) is None
+
+    whole = next((mm * 10 for mm in range(1, _WIDEST + 1) if fits(mm * 10)), None)
+    return {} if whole is None else raised(next(tenths for tenths in range(whole - 9, whole + 1) if fits(tenths)))
 
 
 def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judge: Judge) -> Refusal:
@@ -88,7 +112,7 @@ def _met(data: Mapping[str, Any], changes: Mapping[str, object], judge: Judge) -
 
 def _pitches(refusal: Refusal, data: Mapping[str, Any]) -> Iterator[dict[str, object]]:
     """Yield other pitches in whole mm, the nearest first: of a grid's two, the one along the bed that is too short."""
-    path = "layout.pitch_mm"
+    path = _PITCH
     pitch = at(data, path)
     if isinstance(pitch, list | tuple):
         axis = int(refusal.field == "moulds.bed_y_mm")

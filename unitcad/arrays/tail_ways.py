@@ -1,7 +1,7 @@
 """The ways that the units' own tails take in an array: straight from each unit, clear of units, tails and strap slots.
 
-A tail that no angle was asked for leaves at a quarter turn where one is free, nearest to the way out of the array, else
-at a multiple of 15 degrees.
+A tail that no angle was asked for leaves at a quarter turn where one is free, else at a multiple of 15 degrees. Of free
+quarter turns one comes first whose tail ends beside the sheet, then the nearest to the way out of the array.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from unitcad.arrays.array import Box
+from unitcad.arrays.array import Box, Sheet
 from unitcad.arrays.layouts.kind import Point
 from unitcad.designs import dimensions
 from unitcad.designs.dimensions import WIRE_GAP
+from unitcad.designs.limits import EPS
 from unitcad.geometry.segments import between_segments, to_box, to_segment
 from unitcad.spec import Spec
 
@@ -64,33 +65,47 @@ def tail_length(unit: Spec) -> float:
     return unit.fpcb.tail_length_mm if unit.fpcb else unit.wires.length_mm if unit.wires else 0.0
 
 
-def angles(
-    points: Sequence[Point], units: Sequence[Spec], asked: Mapping[int, float], slots: Sequence[Box]
-) -> list[float]:
+def angles(points: Sequence[Point], units: Sequence[Spec], asked: Mapping[int, float], sheet: Sheet) -> list[float]:
     """Return each unit's angle, degrees: what was `asked` for, by its number, else the nearest free way.
 
     Raises Blocked for the first unit whose tail finds none.
     """
+    try:
+        return _laid(points, units, asked, sheet, out=True)
+    except Blocked:
+        # A tail that was turned to come out may stand in the way of another.
+        return _laid(points, units, asked, sheet, out=False)
+
+
+def _laid(
+    points: Sequence[Point], units: Sequence[Spec], asked: Mapping[int, float], sheet: Sheet, *, out: bool
+) -> list[float]:
+    """Return the angles; with `out` a quarter turn whose tail comes out from under the sheet is preferred."""
     radii = [unit.diameter_mm / 2 for unit in units]
     near = _neighbours(points, units, radii)
     laid: list[list[Tail]] = [[] for _ in points]
     chosen = [asked.get(i, 0.0) for i in range(len(points))]
+    slots = sheet.strap_slots
     for i in asked:
         laid[i] = tails(units[i], points[i].x, points[i].y, chosen[i], i)
     for i in asked:
         if why := in_the_way(laid[i], i, points, radii, near[i], laid, slots):
             raise Blocked(i, _longest(i, (chosen[i],), points, units, radii, near[i], laid, slots), why)
     for i in (i for i in range(len(points)) if i not in asked):
-        why = ""
-        for angle in _candidates(points[i]):
+        why, free = "", None
+        for angle in candidates(points[i]):
+            if free is not None and angle % 90:
+                break
             drawn = tails(units[i], points[i].x, points[i].y, angle, i)
             why = in_the_way(drawn, i, points, radii, near[i], laid, slots)
-            if not why:
-                chosen[i], laid[i] = angle, drawn
-                break
-        else:
-            longest = _longest(i, _candidates(points[i]), points, units, radii, near[i], laid, slots)
+            if not why and (free is None or not ends_hidden(units[i], drawn, sheet)):
+                free = angle, drawn
+                if not (out and ends_hidden(units[i], drawn, sheet)):
+                    break
+        if free is None:
+            longest = _longest(i, candidates(points[i]), points, units, radii, near[i], laid, slots)
             raise Blocked(i, longest, why)
+        chosen[i], laid[i] = free
     return chosen
 
 
@@ -104,7 +119,7 @@ def _neighbours(points: Sequence[Point], units: Sequence[Spec], radii: Sequence[
     ]
 
 
-def _candidates(point: Point) -> list[float]:
+def candidates(point: Point) -> list[float]:
     """Return the angles to try, degrees: quarter turns first, each group from the way outwards on."""
     outwards = math.degrees(math.atan2(point.y, point.x)) if math.hypot(point.x, point.y) > 1e-6 else 0.0
 
@@ -168,3 +183,47 @@ def _longest(
         middle = (low + high + 1) // 2
         low, high = (middle, high) if fits(middle) else (low, middle - 1)
     return low / 10
+
+
+def ends_hidden(unit: Spec, drawn: Sequence[Tail], sheet: Sheet) -> bool:
+    """Tell whether a unit's tails end under the sheet."""
+    exit = dimensions(unit).exit
+    if exit is None or exit.high > sheet.low + EPS:
+        return False  # the tail lies on the sheet
+    return any(_way_out(start, along, sheet, EPS) > 0 for tail in drawn for start, along in _end(tail))
+
+
+def to_edge(drawn: Sequence[Tail], sheet: Sheet) -> float:
+    """Return how far tails have to go on until all of their width is out of the sheet's outline, mm."""
+    return max(_way_out(start, along, sheet) for tail in drawn for start, along in _end(tail))
+
+
+def _end(tail: Tail) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Return the corners and the middle of a tail's end, each with the direction of the tail."""
+    long = math.hypot(tail.x1 - tail.x0, tail.y1 - tail.y0)
+    along = (tail.x1 - tail.x0) / long, (tail.y1 - tail.y0) / long
+    aside = -along[1] * tail.half, along[0] * tail.half
+    return [((tail.x1 + side * aside[0], tail.y1 + side * aside[1]), along) for side in (-1, 0, 1)]
+
+
+def _way_out(start: tuple[float, float], along: tuple[float, float], sheet: Sheet, beyond: float = 0.0) -> float:
+    """Return the way from a point along a direction out of the sheet's outline, mm; 0 from a point outside.
+
+    With `beyond` only whether the way is longer than that: 0 or the most that it can be. The outline is convex, so the
+    way is halved until it is known.
+    """
+    x0, y0, x1, y1 = sheet.outline
+    r = sheet.corner_mm
+    inner = x0 + r, y0 + r, x1 - r, y1 - r
+
+    def inside(way: float) -> bool:
+        at = start[0] + way * along[0], start[1] + way * along[1]
+        return to_box(at, at, inner) <= r
+
+    low, high = beyond, math.hypot(x1 - x0, y1 - y0)
+    if not inside(low):
+        return 0.0
+    while not beyond and high - low > EPS / 2:
+        middle = (low + high) / 2
+        low, high = (middle, high) if inside(middle) else (low, middle)
+    return high

@@ -23,8 +23,9 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from msgspec import Meta, Struct, field, structs
 
-from unitcad.arrays.array_file import expanded
+from unitcad.arrays.array_file import confirm_makeable, expanded
 from unitcad.arrays.array_names import array_templates, confirm_known, is_array
+from unitcad.arrays.offers import offered
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
@@ -179,7 +180,10 @@ class Sweep:
 
     def faults(self, index: int, first: UnitcadError) -> str:
         """Return what is wrong with a refused variant in one line, `first` being what it was refused for."""
-        if index >= EXPLAINED or not isinstance(first, Refusal) or self.of_arrays:
+        if isinstance(first, Refusal) and self.of_arrays:
+            told = offered(first, self._data(index), confirm_makeable) if index < EXPLAINED else _unoffered(first)
+            return str(told)
+        if index >= EXPLAINED or not isinstance(first, Refusal):
             return str(first)
         base, values = self.values(index)
         file = dict(self.written).get(base)
@@ -212,6 +216,11 @@ class Sweep:
     @cached_property
     def _texts(self) -> dict[str, str]:
         return {name: json.dumps(data) for name, data in self.bases}
+
+
+def _unoffered(refusal: Refusal) -> Refusal:
+    """Return an array's refusal without its value to offer, which nobody tried."""
+    return Refusal(refusal.field, refusal.value, refusal.limit)
 
 
 def shipped() -> dict[str, Path]:

@@ -243,7 +243,10 @@ def _tail_end(hidden: Mapping[str, Any] | None) -> str:
     """Say where a tail ends: under the sheet it has to be made longer, or wires soldered on."""
     if hidden is None:
         return "not under the sheet"
-    blocked, longer = hidden["blocked_by"], f"{hidden['field']} = {number(hidden['length_mm'])} reaches the edge"
+    blocked, turn = hidden["blocked_by"], hidden.get("angle_deg")
+    longer = f"{hidden['field']} = {number(hidden['length_mm'])} reaches the edge"
+    if turn is not None:
+        blocked, longer = "", f"with angle_deg = {number(turn)} it comes out"
     return (
         f"under the sheet, {number(hidden['short_mm'], 2)} mm before its edge along the tail: "
         f"{f'{blocked} is in the way: solder wires on' if blocked else f'{longer}, or solder wires on'}"

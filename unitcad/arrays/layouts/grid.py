@@ -8,9 +8,9 @@ from msgspec import Meta
 
 from unitcad.arrays.array_tables import Pitch
 from unitcad.arrays.layouts.kind import LayoutKind, Point, named, needs
-from unitcad.catalogue.entries import LONGEST_MM
 from unitcad.designs.limits import up
 from unitcad.errors import Refusal
+from unitcad.spec import convert
 from unitcad.spec.asked import Table
 
 Count = Annotated[int, Meta(ge=1, le=100)]
@@ -22,7 +22,7 @@ class GridTable(Table, frozen=True, kw_only=True):
     kind: Literal["grid"] = "grid"
     columns: Count
     rows: Count
-    pitch_mm: float | tuple[Pitch, Pitch]  # a Pitch beside the tuple crashes msgspec 0.22: `points` has its limit
+    pitch_mm: float | tuple[Pitch, Pitch]  # a Pitch beside the tuple crashes msgspec 0.22: `_OnePitch` has its limits
 
     @property
     def pitches(self) -> tuple[float, float]:
@@ -30,11 +30,17 @@ class GridTable(Table, frozen=True, kw_only=True):
         return self.pitch_mm if isinstance(self.pitch_mm, tuple) else (self.pitch_mm, self.pitch_mm)
 
 
+class _OnePitch(Table, frozen=True):
+    """A pitch along both axes."""
+
+    pitch_mm: Pitch
+
+
 def points(table: GridTable, radius: float | None) -> tuple[Point, ...]:
     """Return the grid's points by rows from the top, columns along x."""
     across, along = table.pitches
-    if not isinstance(table.pitch_mm, tuple) and table.pitch_mm > LONGEST_MM:
-        raise Refusal("layout.pitch_mm", table.pitch_mm, f"must be at most {LONGEST_MM:g}", float(LONGEST_MM))
+    if not isinstance(table.pitch_mm, tuple):
+        convert({"pitch_mm": table.pitch_mm}, _OnePitch, "layout")
     return tuple(
         Point(
             named(row, column),
