@@ -1,4 +1,4 @@
-"""How small a limb a curved mould can be made for: what prints without support, and what stands between the units."""
+"""Which limbs a curved mould can be made for: it prints without support, units stand apart, air finds the vents."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from itertools import combinations
 
 from unitcad.arrays.array import Array
 from unitcad.errors import Refusal
+from unitcad.moulds.dents import TILT_DEG
 from unitcad.spec import printer_of
 
 MOST_DEG = 75.0
@@ -18,18 +19,43 @@ _STEP = 0.1
 
 
 def check_limb(array: Array, apart: float, middle: Callable[[float], float]) -> None:
-    """Raise Refusal for a limb too small, with the least radius that fits.
+    """Raise Refusal for a limb too small or too large, with the nearest radius that fits.
 
     `apart`: between two units' feet, mm. `middle`: from the limb's radius to that of the sheet's middle, mm.
     """
     radius = array.radius_mm or 0.0
+    _check_vents(array, radius, middle)
     if not (why := _too_small(array, radius, apart, middle(radius))):
         return
     radii = (tenth * _STEP for tenth in range(math.ceil(radius / _STEP + 1e-9), round(LARGEST / _STEP) + 1))
     fits = next((each for each in radii if not _too_small(array, each, apart, middle(each))), None)
-    if fits is None or array.layout["kind"] == "ring":
+    if fits is None or middle(fits) > _largest_middle(array) or array.layout["kind"] == "ring":
         raise Refusal("body.cast", "curved", f"{why}; cast it flat and bend it", "flat")
     raise Refusal("body.radius_mm", radius, why, round(fits, 1))
+
+
+def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) -> None:
+    """Raise Refusal for a limb so large that a tilt of the mould brings the highest line off the sheet, and its vents.
+
+    `middle` as in `check_limb`.
+    """
+    largest = _largest_middle(array)
+    if middle(radius) <= largest:
+        return
+    end = math.degrees(largest / middle(radius)) * math.radians(TILT_DEG)
+    why = (
+        f"the sheet reaches {end:.3g} degrees from the top, and a mould tilted by {TILT_DEG:g} degrees keeps air at its "
+        "ends; cast it flat and bend it"
+    )
+    fits = math.floor(min(radius, largest) / _STEP)
+    while middle(fits * _STEP) > largest:
+        fits -= 1
+    raise Refusal("body.radius_mm", radius, why, round(fits * _STEP, 1))
+
+
+def _largest_middle(array: Array) -> float:
+    """Return the radius of the sheet's middle with which its nearer end lies in the tilt from the top, mm."""
+    return min(-array.sheet.outline[0], array.sheet.outline[2]) / math.radians(TILT_DEG)
 
 
 def _too_small(array: Array, radius: float, apart: float, middle: float) -> str:

@@ -34,10 +34,11 @@ def _apart(one: tuple[float, float, float], other: tuple[float, float, float]) -
 
 
 def slot_profile(box: Box) -> Profile:
-    """Return a slot that fills a box, its two short ends round."""
+    """Return a slot that fills a box, its two short ends round; one that is as long as it is wide is a circle."""
     x0, y0, x1, y1 = box
+    r = min(x1 - x0, y1 - y0) / 2
+    if (mm(x0 + r), mm(y0 + r)) == (mm(x1 - r), mm(y1 - r)):
+        return rounded(box, r)
     if y1 - y0 >= x1 - x0:
-        r = (x1 - x0) / 2
         return Profile(((x0, y0 + r, 1.0), (x1, y0 + r, 0.0), (x1, y1 - r, 1.0), (x0, y1 - r, 0.0)))
-    r = (y1 - y0) / 2
     return Profile(((x0 + r, y0, 0.0), (x1 - r, y0, 1.0), (x1 - r, y1, 0.0), (x0 + r, y1, 1.0)))

@@ -9,7 +9,8 @@ from unitcad.arrays.array import Box, Sheet
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.construction import Construction
 from unitcad.arrays.layouts import Point
-from unitcad.designs.limits import down
+from unitcad.arrays.sheet_length import check_length
+from unitcad.designs.limits import down, up
 from unitcad.errors import Refusal
 from unitcad.shape import mm
 from unitcad.spec import Spec
@@ -41,7 +42,7 @@ def _thickness(asked: AskedArray, way: Construction) -> float:
 
 
 def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: list[Spec]) -> Sheet:
-    """Return the sheet. Raises Refusal for a thickness, corner or slot that does not fit."""
+    """Return the sheet. Raises Refusal for a thickness, length, corner or slot that does not fit."""
     table, distinct, thickness = asked.sheet, _distinct(units), _thickness(asked, way)
     known = catalogue.materials({name: entry for unit in distinct for name, entry in unit.materials.items()})
     material = table.material or distinct[0].layers[-1].material
@@ -64,6 +65,7 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
     slots: tuple[Box, ...] = ()
     if table.strap_slot_mm:
         width, length = table.strap_slot_mm
+        _check_post(table.strap_slot_mm, units[0])
         most = y1 - y0 - 2 * table.strap_web_mm
         if length > most + 1e-9:
             limit = f"across the sheet of {y1 - y0:.4g} mm, with webs of {table.strap_web_mm:g} mm, a slot is at most"
@@ -77,6 +79,7 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
         )
         x0, x1 = x0 - width - table.strap_web_mm, x1 + width + table.strap_web_mm
     outline = mm(x0), mm(y0), mm(x1), mm(y1)
+    check_length(asked, points, outline)
     return Sheet(
         material=material,
         low=mm(level.low),
@@ -87,6 +90,15 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
         strap_slots=slots,
         hold_mm=hold,
     )
+
+
+def _check_post(slot: tuple[float, float], unit: Spec) -> None:
+    """Raise Refusal for a strap slot that is formed by a post thinner than the tools' least wall."""
+    least = unit.moulds.least_wall_mm
+    for i, size in enumerate(slot):
+        if size < least - 1e-9:
+            limit = f"a post of the tools forms the slot, and no wall of them is thinner than {least:g} mm "
+            raise Refusal(f"sheet.strap_slot_mm.{i}", size, f"{limit}(moulds.least_wall_mm)", up(least))
 
 
 def _check_hold(hold: float, units: tuple[Spec, ...], elongation_pct: float) -> None:

@@ -13,7 +13,7 @@ GRID_PER_MM = 1024
 
 Vertex = tuple[float, float, float]
 _BLOCK = 256
-"""Sides of a polygon that are compared with all others at once."""
+"""Sides of a polygon that are compared with others at once."""
 
 
 def mm(length: float) -> float:
@@ -183,17 +183,23 @@ def _crosses_itself(polygon: np.ndarray) -> bool:
     def side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
         return np.sign((q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0]))
 
+    # Sides that overlap along the longer way of the whole stand near each other in this order.
+    along, across = np.argsort(high.max(axis=0) - low.min(axis=0))[::-1]
+    order = np.argsort(low[:, along], kind="stable")
+    ends = np.searchsorted(low[order, along], high[order, along], side="right")
     for start in range(0, n, _BLOCK):
-        block = slice(start, start + _BLOCK)
-        near = np.all((low[block, None] <= high) & (low <= high[block, None]), axis=2)
-        i, j = np.nonzero(near)
-        i = i + start
-        i, j = i[i < j], j[i < j]
+        ones = np.arange(start, min(start + _BLOCK, n))
+        counts = ends[ones] - ones - 1
+        one = np.repeat(ones, counts)
+        other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts)
+        i, j = np.sort((order[one], order[other]), axis=0)
+        near = (low[i, across] <= high[j, across]) & (low[j, across] <= high[i, across])
+        i, j = i[near], j[near]
         neighbours = (j == i + 1) | ((i == 0) & (j == n - 1))
         # Neighbours cross only by folding back on each other.
         after, before = np.where(j == i + 1, j, i), np.where(j == i + 1, i, j)
-        along = np.einsum("ij,ij->i", b[before] - a[before], b[after] - a[after])
-        folded = neighbours & (side(a[before], b[before], b[after]) == 0) & (along < 0)
+        onwards = np.einsum("ij,ij->i", b[before] - a[before], b[after] - a[after])
+        folded = neighbours & (side(a[before], b[before], b[after]) == 0) & (onwards < 0)
         i, j = i[~neighbours], j[~neighbours]
         apart = (side(a[i], b[i], a[j]) * side(a[i], b[i], b[j]) > 0) | (
             side(a[j], b[j], a[i]) * side(a[j], b[j], b[i]) > 0

@@ -1,0 +1,66 @@
+"""Values far outside the usual ranges: each array is made, or refused with a field and in seconds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.outlines import slot_profile
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.errors import Refusal
+from unitcad.mould_checks import check_moulds
+
+
+@pytest.mark.parametrize("height", [2.0, 3 - 1 / 1024, 3.0, 3 + 1 / 1024, 4.0])
+@pytest.mark.parametrize("width", [3.0, 3 - 1 / 1024])
+def test_a_strap_slot_of_any_proportion_has_round_ends(width: float, height: float) -> None:
+    drawn, r = slot_profile((5.0, -1.0, 5 + width, height - 1)), min(width, height) / 2
+    assert drawn.area == pytest.approx(width * height - (4 - math.pi) * r**2, rel=1e-3)
+    assert drawn.bounds == pytest.approx((5, -1, 5 + width, height - 1), abs=1e-3)
+
+
+@pytest.mark.parametrize("slot", [[3.0, 3.0], [3.0, 2.0]])
+@pytest.mark.parametrize("name", ["forearm-pockets", "forearm-patch"])
+def test_a_sheet_with_round_strap_slots_keeps_every_check(name: str, slot: list[float]) -> None:
+    changes = {"sheet.strap_slot_mm": slot, "layout.columns": 2, "layout.rows": 1}
+    findings = check_moulds(patch_moulds(load_array(name, changes)))
+    assert [f for f in findings if not f.ok] == []
+
+
+MADE: list[tuple[str, dict[str, Any]]] = [
+    ("sleeve-curved", {"sheet.strap_slot_mm": [3, 3]}),
+    ("hex-19", {"layout.pitch_mm": 200}),
+]
+"""The last one's trays have 25 pieces, their seams 4,000 corners."""
+
+
+@pytest.mark.parametrize(("name", "changes"), MADE)
+def test_what_is_rare_is_made(name: str, changes: dict[str, Any]) -> None:
+    assert patch_moulds(load_array(name, changes)).plan
+
+
+REFUSED: list[tuple[str, dict[str, Any], str, object]] = [
+    ("forearm-pockets", {"sheet.strap_slot_mm": [0.1, 5]}, "sheet.strap_slot_mm.0", 0.8),
+    ("forearm-patch", {"sheet.strap_slot_mm": [5, 0.1]}, "sheet.strap_slot_mm.1", 0.8),
+    ("forearm-patch", {"moulds.bed_x_mm": 57}, "moulds.bed_x_mm", 58.9),
+    ("sleeve-curved", {"body.radius_mm": 500}, "body.radius_mm", 339.7),
+    ("sleeve-curved", {"body.radius_mm": 5000}, "body.radius_mm", 339.7),
+    ("hex-19", {"layout.pitch_mm": 500}, "layout.pitch_mm", 370),
+    ("hex-19", {"layout.pitch_mm": 1e9}, "layout.pitch_mm", 370),
+    ("forearm-pockets", {"layout.pitch_mm": [20, 900]}, "layout.pitch_mm.1", 740),
+    ("forearm-pockets", {"sheet.strap_slot_mm": [1000, 20]}, "sheet.strap_slot_mm.0", 715),
+    ("wrist-band", {"body.radius_mm": 1000}, "body.radius_mm", None),
+]
+
+
+@pytest.mark.parametrize(("name", "changes", "field", "nearest"), REFUSED)
+def test_what_can_not_be_made_is_refused(name: str, changes: dict[str, Any], field: str, nearest: object) -> None:
+    with pytest.raises(Refusal) as refused:
+        patch_moulds(load_array(name, changes)).plan  # noqa: B018
+    assert refused.value.field == field
+    if nearest is not None:
+        assert refused.value.nearest == nearest
+    assert isinstance(refused.value.nearest, float)
