@@ -60,7 +60,7 @@
       underWay[what] = own;
       const answer = await own.answer;
       if (underWay[what] === own) underWay[what] = null;
-      return mine === newest[what] && answer.status !== 409 ? answer : null;
+      return mine === newest[what] && !answer.superseded ? answer : null;
     }
 
     return { ask, send };
