@@ -46,6 +46,18 @@ def test_a_row_of_a_batch_opens_live(running: Any, batch: Path) -> None:
         visit.close()
 
 
+def test_a_row_opens_in_another_tab(running: Any, batch: Path) -> None:
+    with serving(batch.parent, str(batch)) as own:
+        visit = Live(running, own)
+        with visit.context.expect_page() as opened:
+            visit.page.locator("#variants tbody th a").last.click(modifiers=["Control"])
+        opened.value.wait_for_function("() => /passed/.test(document.querySelector('#state').textContent)")
+        assert own.token not in opened.value.url
+        opened.value.reload()
+        opened.value.wait_for_function("() => /passed/.test(document.querySelector('#state').textContent)")
+        visit.close()
+
+
 def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running: Any, tmp_path: Path) -> None:
     base = {"base": "single-embedded", "set": {"output.formats": []}}
     sweep = from_file({**base, "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "walls")

@@ -405,7 +405,9 @@ def test_ten_thousand_random_edits(running: Any, server: Server) -> None:
     visit.settled()
     assert early is not None
     late = grown()
-    assert sum(late[0]) < 1.25 * sum(early[0])
+    # A worker that is made ready for a slow question may have come since: three at the most.
+    assert len(late[0]) <= 7
+    assert sum(late[0]) / len(late[0]) < 1.25 * sum(early[0]) / len(early[0])
     assert max(late[0]) < 150
     assert late[1] < 1.5 * early[1] + 20
     assert late[2] < 1.5 * early[2]

@@ -6,8 +6,10 @@ import asyncio
 import contextlib
 import os
 import signal
+import threading
 import time
 from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import msgspec
@@ -39,7 +41,9 @@ def with_questions(act: Callable[[Questions], Awaitable[None]]) -> None:
         finally:
             await asked.close()
 
-    asyncio.run(run())
+    # In a thread of its own: the browser of other tests has a loop in this one.
+    with ThreadPoolExecutor(1) as apart:
+        apart.submit(asyncio.run, run()).result()
 
 
 @pytest.fixture(autouse=True)
@@ -144,7 +148,7 @@ def test_no_process_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
         asked._text = "30"
         under_way = asking(asked, "60")
         await asyncio.sleep(1.0)
-        children = Path(f"/proc/self/task/{os.getpid()}/children").read_text()
+        children = Path(f"/proc/self/task/{threading.get_native_id()}/children").read_text()
         pids.extend(map(int, children.split()))
         await asked.close()
         with contextlib.suppress(WorkerLost):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import signal
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -88,3 +90,17 @@ def test_workers_that_are_killed_while_idle_are_not_noticed(running: Any, tmp_pa
         visit.choose(WALL, "1.3")
         assert "passed" in visit.state
         visit.close()
+
+
+def test_an_overtaken_question_is_no_fault(server: Server, text: str) -> None:
+    """Two of one page at the same time, of which the newer one is put while the older one waits for the first."""
+    with ThreadPoolExecutor(3) as asking:
+        every = []
+        for _ in range(3):
+            every.append(asking.submit(server.send, "/ask", {"text": text, "what": "moulds", "page": "same"}))
+            time.sleep(0.05)
+        answers = [one.result() for one in every]
+    assert [status for status, _, _ in answers] == [200, 200, 200]
+    told = [json.loads(content) for _, content, _ in answers]
+    assert told[1] == {"superseded": True}
+    assert told[2]["checks"]

@@ -278,7 +278,8 @@ async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaita
     try:
         return _json(await handle(message))
     except Superseded:
-        return PlainTextResponse("a newer question is under way\n", 409)
+        # No fault: a browser would tell of one in its console.
+        return _json(msgspec.json.encode({"superseded": True}))
     except WorkerLost as error:
         return _json(msgspec.json.encode({"faults": [Fault(str(error))], "again": True}), 500)
     except Refusal as error:

@@ -5,13 +5,14 @@
   const KEY = "unitcad-token";
   const LONG_MS = 1500;
 
-  // The token stands in no address that is copied, bookmarked or kept as history. The tab holds it, for this server alone.
+  // The token stands in no address that is copied, bookmarked or kept as history. The browser holds it for this address and
+  // port, of which a reload and other tabs take it.
   function takeToken() {
     const given = new URLSearchParams(location.search).get("token");
     history.replaceState(null, "", location.pathname + location.hash);
     try {
-      if (given) sessionStorage.setItem(KEY, given);
-      return given || sessionStorage.getItem(KEY) || "";
+      if (given) localStorage.setItem(KEY, given);
+      return given || localStorage.getItem(KEY) || "";
     } catch {
       return given || "";
     }
@@ -59,7 +60,7 @@
       underWay[what] = own;
       const answer = await own.answer;
       if (underWay[what] === own) underWay[what] = null;
-      return mine === newest[what] && answer.status !== 409 ? answer : null;
+      return mine === newest[what] && !answer.superseded ? answer : null;
     }
 
     return { ask, send };
