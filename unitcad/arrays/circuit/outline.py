@@ -87,10 +87,21 @@ def _rounded(laid: Wiring, walls: Sequence[_Wall], corner: float) -> tuple[Cross
     if closed.num_contour() != 1:
         return closed, "the circuit's inner corners would enclose a hole between its rows or pads"
     added = closed - whole
+    # One union for all walls of a clearance, and of what is added only what is near a wall: with all of it for each
+    # wall a large array took seconds.
+    pieces = added.decompose()
+    x0, y0, x1, y1 = np.array([piece.bounds() for piece in pieces], float).reshape(-1, 4).T
+    notches = {
+        clearance: CrossSection.batch_boolean([_rectangle(strip, clearance) for strip in laid.strips], OpType.Add)
+        for clearance in {wall.clearance for wall in walls}
+    }
     for wall in walls:
-        notch = [_rectangle(strip, wall.clearance) for strip in laid.strips]
+        (x, y), r = wall.at, wall.outer
+        near = np.flatnonzero((x0 < x + r) & (x1 > x - r) & (y0 < y + r) & (y1 > y - r))
         silicone = CrossSection.circle(wall.outer, 128) - CrossSection.circle(wall.inner, 128)
-        beside = (added ^ silicone.translate(wall.at)) - CrossSection.batch_boolean(notch, OpType.Add)
+        beside = (CrossSection.compose([pieces[i] for i in near]) ^ silicone.translate(wall.at)) - notches[
+            wall.clearance
+        ]
         if beside.area() > _LEAST_AREA:
             return closed, f"the circuit's inner corners would reach into the silicone of {wall.name} beside its notch"
     return closed, ""
