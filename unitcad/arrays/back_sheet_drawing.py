@@ -10,6 +10,7 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.circuit.wiring import wiring
 from unitcad.arrays.fins import Fin, fins
 from unitcad.arrays.larger_than_bed import box_feature, intervals, of_sheet, round_units, sized
+from unitcad.arrays.pry_slots import STEP, PrySlot, Side, pry_slots
 from unitcad.arrays.seam_weep import sheet_mm2, too_much
 from unitcad.designs import Dimensions, dimensions
 from unitcad.designs.tooling import Cell, Layout
@@ -42,6 +43,7 @@ class Drawing:
     pins: Pins
     base_seams: tuple[Seam, ...] = ()
     cup_seams: tuple[Seam, ...] = ()
+    pry: tuple[PrySlot, ...] = ()
 
     @property
     def hole(self) -> float:
@@ -88,16 +90,20 @@ def _cut(drawn: Drawing) -> Drawing:
     moats = len(array.places) * math.pi * (dims.radii[-1] ** 2 - inner**2) * sheet.low
     layer_mm3 = sheet_mm2(array) * sheet.thickness_mm + moats
     fault = too_much(array, (-x, -y, x, y), (sheet.low, dims.heights[-1]), layer_mm3)
+
+    def levers(found: Sequence[Seam]) -> tuple[tuple[PrySlot, ...], str]:
+        return pry_slots(drawn.spec, drawn.lay, found, drawn.pins.places, drawn.hole)
+
     under = [box_feature(*filament.groove(drawn.spec, drawn.lay, cell)) for cell in drawn.lay.cells]
     bases = sized(array, (-plate[0], -plate[1], *plate), clear, close, under)
     try:
-        base = seams(bases, what, play)
+        base = seams(bases, what, play, fault=lambda found: levers(found)[1])
     except Refusal:
         # The bed that would do must do for the cups too.
-        base = seams(bases, what, play, fault=fault)
+        base = seams(bases, what, play, fault=lambda found: levers(found)[1] or fault(found))
     what = f"a cup of {2 * x:.4g} x {2 * y:.4g} mm"
     cups = seams(sized(array, (-x, -y, x, y), clear, close), what, play, base, fault)
-    cut_at = replace(drawn, base_seams=base, cup_seams=cups)
+    cut_at = replace(drawn, base_seams=base, cup_seams=cups, pry=levers(base)[0])
     return replace(cut_at, pins=replace(drawn.pins, places=(*drawn.pins.places, *_more_pins(cut_at))))
 
 
@@ -129,12 +135,33 @@ def _more_pins(drawn: Drawing) -> tuple[tuple[float, float], ...]:
                 ends = [side * out_y for side in (-1, 1) if low_y < side * out_y < high_y]
                 sides = [side * out_x for side in (-1, 1) if low_x < side * out_x < high_x]
                 each = 2 if len(ends) + len(sides) == 1 else 1
-                along = _spots([place.x for place in units], (low_x, high_x), each)
+                across, along = (low_x, high_x), (low_y, high_y)
+                new = [
+                    (at, end)
+                    for end in ends
+                    for at in _beside_slots(drawn, "back" if end > 0 else "front", [p.x for p in units], across, each)
+                ]
                 clear_of_pry = [place.y for place in units if abs(place.y) > PRY_HALF_WIDTH + 2 * PIN_RADIUS]
-                upright = _spots(clear_of_pry, (low_y, high_y), each)
-                new = [*((at, end) for end in ends for at in along), *((side, up) for side in sides for up in upright)]
+                new += [
+                    (side, at)
+                    for side in sides
+                    for at in _beside_slots(drawn, "right" if side > 0 else "left", clear_of_pry, along, each)
+                ]
                 standing += [at for at in new if all(math.dist(at, pin) > 4 * PIN_RADIUS for pin in standing)]
     return tuple(standing[len(drawn.pins.places) :])
+
+
+def _beside_slots(
+    drawn: Drawing, side: Side, middles: Sequence[float], within: tuple[float, float], count: int
+) -> list[float]:
+    """Return where pins stand on a side, as `_spots`; where slots were added there, clear of these, and anywhere."""
+    by = PRY_HALF_WIDTH + drawn.hole + drawn.spec.moulds.least_wall_mm
+    added = [slot.middle for slot in drawn.pry if slot.side == side and not slot.customary]
+    if added:
+        steps = (within[0] + STEP * i for i in range(math.ceil((within[1] - within[0]) / STEP)))
+        every = [*steps, *(at + sign * by for at in added for sign in (-1, 1))]
+        middles = [at for at in every if all(abs(at - slot) >= by - 1e-9 for slot in added)]
+    return _spots(middles, within, count)
 
 
 def _spots(middles: Sequence[float], within: tuple[float, float], count: int) -> list[float]:

@@ -113,6 +113,7 @@ def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: boo
         dims,
         concentric=False,
         pins=drawing.pins,
+        pry_slots=tuple((slot.piece, slot.side, slot.middle) for slot in drawing.pry),
         genus=tuple(holes),
         splits=tuple(_splits(drawing, base, cups)),
     )
@@ -126,10 +127,13 @@ def _splits(drawing: Drawing, base: Body, cups: Sequence[Body]) -> Iterator[Spli
 
 
 def _base_letters(drawing: Drawing, label: str) -> list[Shape]:
-    """Draw the base's label; on a base that is cut, on each piece with its number."""
+    """Draw the base's label; on a base that is cut, on each piece with its number, or that alone."""
     spec, (x, y) = drawing.spec, drawing.lay.plate
     strip = Strip((-x, -y, x, y), LABEL_MARGIN, spec.moulds.engraving_stroke_mm, _engraving(spec, 0.0), "top")
-    return on_pieces(strip, [(label,)], drawing.base_seams)
+    if all(slot.customary for slot in drawing.pry):
+        return on_pieces(strip, [(label,)], drawing.base_seams)
+    beside = strip._replace(taken=[slot.taken(drawing.lay) for slot in drawing.pry])
+    return on_pieces(beside, [(label,), (label[0],), ()], drawing.base_seams)
 
 
 def _cup_letters(drawing: Drawing, pour: int, label: str) -> list[Shape]:
@@ -193,6 +197,7 @@ def _base(drawing: Drawing) -> Shape:
     ways = [filament.way(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells]
     # Drawn for a plate under a plinth.
     slots = [moved(pry_slot(spec, lay, side), z=-plate_top(spec)) for side in (1, -1)]
+    slots += [slot.drawn(lay) for slot in drawing.pry if not slot.customary]
     return cut(union((plate, *cores, *ridges, *standing_pins(drawing.pins))), [*slots, *ways])
 
 

@@ -44,8 +44,8 @@ def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) 
         return
     end = math.degrees(largest / middle(radius)) * math.radians(TILT_DEG)
     why = (
-        f"the sheet reaches {end:.3g} degrees from the top, and a mould tilted by {TILT_DEG:g} degrees keeps air at its "
-        "ends; cast it flat and bend it"
+        f"the sheet reaches {end:.3g} degrees from the top, and a mould tilted by {TILT_DEG:g} degrees keeps air at "
+        "its ends; cast it flat and bend it"
     )
     fits = math.floor(min(radius, largest) / _STEP)
     while middle(fits * _STEP) > largest:

@@ -70,8 +70,9 @@ class Plan:
     """All tools as assembled, the pours in their order, and the four characters that their labels end in.
 
     `dimensions` are those that the tools were drawn to; `concentric`: they tell every hole and gap in the tools.
-    `pins` centre the cups on the base in place of plinth and skirt; `genus`: the through holes of a tool, by its name,
-    where neither is told by dimensions of rings.
+    `pins` centre the cups on the base in place of plinth and skirt; `pry_slots` of that base: the number of the piece
+    that has it (1 of a whole base), its side (left, right, front, back) and its middle along that side, mm. `genus`:
+    the through holes of a tool, by its name, where neither is told by dimensions of rings.
     `stretches`: where the silicone stretches after casting, and by how many percent, beside what the tools ask for.
     `splits`: the tools that are printed in pieces; everything but the pieces' files and C250 sees them joined.
     """
@@ -84,6 +85,7 @@ class Plan:
     concentric: bool = True
     stretches: tuple[tuple[str, float], ...] = ()
     pins: Pins | None = None
+    pry_slots: tuple[tuple[int, str, float], ...] = ()
     genus: tuple[tuple[str, int], ...] = ()
     splits: tuple[Split, ...] = ()
 

@@ -1,0 +1,110 @@
+"""Pry slots: every piece of a base that is cut has one at an edge, clear of what stands there; else it is refused."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.back_sheet_drawing import drawing_of
+from unitcad.arrays.back_sheet_tools import _base_letters
+from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.pry_slots import pieces
+from unitcad.check import Options, check_bytes
+from unitcad.errors import Refusal
+from unitcad.export import stl
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays
+from unitcad.mould_checks import check_moulds
+from unitcad.moulds.base import PRY_HALF_WIDTH
+from unitcad.shape import box, union
+from unitcad.spec import printer_of
+
+THREE = {"moulds.bed_x_mm": 60}
+CUT: list[dict[str, Any]] = [
+    THREE,
+    {"layout.columns": 12, "moulds.bed_x_mm": 110},
+    {"layout.rows": 12},
+    {
+        "layout.columns": 6,
+        "layout.rows": 6,
+        "layout.pitch_mm": 22,
+        "moulds.bed_x_mm": 110,
+        "moulds.bed_y_mm": 110,
+    },
+]
+
+
+@cache
+def three() -> PatchMoulds:
+    return patch_moulds(load_array("forearm-patch", THREE))
+
+
+@pytest.mark.parametrize("changes", CUT, ids=["3 x 1", "3 x 1, wide", "1 x 2", "2 x 2"])
+def test_every_piece_of_a_cut_base_has_a_slot_and_two_pins_clear_of_it(changes: dict[str, Any]) -> None:
+    drawn = drawing_of(load_array("forearm-patch", changes))
+    wall = drawn.spec.moulds.least_wall_mm - 1e-9
+    of_base = pieces(drawn.lay, drawn.base_seams)
+    assert len(of_base) > 1
+    for piece in of_base:
+        own = [slot for slot in drawn.pry if slot.piece == piece.number]
+        sides = {slot.side for slot in own}
+        assert sides
+        assert sides <= set(piece.sides(drawn.lay))
+        # At both ends, where the piece has two opposite edges of the base.
+        assert len(sides) == 2 or not {"front", "back"} <= set(piece.sides(drawn.lay)) or {"left", "right"} & sides
+        standing = [pin for pin in drawn.pins.places if piece.across[0] < pin[0] < piece.across[1]]
+        standing = [pin for pin in standing if piece.along[0] < pin[1] < piece.along[1]]
+        assert len(standing) >= 2
+        for slot in own:
+            x0, y0, x1, y1 = slot.taken(drawn.lay)
+            inside = piece.across if slot.side in ("front", "back") else piece.along
+            assert inside[0] < slot.middle - PRY_HALF_WIDTH < slot.middle + PRY_HALF_WIDTH < inside[1]
+            for px, py in standing:
+                beside = math.hypot(max(x0 - px, 0, px - x1), max(y0 - py, 0, py - y1))
+                assert beside >= drawn.hole + wall or slot.customary
+    assert {slot.piece for slot in drawn.pry} == {piece.number for piece in of_base}
+
+
+def test_the_middle_piece_of_three_keeps_every_check_and_prints_without_support() -> None:
+    moulds = three()
+    assert [f for f in check_moulds(moulds) if not f.ok] == []
+    assert [slot[:2] for slot in moulds.plan.pry_slots] == [(1, "left"), (2, "front"), (2, "back"), (3, "right")]
+    for piece in moulds.plan.pieces_of("base"):
+        content = stl.content(*print_ready(*arrays(moulds.mesh(piece)), piece.upside_down), piece.name)
+        assert check_bytes(content, f"{piece.name}.stl", Options(printer=printer_of(moulds.spec))).findings == ()
+
+
+def test_the_slots_reach_under_the_cup_from_the_plates_edge() -> None:
+    """A screwdriver of 7.5 x 0.7 mm gets in from outside, 1 mm far under the cup."""
+    moulds = three()
+    lay, base = moulds.plan.layout, moulds.mesh(moulds.plan.tool("base"))
+    for _, side, middle in moulds.plan.pry_slots:
+        if side in ("front", "back"):
+            sign = 1 if side == "back" else -1
+            low, high = sorted((sign * (lay.cup[1] - 1), sign * (lay.plate[1] + 1)))
+            tip = box(middle - 3.75, middle + 3.75, low, high, -0.75, -0.05)
+            assert (base ^ moulds.meshes([tip])[0]).volume() == 0
+
+
+def test_a_piece_without_an_edge_is_refused_with_the_bed_that_gives_it_one() -> None:
+    small = {"layout.columns": 6, "layout.rows": 6, "moulds.bed_x_mm": 70, "moulds.bed_y_mm": 70}
+    with pytest.raises(Refusal, match="piece 5 of the base has no edge of the base for a pry slot") as refused:
+        drawing_of(load_array("forearm-patch", small))
+    assert refused.value.field == "moulds.bed_x_mm"
+    assert refused.value.nearest
+
+
+def test_marks_of_pieces_keep_clear_of_slots() -> None:
+    """The middle piece has room for its number alone. No face of a mark is open to a slot."""
+    moulds = three()
+    lay = moulds.plan.layout
+    drawn = drawing_of(moulds.arranged)
+    letters = moulds.meshes([union(_base_letters(drawn, "B62A6"))])[0]
+    assert len(letters.decompose()) == 6 + 1 + 6
+    for slot in drawn.pry:
+        x0, y0, x1, y1 = slot.taken(lay)
+        assert (letters ^ moulds.meshes([box(x0 - 0.5, x1 + 0.5, y0 - 0.5, y1 + 0.5, -2, 1)])[0]).volume() == 0
