@@ -191,3 +191,12 @@ def test_agent_goes_into_the_last_cup_alone(made: Procedure) -> None:
     assert "none on base or Layer 1, ever" in on[1]
     assert "release agent" in {item.item for item in made.bill}
     assert not any(bond.face.tool == "cup2" for bond in made.bonds)
+
+
+def test_the_smear_is_bought_and_has_a_cup(made: Procedure) -> None:
+    """2 g of Layer 1's silicone on top of its pour, and a mixing cup beside those of the two pours."""
+    inner, pour = made.pours[0].material, made.pours[0]
+    bought = {item.item: item.quantity for item in made.bill}
+    assert bought[f"{inner} part A"] == pytest.approx(pour.part_a_g + 1.0)
+    assert bought[f"{inner} part B"] == pytest.approx(pour.part_b_g + 1.0)
+    assert bought["mixing cups and sticks"] == 3

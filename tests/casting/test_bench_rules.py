@@ -125,6 +125,13 @@ def no_time_to_prepare(made: Procedure) -> Procedure:
     return replace(made, preparation=tuple(replace(s, minutes=0.0, wait_min=0.0) for s in made.preparation))
 
 
+def smear_not_bought(made: Procedure) -> Procedure:
+    """The bill of the pours alone: 2 g of Layer 1's silicone, half of each part, are missing."""
+    inner = made.pours[0].material
+    bill = [replace(i, quantity=i.quantity - 1.0) if i.item.startswith(f"{inner} part") else i for i in made.bill]
+    return replace(made, bill=tuple(bill))
+
+
 def smear_of_another(made: Procedure) -> Procedure:
     *steps, cure = made.assembly
     return replace(made, assembly=(*steps, replace(cure, wait_min=60 * made.pours[-1].cure_h)))
@@ -181,6 +188,7 @@ PLANTED = {
     "no spatula": (("embedded",), spatula_forgotten, "blunt spatula"),
     "no varnish": (RESIN, varnish_forgotten, "acrylic varnish"),
     "no preparation": (RESIN, no_time_to_prepare, "Wash: takes no time"),
+    "smear not bought": (PATCH, smear_not_bought, "the bill lacks silicone"),
     "smear of another silicone": (("encapsulating",), smear_of_another, "another's time"),
     "no picture": (("encapsulating",), without_pictures, "has no picture"),
     "not levelled": (("encapsulating",), unlevelled, "levelled"),

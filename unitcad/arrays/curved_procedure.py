@@ -17,7 +17,7 @@ from unitcad.casting import figures as fig
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import picture_path, views
 from unitcad.casting.bill import Item, bill, injecting
-from unitcad.casting.finishing import motor_in, never_pushed
+from unitcad.casting.finishing import motor_in, never_pushed, smears
 from unitcad.casting.finishing import release as flat_release
 from unitcad.casting.finishing import shown as grams_shown
 from unitcad.casting.holding import lid_held
@@ -264,7 +264,7 @@ def _measure(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
 def _bill(moulds: PatchMoulds, mixes: list[tuple[Material, fig.Mix]], steps: Sequence[BenchStep]) -> Iterator[Item]:
     """Yield the bill of the whole set, its filaments told apart: bent ones, and straight ones."""
     places = len(moulds.arranged.places)
-    for item in bill(moulds, mixes, needs(steps)):
+    for item in bill(moulds, mixes, needs(steps), smears(moulds, [silicone for silicone, _ in mixes])):
         if item.item == "filament stub":
             size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
             yield replace(item, quantity=item.quantity - places)

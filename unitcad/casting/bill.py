@@ -31,10 +31,16 @@ class Item:
     least_ml: float | None = None
 
 
-def bill(moulds: MouldSet, mixes: list[tuple[Material, Mix]], named: Sequence[Need]) -> tuple[Item, ...]:
-    """List pieces, silicone (every pour's mix), motor, circuit or wires, tools and consumables (`named`: by steps)."""
-    consumables = consumed(moulds, [mix for _, mix in mixes], named)
-    return (*_pieces(moulds), *_silicone(mixes), *_inside(moulds), *consumables)
+def bill(
+    moulds: MouldSet, mixes: list[tuple[Material, Mix]], named: Sequence[Need], smears: Sequence[Material] = ()
+) -> tuple[Item, ...]:
+    """List pieces, silicone, motor, circuit or wires, tools and consumables (`named`: by steps).
+
+    Silicone is every pour's mix, and the least batch for each of `smears`, which are mixed after the pours.
+    """
+    consumables = consumed(moulds, [mix for _, mix in mixes], named, len(smears))
+    silicone = _silicone(mixes, smears, moulds.spec.casting.minimum_mix_g)
+    return (*_pieces(moulds), *silicone, *_inside(moulds), *consumables)
 
 
 def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
@@ -79,13 +85,16 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
             yield Item(plan.called(name), count, "piece", attitude, note)
 
 
-def _silicone(mixes: list[tuple[Material, Mix]]) -> Iterator[Item]:
-    for material in dict.fromkeys(material for material, _ in mixes):
+def _silicone(mixes: list[tuple[Material, Mix]], smears: Sequence[Material], least_g: float) -> Iterator[Item]:
+    for material in dict.fromkeys([*(material for material, _ in mixes), *smears]):
         own = [mix for other, mix in mixes if other == material]
-        pours = f"{len(own)} pour{'' if len(own) == 1 else 's'}"
-        note = f"{pours}, mix ratio {number(material.mix_ratio, 3)} A to 1 B, Shore {material.shore.value}"
-        yield Item(f"{material.name} part A", sum(m.part_a_g for m in own), "g", "bought", note)
-        yield Item(f"{material.name} part B", sum(m.part_b_g for m in own), "g", "bought", note)
+        ratio, smeared = float(material.mix_ratio), smears.count(material) * least_g
+        uses = [f"{len(own)} pour{'' if len(own) == 1 else 's'}"] if own else []
+        uses += [f"{number(smeared, 3)} g for the smear"] if smeared else []
+        note = f"{' and '.join(uses)}, mix ratio {number(ratio, 3)} A to 1 B, Shore {material.shore.value}"
+        part_b = smeared / (1 + ratio)
+        yield Item(f"{material.name} part A", sum(m.part_a_g for m in own) + ratio * part_b, "g", "bought", note)
+        yield Item(f"{material.name} part B", sum(m.part_b_g for m in own) + part_b, "g", "bought", note)
 
 
 def _inside(moulds: MouldSet) -> Iterator[Item]:
@@ -121,10 +130,10 @@ def injecting(spec: Spec, mixes: Sequence[Mix]) -> Iterator[Item]:
     yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
 
 
-def consumed(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> Iterator[Item]:
-    """List what the steps name, then what only its numbers make an item of this set's."""
+def consumed(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need], smears: int = 0) -> Iterator[Item]:
+    """List what the steps name, then what only its numbers make an item of this set's; `smears`: mixes beside pours."""
     pours, lengths = len(moulds.plan.steps), moulds.spec.moulds
-    yield Item("mixing cups and sticks", pours, "set", "bought", "no latex, no sulphur clay: they inhibit")
+    yield Item("mixing cups and sticks", pours + smears, "set", "bought", "no latex, no sulphur clay: they inhibit")
     yield Item("gloves", pours, "pair", "bought", "nitrile or vinyl; latex inhibits")
     resolution = number(moulds.spec.casting.scale_resolution_g, 3)
     yield Item("scale", 1, "piece", "tool", f"shows {resolution} g")

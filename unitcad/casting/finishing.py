@@ -119,6 +119,14 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     )
 
 
+def smears(moulds: MouldSet, silicones: Sequence[Material]) -> list[Material]:
+    """Return the silicones of the smears that hold motors, one batch each; where none is named Layer 1's serves."""
+    texts = () if moulds.design.laid_in else assembly(moulds)
+    if not any("smear" in text for text in texts):
+        return []
+    return list(dict.fromkeys(smeared(texts, silicones if layers_named(texts) else silicones[:1])))
+
+
 def smeared(texts: Sequence[str], silicones: Sequence[Material]) -> list[Material]:
     """Return the silicones that an assembly's words name by their layer, of `silicones` from the inside out.
 

@@ -364,8 +364,8 @@ def _release_agent(moulds: MouldSet, step: Step) -> str:
         earlier = f" or Layer {step.index - 1}" if step.index > 1 else ""
         return (
             f"Release agent, if any, sparingly and only on the sheet's bed and the bores of cup {step.index}: a "
-            "printed cup holds a thin sheet fast. Put it on away from the base and let it dry. None in the slots for the "
-            f"fins, and none on base{earlier}, ever: what bonds later is cast there."
+            "printed cup holds a thin sheet fast. Put it on away from the base and let it dry. None in the slots for "
+            f"the fins, and none on base{earlier}, ever: what bonds later is cast there."
         )
     where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)
     return (

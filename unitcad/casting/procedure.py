@@ -12,7 +12,7 @@ from unitcad.casting.bench_views import views
 from unitcad.casting.bill import Item, bill
 from unitcad.casting.eccentricity import UNEVEN, Eccentricity, eccentricity
 from unitcad.casting.figures import Figure, Mix, sourced
-from unitcad.casting.finishing import measurements, motor_in, release
+from unitcad.casting.finishing import measurements, motor_in, release, smears
 from unitcad.casting.in_short import LATE, STAY
 from unitcad.casting.instructions import pour_steps
 from unitcad.casting.layer_grid import OffGrid, UnitHeight, off_grid, unit_heights
@@ -180,7 +180,12 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         without_ribs=free,
         walls=tuple(_walls(spec, free, centred)) if plan.concentric else (),
         makes=moulds.makes,
-        bill=bill(moulds, mixes, needs([*prepared, *(step for pour in pours for step in pour.steps), *out, *motor])),
+        bill=bill(
+            moulds,
+            mixes,
+            needs([*prepared, *(step for pour in pours for step in pour.steps), *out, *motor]),
+            smears(moulds, [silicone for silicone, _ in mixes]),
+        ),
     )
 
 

@@ -158,6 +158,19 @@ def _listed(procedure: Procedure) -> Iterator[str]:
             yield f"the bill lacks what a step names: {need.item}"
 
 
+def _bought(procedure: Procedure) -> Iterator[str]:
+    """Buy what the pours take of each silicone, and the smear's batch on top."""
+    bought = {item.item: item.quantity for item in procedure.bill}
+    batches = [(pour.material, pour.part_a_g + pour.part_b_g) for pour in procedure.pours]
+    layers = set(layers_named(step.text for step in procedure.assembly))
+    for material in dict.fromkeys(material for material, _ in batches):
+        taken = sum(grams for name, grams in batches if name == material)
+        there = sum(bought.get(f"{material} part {part}", 0.0) for part in "AB")
+        smeared = any(procedure.pours[min(i, len(procedure.pours) - 1)].material == material for i in layers)
+        if there < taken - 1e-6 or (smeared and there < taken + 1e-6):
+            yield f"the bill lacks silicone: {material}"
+
+
 def _timed(procedure: Procedure) -> Iterator[str]:
     """Give every step its time: at the bench, or as a wait."""
     for step in _all(procedure):
@@ -206,6 +219,7 @@ RULES = (
     _gripped,
     _propped,
     _listed,
+    _bought,
     _timed,
     _smeared,
     _level_again,
