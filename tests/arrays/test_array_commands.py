@@ -57,7 +57,7 @@ def test_a_refusal_names_file_line_and_the_pitch_that_fits(tmp_path: Path) -> No
     with pytest.raises(Refusal) as refused:
         load_array(file)
     assert refused.value.located.startswith(f"{file}:9: layout.pitch_mm = 12: ")
-    assert refused.value.nearest == 16
+    assert refused.value.nearest == 18
     with pytest.raises(Refusal) as refused:
         load_array(file, ["layout.pitch_mm=11"])
     assert refused.value.line is None

@@ -13,9 +13,10 @@ import pytest
 
 import unitcad
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import expanded, load_array
+from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_names import array_templates, is_array
 from unitcad.arrays.array_tables import AskedArray
+from unitcad.arrays.array_units import expanded
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.outlines import rounded
 from unitcad.arrays.tail_ways import tails
@@ -91,7 +92,7 @@ REFUSED = [
     ({"layout": {**_GRID, "rings": 2}}, "layout.rings", None),
     ({"place": [{"at": [4, 1]}]}, "place.0.at", [3, 1]),
     ({"place": [{"at": "B4"}]}, "place.0.at", None),
-    ({"place": [{"at": "B2", "angle_deg": 0}]}, "place.0.angle_deg", None),
+    ({"place": [{"at": "B2", "angle_deg": 0}]}, "place.0.angle_deg", 27),
     ({"sheet": {"thickness_mm": 4}}, "sheet.thickness_mm", 2.41),
     ({"sheet": {"hold_mm": 5}}, "sheet.hold_mm", 1.4),
     ({"sheet": {"corner_mm": 30}}, "sheet.corner_mm", 10),

@@ -123,3 +123,25 @@ def test_the_docs_quote_refusals_as_they_are() -> None:
     text = " ".join((Path(__file__).parents[2] / "docs" / "arrays.md").read_text("utf-8").split())
     for name, changes in (("hex-19", {"layout.pitch_mm": 12}), ("sleeve-curved", {"body.radius_mm": 25})):
         assert f"is refused: `{refusal_of(name, changes)}`" in text
+
+
+@pytest.mark.parametrize(("unit", "tail", "pitch"), [("three-layer", 5.6, 21), ("chain", 7.1, 21.7)])
+def test_a_tail_too_long_is_told_the_length_and_the_pitch(unit: str, tail: float, pitch: float) -> None:
+    refused = refusal_of("hex-19", {"unit": unit})
+    assert (refused.field, refused.nearest) == ("unit.fpcb.tail_length_mm", tail)
+    assert f"with layout.pitch_mm = {pitch} it is accepted as it is" in refused.limit
+    assert load_array("hex-19", {"unit": unit, "layout.pitch_mm": pitch})
+    assert load_array("hex-19", {"unit": unit, "unit.fpcb.tail_length_mm": tail})
+
+
+def test_an_angle_at_which_a_tail_runs_into_a_unit_is_told_the_nearest_free_one() -> None:
+    points = {"kind": "list", "points_mm": [[0, 0], [20, 0]]}
+    data = {"name": "pair", "array": "pockets", "unit": "encapsulating", "layout": points}
+    changes = {"place": [{"at": "P2", "angle_deg": 180}]}
+    refused = refusal_of(data, changes)
+    assert (refused.field, refused.nearest) == ("place.0.angle_deg", 207)
+    for angle in (153, 207):
+        assert load_array(data, {"place": [{"at": "P2", "angle_deg": angle}]})
+    for angle in (154, 206):
+        with pytest.raises(Refusal):
+            load_array(data, {"place": [{"at": "P2", "angle_deg": angle}]})

@@ -19,6 +19,7 @@ from typing import Any
 from unitcad.arrays.array import Array, Placed, Sheet
 from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.array_tables import AskedArray
+from unitcad.arrays.array_units import expanded, merged, unit_data, with_changes
 from unitcad.arrays.asked_places import layout_of, places_of
 from unitcad.arrays.construction import Construction, construction_of
 from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point
@@ -34,10 +35,10 @@ from unitcad.shape import mm
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.toml import text_of
-from unitcad.validation import custom_templates, default_template, from_data, templates
+from unitcad.validation import default_template, from_data, templates
 from unitcad.validation.dotted import ABSENT, at
 from unitcad.validation.faults import line_of
-from unitcad.validation.load import changed, override
+from unitcad.validation.load import changed
 from unitcad.validation.shipped_files import named_file
 from unitcad.validation.tables import Changes, changes_of
 
@@ -63,7 +64,7 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
         path = named_file(os.fspath(source), array_templates(), "array", WrongArgument)
         data, folder = read_toml(path), path.parent
     written = expanded(data, folder)
-    whole = changed(override(written, ()), changes_of(set))
+    whole = with_changes(written, data, changes_of(set))
     try:
         return array_of(whole, lay_tails=lay_tails)
     except Refusal as first:
@@ -91,46 +92,6 @@ def _locate(
         return
     if refusal.value is None or at(file, refusal.field) == at(whole, refusal.field) is not ABSENT:
         refusal.file, refusal.line = os.fspath(path), line_of(read_text(path), refusal.field)
-
-
-def expanded(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
-    """Return an array's plain data with the whole spec of each unit in it. Raises Refusal for a unit not found."""
-    whole = copy.deepcopy(dict(data))
-    if "unit" in whole:
-        whole["unit"] = _unit_data(whole["unit"], "unit", folder)
-    places = whole.get("place")
-    for i, place in enumerate(places if isinstance(places, list) else ()):
-        if isinstance(place, dict) and "unit" in place:
-            place["unit"] = _unit_data(place["unit"], f"place.{i}.unit", folder)
-    return whole
-
-
-def _unit_data(given: Any, field: str, folder: Path) -> Any:
-    """Return the plain data of a unit's spec: what `like` names, with the other keys in place of its own."""
-    if isinstance(given, str):
-        given = {"like": given}
-    if not isinstance(given, dict) or "like" not in given:
-        return with_source(given, folder) if isinstance(given, dict) else given
-    own = {key: value for key, value in given.items() if key != "like"}
-    if not isinstance(given["like"], str):
-        return given
-    at_field = field if not own else f"{field}.like"
-    known = templates() | custom_templates()
-    if given["like"] in array_templates() and given["like"] not in known:
-        raise Refusal(at_field, given["like"], "is an array; a unit is a single one")
-    path = named_file(given["like"], known, at_field)
-    if path not in known.values():
-        path = folder / path
-    base = with_source(read_toml(path), path.parent)
-    return _merged(base, with_source(own, folder))
-
-
-def _merged(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    merged = dict(base)
-    for key, value in own.items():
-        there = merged.get(key)
-        merged[key] = _merged(there, value) if isinstance(there, dict) and isinstance(value, dict) else value
-    return merged
 
 
 def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
@@ -245,13 +206,13 @@ def _unit_tables(settled: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _unit(given: str | dict[str, Any], field: str, data: Mapping[str, Any]) -> Spec:
     """Return a unit's spec, with the array's tables over its own; refusals name the field in the array's file."""
-    if isinstance(given, str):  # not expanded: plain data that names a template
-        given = _unit_data(given, field, Path())
+    if isinstance(given, str) or "like" in given:  # not expanded: plain data that names a template
+        given = unit_data(given, field, Path())
         assert isinstance(given, dict)
     whole = {"name": f"{data['name']}-unit", **given}
     for table in _OVERRIDES:
         if data.get(table):
-            whole[table] = _merged(whole.get(table) or {}, data[table])
+            whole[table] = merged(whole.get(table) or {}, data[table])
     try:
         return from_data(with_source(whole, Path()))
     except Refusal as refusal:
@@ -335,7 +296,7 @@ def _angles(
         length = unit.fpcb.tail_length_mm if unit.fpcb else unit.wires.length_mm if unit.wires else 0.0
         if n in wanted:
             limit = f"at this angle the tail of {name} runs into {blocked.by}; it may be {blocked.longest:g} mm long"
-            raise Refusal(f"place.{i}.angle_deg", wanted[n], limit) from None
+            raise Refusal(f"place.{i}.angle_deg", wanted[n], limit, blocked.turned) from None
         limit = f"the tail of {name} finds no straight way between the units; it may be at most"
         nearest = blocked.longest if blocked.longest >= 0.1 else None
         raise Refusal(f"{at_unit}.{table}", length, f"{limit} {blocked.longest:g} mm", nearest) from None

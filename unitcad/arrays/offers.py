@@ -16,6 +16,7 @@ Judge = Callable[[dict[str, Any]], object]
 _MOST = 8
 """Changes that are tried together."""
 _PITCH = "layout.pitch_mm"
+_OF_TAIL = ("fpcb.tail_length_mm", "wires.length_mm")
 _WIDEST = 16
 """How much wider a pitch may be that needs no other change, mm."""
 _PITCHES = 3
@@ -33,17 +34,18 @@ _COUNTS: dict[str, dict[str, str]] = {
 
 def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
     """Return the refusal of plain data, its nearest value one that is accepted, or with what has to change as well."""
-    if type(refusal) is not Refusal or refusal.nearest is None:
+    if type(refusal) is not Refusal or (refusal.nearest is None and not refusal.field.endswith(_OF_TAIL)):
         return refusal
     changes: dict[str, object] = {refusal.field: refusal.nearest}
     limit, met = refusal.limit, _met(data, changes, judge)
+    if refusal.field.endswith(_OF_TAIL) and (wider := _wider(_present_pitches(data), data, judge)):
+        limit += f"; with {_listed(wider, 'and')} it is accepted as it is"
     for _ in range(_MOST):
         if met is None or met.nearest is None or changes.get(met.field) == met.nearest:
             break
         changes[met.field] = met.nearest
         met = _met(data, changes, judge)
-    # A bed's size grows with the pitch, and a try of so large an array takes seconds.
-    if (met is not None or len(changes) > 1) and not any(path.startswith(_OF_BED) for path in changes):
+    if met is not None or len(changes) > 1:
         pitches = {path: value for path, value in changes.items() if path.startswith(_PITCH)}
         if refusal.field in pitches and (wider := _wider(pitches, data, judge)):
             if met is None:
@@ -52,7 +54,7 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
             changes, met = wider, None
     nearest = changes.pop(refusal.field)
     if met is not None and met.field == refusal.field:
-        return Refusal(refusal.field, refusal.value, refusal.limit)
+        return Refusal(refusal.field, refusal.value, limit)
     if changes:
         limit += f"; the value offered here also needs {_listed(changes, 'and')}"
     if met is not None:
@@ -60,17 +62,36 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
     return Refusal(refusal.field, refusal.value, limit, nearest)
 
 
+def _present_pitches(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the pitch by its path, or both of a grid's; {} where the layout has none."""
+    pitch = at(data, _PITCH)
+    both = {f"{_PITCH}.{axis}": mm for axis, mm in enumerate(pitch)} if isinstance(pitch, list | tuple) else {}
+    return {_PITCH: pitch} if isinstance(pitch, int | float) else both
+
+
+def _places(data: Mapping[str, Any]) -> int:
+    """Return how many places a layout with a pitch has; 0 for one that has no such counts."""
+    columns, rows, rings = (at(data, f"layout.{key}") for key in ("columns", "rows", "rings"))
+    if isinstance(rings, int):
+        return 3 * rings * (rings + 1) + 1
+    return columns * rows if isinstance(columns, int) and isinstance(rows, int) else 0
+
+
 def _wider(pitches: Mapping[str, Any], data: Mapping[str, Any], judge: Judge) -> dict[str, object]:
     """Return pitches raised together, by as few tenths of a mm as can be, that need no other change; {}: none found."""
+
+    if not pitches or _places(data) > _MANY:
+        return {}
 
     def raised(tenths: int) -> dict[str, object]:
         return {path: (math.ceil(pitch * 10 - 1e-6) + tenths) / 10 for path, pitch in pitches.items()}
 
-    def fits(tenths: int) -> bool:
-        return _met(data, raised(tenths), judge) is None
-
-    whole = next((mm * 10 for mm in range(1, _WIDEST + 1) if fits(mm * 10)), None)
-    return {} if whole is None else raised(next(tenths for tenths in range(whole - 9, whole + 1) if fits(tenths)))
+    for whole in range(10, 10 * _WIDEST + 1, 10):
+        met = _met(data, raised(whole), judge)
+        if met is None:
+            nearer = (raised(tenths) for tenths in range(whole - 9, whole))
+            return next((each for each in nearer if _met(data, each, judge) is None), raised(whole))
+    return {}
 
 
 def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judge: Judge) -> Refusal:

@@ -35,11 +35,14 @@ class Tail(NamedTuple):
 
 
 class Blocked(Exception):
-    """A unit whose tail finds no way: its number, and the longest tail that would find one (mm beyond its edge)."""
+    """A unit whose tail finds no way: its number, and the longest tail that would find one (mm beyond its edge).
 
-    def __init__(self, owner: int, longest: float, by: str) -> None:
+    `turned`: the nearest angle, in whole degrees from the one asked for, at which it would; None for none.
+    """
+
+    def __init__(self, owner: int, longest: float, by: str, turned: float | None = None) -> None:
         super().__init__(by)
-        self.owner, self.longest, self.by = owner, longest, by
+        self.owner, self.longest, self.by, self.turned = owner, longest, by, turned
 
 
 def tails(unit: Spec, x: float, y: float, angle_deg: float, owner: int, length: float | None = None) -> list[Tail]:
@@ -90,7 +93,14 @@ def _laid(
         laid[i] = tails(units[i], points[i].x, points[i].y, chosen[i], i)
     for i in asked:
         if why := in_the_way(laid[i], i, points, radii, near[i], laid, slots):
-            raise Blocked(i, _longest(i, (chosen[i],), points, units, radii, near[i], laid, slots), why)
+            longest = _longest(i, (chosen[i],), points, units, radii, near[i], laid, slots)
+
+            def clear(angle: float, i: int = i) -> bool:
+                drawn = tails(units[i], points[i].x, points[i].y, angle, i)
+                return not in_the_way(drawn, i, points, radii, near[i], laid, slots)
+
+            by = (chosen[i] + sign * turn for turn in range(1, 181) for sign in (1, -1))
+            raise Blocked(i, longest, why, next((angle for angle in by if abs(angle) <= 360 and clear(angle)), None))
     for i in (i for i in range(len(points)) if i not in asked):
         why, free = "", None
         for angle in candidates(points[i]):

@@ -23,8 +23,9 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from msgspec import Meta, Struct, field, structs
 
-from unitcad.arrays.array_file import confirm_makeable, expanded
+from unitcad.arrays.array_file import confirm_makeable
 from unitcad.arrays.array_names import array_templates, confirm_known, is_array
+from unitcad.arrays.array_units import expanded
 from unitcad.arrays.offers import offered
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest

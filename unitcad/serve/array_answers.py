@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 from msgspec.structs import replace
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import array_of, expanded, to_toml
+from unitcad.arrays.array_file import array_of, to_toml
 from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.array_tables import AskedArray, BodyTable, CircuitTable, SheetTable
+from unitcad.arrays.array_units import expanded
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.made_plan import made_plan
 from unitcad.catalogue import materials

@@ -10,8 +10,8 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from unitcad.arrays.array_file import expanded
 from unitcad.arrays.array_names import array_templates, is_array
+from unitcad.arrays.array_units import expanded
 from unitcad.errors import Missing, Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text
 from unitcad.pipeline.folder import ARRAY
