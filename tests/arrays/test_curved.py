@@ -24,7 +24,7 @@ from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.mould_checks import air, check_moulds, mould_checks
+from unitcad.mould_checks import air, balance, check_moulds, mould_checks
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.report.array_view import patch_model
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
@@ -78,6 +78,12 @@ def test_every_mould_check_holds_on_other_layouts(data: dict[str, object]) -> No
 
 def test_air_leaves_a_narrow_sheet_whose_round_corners_hold_vents_off_its_ends() -> None:
     found = list(air.findings(sleeve("layout.columns=1", "layout.rows=1", "body.radius_mm=86")))
+    assert [f for f in found if not f.ok] == []
+
+
+def test_vents_that_stand_aside_on_a_large_limb_begin_in_the_sheet() -> None:
+    moulds = sleeve("layout.columns=2", "layout.rows=1", "body.radius_mm=220")
+    found = [f for check in (balance, air) for f in check.findings(moulds)]
     assert [f for f in found if not f.ok] == []
 
 

@@ -27,7 +27,7 @@ from unitcad.arrays.piece_labels import Strip, on_pieces
 from unitcad.designs import dimensions
 from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
-from unitcad.geometry.segments import Point, between_convex
+from unitcad.geometry.segments import Point, nearer
 from unitcad.moulds import filament
 from unitcad.moulds.base import core, outline, plate_top, pry_slot
 from unitcad.moulds.blade import blade
@@ -260,7 +260,7 @@ def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
         for strip in strips(seam, moulds.least_wall_mm + seam.play / 2):
             over = Extrude(polygon(*strip), low - BEYOND, high + BEYOND)
             for i, cell in enumerate(cells):
-                if between_convex([seen((cell.x, cell.y), seam.across)], strip) < outer:
+                if nearer([seen((cell.x, cell.y), seam.across)], strip, outer):
                     stops[i].append(over if seam.across == "x" else turned(over, "z", 1))
     return [cut(moved(ring(inner, outer, low, high), c.x, c.y), stops[i]) for i, c in enumerate(cells)]
 

@@ -274,7 +274,9 @@ def _channels(former: Former, low: float, top: float) -> list[Shape]:
     drawn = [sprue]
     for x in places:
         along = (sheet.outline[3] - sheet.outline[1]) / 2 - _vent_off_end(former, x) - vent
-        drawn += [moved(cylinder(vent, low, top), x, middle + side * along) for side in (-1, 1)]
+        # A vent that stands aside begins lower, where the sheet's back does.
+        back = math.sqrt(former.back**2 - (abs(x) + vent) ** 2) - (former.array.radius_mm or 0.0)
+        drawn += [moved(cylinder(vent, min(low, back - INTO), top), x, middle + side * along) for side in (-1, 1)]
     return drawn
 
 

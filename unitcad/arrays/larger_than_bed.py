@@ -14,7 +14,7 @@ from itertools import pairwise, product
 
 from unitcad.arrays.array import Array, Box, Placed
 from unitcad.errors import Refusal
-from unitcad.geometry.segments import Point, between_convex, to_segment
+from unitcad.geometry.segments import Point, nearer, to_segment
 from unitcad.moulds.cuts import BESIDE, Feature, Place, Sized, in_gaps
 from unitcad.moulds.dovetails import FAR, LARGE, Axis, Interval, Seam, seen
 from unitcad.shape import mm
@@ -115,9 +115,7 @@ def _stepping(array: Array, features: Sequence[Feature]) -> Iterator[Place]:
         line = _line([(y, _passes(rows[y], x, array.pitch_mm)) for y, x in zip(rows, wanted, strict=True)], through)
         stretches = list(pairwise(line))
         if len({x for x, _ in line}) > 1 and not any(
-            between_convex(ends, feature.corners) < feature.radius + BESIDE
-            for ends in stretches
-            for feature in features
+            nearer(ends, feature.corners, feature.radius + BESIDE) for ends in stretches for feature in features
         ):
             yield Place(start, line)
 

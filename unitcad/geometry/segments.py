@@ -54,3 +54,12 @@ def _inside(at: Point, corners: Sequence[Point]) -> bool:
     """Tell whether a point lies in a convex polygon of three corners or more."""
     sides = [(q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0]) for p, q in _edges(corners)]
     return len(corners) > 2 and (min(sides) >= 0 or max(sides) <= 0)
+
+
+def nearer(a: Sequence[Point], b: Sequence[Point], than: float) -> bool:
+    """Tell whether two convex polygons are nearer to each other than a distance; quick where their boxes are not."""
+    for axis in (0, 1):
+        ones, others = [p[axis] for p in a], [p[axis] for p in b]
+        if min(ones) - max(others) >= than or min(others) - max(ones) >= than:
+            return False
+    return between_convex(a, b) < than

@@ -14,7 +14,7 @@ from itertools import combinations, pairwise
 from typing import NamedTuple
 
 from unitcad.errors import Refusal
-from unitcad.geometry.segments import Point, between_convex
+from unitcad.geometry.segments import Point, between_convex, nearer
 from unitcad.moulds.dovetails import (
     FAR,
     LARGE,
@@ -230,7 +230,7 @@ def _beside(
         return
     y = (low + high) / 2
     middle = start[0] + way[0] * (y - start[1]) / way[1], y
-    near = [f for f in features if between_convex((start, end), f.corners) < f.radius + size.depth + BESIDE]
+    near = [f for f in features if nearer((start, end), f.corners, f.radius + size.depth + BESIDE)]
     count = 2 * math.floor(room / 2 / STEP)
     runs: list[list[float]] = []
     for by in [(i - count / 2) * STEP for i in range(count + 1)]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -70,9 +71,10 @@ def _outline(laid: Wiring, walls: tuple[_Wall, ...], corner: float) -> Profile:
     """Return the outline, kept: most changes of a sheet leave the circuit as it is. Raises Refusal."""
     closed, blocked = _rounded(laid, walls, corner)
     if blocked:
-        tenths = range(math.ceil(10 * corner) - 1, 1, -1)
-        fits = next((tenth / 10 for tenth in tenths if not _rounded(laid, walls, tenth / 10)[1]), None)
-        raise Refusal("circuit.corner_mm", corner, blocked, fits)
+        tenths = range(2, math.ceil(10 * corner))
+        # What a corner reaches into, a larger one does too.
+        fits = bisect(tenths, False, key=lambda tenth: bool(_rounded(laid, walls, tenth / 10)[1]))
+        raise Refusal("circuit.corner_mm", corner, blocked, tenths[fits - 1] / 10 if fits else None)
     return Profile(tuple(_with_arcs(_distinct(np.asarray(closed.to_polygons()[0], float)))))
 
 
@@ -86,25 +88,27 @@ def _rounded(laid: Wiring, walls: Sequence[_Wall], corner: float) -> tuple[Cross
     closed = whole.offset(corner, JoinType.Miter).offset(-corner, JoinType.Round, 2.0, _segments(corner))
     if closed.num_contour() != 1:
         return closed, "the circuit's inner corners would enclose a hole between its rows or pads"
-    added = closed - whole
-    # One union for all walls of a clearance, and of what is added only what is near a wall: with all of it for each
-    # wall a large array took seconds.
-    pieces = added.decompose()
-    x0, y0, x1, y1 = np.array([piece.bounds() for piece in pieces], float).reshape(-1, 4).T
-    notches = {
-        clearance: CrossSection.batch_boolean([_rectangle(strip, clearance) for strip in laid.strips], OpType.Add)
-        for clearance in {wall.clearance for wall in walls}
-    }
+    added = (closed - whole).decompose()
+    boxes, strips = (
+        np.array([each.bounds() for each in shapes]).reshape(-1, 4) for shapes in (added, map(_rectangle, laid.strips))
+    )
     for wall in walls:
-        (x, y), r = wall.at, wall.outer
-        near = np.flatnonzero((x0 < x + r) & (x1 > x - r) & (y0 < y + r) & (y1 > y - r))
+        near = [added[i] for i in _near(boxes, wall)]
+        if not near:
+            continue
+        notch = [_rectangle(laid.strips[i], wall.clearance) for i in _near(strips, wall)]
         silicone = CrossSection.circle(wall.outer, 128) - CrossSection.circle(wall.inner, 128)
-        beside = (CrossSection.compose([pieces[i] for i in near]) ^ silicone.translate(wall.at)) - notches[
-            wall.clearance
-        ]
+        beside = CrossSection.compose(near) ^ silicone.translate(wall.at)
+        beside -= CrossSection.batch_boolean(notch, OpType.Add)
         if beside.area() > _LEAST_AREA:
             return closed, f"the circuit's inner corners would reach into the silicone of {wall.name} beside its notch"
     return closed, ""
+
+
+def _near(boxes: np.ndarray, wall: _Wall) -> list[int]:
+    """Return which of the boxes (x0, y0, x1, y1), wider by the notch's clearance, may meet a unit."""
+    at, reach = np.array(wall.at), wall.outer + max(wall.clearance, 0.0)
+    return np.nonzero(np.all((boxes[:, :2] - reach < at) & (at < boxes[:, 2:] + reach), axis=1))[0].tolist()
 
 
 def circuit_body(array: Array) -> Body:
