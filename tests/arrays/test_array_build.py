@@ -228,6 +228,23 @@ def test_the_units_take_the_time_of_their_whole_time_line(count: int, words: str
     assert take in step.text
 
 
+def test_the_sheet_is_cast_while_the_units_first_pour_cures() -> None:
+    """One casting of two units: Layer 1 cures for 4 h, in which the sheet is poured; neither waits for the other."""
+    array = load_array("forearm-pockets", [*SMALL, "moulds.cavities=[2, 1]"])
+    spec = MouldSet(array.unit)
+    unit = procedure(spec, [spec.solids[step.name].volume() for step in spec.plan.steps], 1000.0)
+    made = pocket_procedure(patch_moulds(array), 1000.0, 1000.0, {"units/encapsulating": unit})
+    phases = {phase.name: phase for phase in made.time_line}
+    first = next(phase for phase in unit.time_line if phase.name == "pour 1")
+    begin = first.end_min - 60 * unit.pours[0].cure_h
+    assert phases["sheet: preparation"].start_min == pytest.approx(begin)
+    assert phases["sheet: pour"].start_min + phases["sheet: pour"].bench_min < first.end_min
+    ends = phases["units"].end_min, phases["sheet: out of the mould"].end_min
+    assert made.earliest_finish_min == pytest.approx(max(ends)) == pytest.approx(phases["units in"].start_min)
+    assert made.bench_min == pytest.approx(sum(phase.bench_min for phase in made.time_line[:-1]))
+    assert f"while their first pour cures, {duration(begin)} from now" in made.preparation[0].text
+
+
 def test_no_file_of_a_tool_has_a_finding(folder: Path) -> None:
     printer = printer_of(load_array("forearm-pockets").unit)
     for path in folder.rglob("*.stl"):

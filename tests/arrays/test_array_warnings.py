@@ -13,6 +13,7 @@ from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.circuit.circuit_files import has_circuit
 from unitcad.arrays.circuit.tracks import GAP_MM, TRACK_MM, crowded_tracks, width_needed
 from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.mould_checks.gap import play_missing
 from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
@@ -35,6 +36,15 @@ def test_no_template_warns(name: str) -> None:
     array = load_array(name)
     assert not (has_circuit(array) and crowded_tracks(array))
     assert shallow_grooves(patch_moulds(array)) == []
+    assert play_missing(patch_moulds(array)) == []
+
+
+def test_casting_alone_warns_of_play_that_the_mould_checks_would_miss(tmp_path: Path) -> None:
+    array = load_array("wrist-band", {"moulds.plinth_clearance_mm": 0.05})
+    built = build_array(array, tmp_path, only=("casting",))
+    warned = json.loads((built.folder / "manifest.json").read_bytes())["warnings"]
+    (said,) = [line for line in warned if "moulds.plinth_clearance_mm = 0.05" in line]
+    assert said.endswith("(C210 and C250)")
 
 
 @pytest.mark.parametrize("only", ["unit", "moulds"])

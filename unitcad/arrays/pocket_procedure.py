@@ -24,7 +24,7 @@ from unitcad.casting.needs import needs
 from unitcad.casting.plates import mould_plates
 from unitcad.casting.preparation import cleaning, fall, printing
 from unitcad.casting.procedure import Procedure, bubbles, pour_of
-from unitcad.casting.time_line import duration, phases
+from unitcad.casting.time_line import Phase, duration, phases
 from unitcad.catalogue import Material
 from unitcad.check.findings import counted
 from unitcad.moulds.mould_set import MouldSet
@@ -59,8 +59,10 @@ def pocket_procedure(
     poured = tuple(_pour(moulds, silicone, mix, verdict))
     out = tuple(_out(moulds))
     together = tuple(_together(array, moulds))
-    stages = [("units", cast), ("preparation", prepared), ("pour 1", poured), ("out of the mould", out)]
-    until, line = phases(stages), phases([*stages, ("units in", together)])
+    sheet = [("sheet: preparation", prepared), ("sheet: pour", poured), ("sheet: out of the mould", out)]
+    until = _side_by_side(phases([("units", cast)]), phases(sheet), _first_cure(units))
+    finish = max(phase.end_min for phase in until)
+    line = (*until, *_later(phases([("units in", together)]), finish))
     pour = replace(pour_of(moulds, step, silicone, mix, sheet_mm3, verdict, poured), layer="sheet")
     grams = sheet_mm3 * float(silicone.density_g_cm3) / 1000
     named = needs([*prepared, *poured, *out, *together])
@@ -70,7 +72,7 @@ def pocket_procedure(
         cells=1,
         vacuum=spec.casting.vacuum,
         tunnels=(),
-        earliest_finish_min=until[-1].end_min,
+        earliest_finish_min=finish,
         bench_min=sum(phase.bench_min for phase in until),
         time_line=line,
         printing=tuple(_printing(moulds, printed_mm3, array, units)),
@@ -91,20 +93,40 @@ def pocket_procedure(
     )
 
 
+def _first_cure(units: Mapping[str, Procedure]) -> float:
+    """Return when the first pour of the first units cures, min: until then the bench is theirs."""
+    first = next(iter(units.values()), None)
+    poured = first and next((phase for phase in first.time_line if phase.name == "pour 1"), None)
+    return poured.end_min - 60 * first.pours[0].cure_h if first and poured else 0.0
+
+
+def _later(line: Iterable[Phase], by: float) -> tuple[Phase, ...]:
+    """Return phases that begin later."""
+    return tuple(replace(phase, start_min=phase.start_min + by) for phase in line)
+
+
+def _side_by_side(units: Iterable[Phase], sheet: Iterable[Phase], after: float) -> tuple[Phase, ...]:
+    """Return the phases of units and sheet in the order of their beginnings; the sheet's begin `after` so long."""
+    return tuple(sorted((*units, *_later(sheet, after)), key=lambda phase: phase.start_min))
+
+
 def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
     """Say how the units are made first: by their own procedures, as often as their mould has to be filled."""
-    for count, (folder, unit) in zip(counts(array), units.items(), strict=True):
+    for i, (count, (folder, unit)) in enumerate(zip(counts(array), units.items(), strict=True)):
         times = castings(count, unit)
         cavities = "one cavity" if unit.cells == 1 else f"{unit.cells} cavities"
         filled = "one casting" if times == 1 else f"{times} castings, one after the other,"
         take = "takes" if times == 1 else "take"
         whole, bench = unit.time_line[-1].end_min, sum(phase.bench_min for phase in unit.time_line)  # motors in
+        # One sheet is cast, beside the first of them.
+        after = duration(_first_cure(units)) if not i else ""
+        beside = f"Begin the sheet beside them, while their first pour cures, {after} from now." if after else ""
         more = "" if unit.cells >= count else " More cavities (moulds.cavities) or a second set of moulds save days."
         yield BenchStep(
             "Cast the units",
             f"Cast {count} of {unit.name} by {folder}/casting.md, motors in: {filled} in moulds of {cavities} {take} "
             f"{duration(times * whole)}, of which {duration(times * bench)} at the bench. "
-            f"The sheet can cure beside them.{more} Try every motor.",
+            f"{beside}{more} Try every motor.",
             kind="cure",
             minutes=times * bench,
             wait_min=times * (whole - bench),

@@ -75,7 +75,7 @@ def to_markdown(procedure: Procedure) -> str:
 def _times(procedure: Procedure) -> Iterator[str]:
     """Yield the earliest finish in a sentence, and the time line."""
     total, bench = duration(procedure.earliest_finish_min), duration(procedure.bench_min)
-    out = f"{procedure.makes} out of the mould"
+    out = "units and sheet out of their moulds" if procedure.makes == "sheet" else f"{procedure.makes} out of the mould"
     yield f"**{total}** from the printed pieces to the {out}, of which {bench} at the bench."
     if procedure.assembly:
         more = procedure.time_line[-1].end_min - procedure.earliest_finish_min

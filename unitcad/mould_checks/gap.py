@@ -90,6 +90,15 @@ def least_play(lengths: Moulds) -> float:
     return max(lengths.plinth_clearance_mm, lengths.xy_play_mm)
 
 
+def play_missing(moulds: MouldSet) -> list[str]:
+    """Return a sentence where pieces without ribs are drawn with too little play, known before anything is; else []."""
+    lengths, plan = moulds.spec.moulds, moulds.plan
+    codes = [*(["C210"] if plan.pins else []), *(["C250"] if plan.splits else [])]
+    if not codes or lengths.plinth_clearance_mm >= least_play(lengths):
+        return []
+    return [f"{too_tight(lengths)}, or the pieces do not go together ({' and '.join(codes)})"]
+
+
 def too_tight(lengths: Moulds) -> str:
     """Write what to change where pieces have less than `least_play` between them."""
     asked, play = lengths.plinth_clearance_mm, lengths.xy_play_mm

@@ -39,6 +39,7 @@ from unitcad.casting.procedure import procedure as unit_procedure
 from unitcad.casting.written import files as written
 from unitcad.casting.written import step_section
 from unitcad.mould_checks.finding import FindingRecord
+from unitcad.mould_checks.gap import play_missing
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import folder as folders
@@ -81,7 +82,7 @@ def make_array(array: Array, only: Sequence[str], check: bool, store: Store, sta
         parts, shared = [*parts, *made], shared | files
     drawn: list[str] = []
     tracks = crowded_tracks(array) if has_circuit(array) else []
-    warned = [*hidden_tails_warning(array), *tracks, *shallow_grooves(moulds)]
+    warned = [*hidden_tails_warning(array), *tracks, *shallow_grooves(moulds), *play_missing(moulds)]
     if {"unit", "moulds"} & set(only):
         with stages("pictures"):
             shown = _pictures(moulds, store)
