@@ -36,6 +36,8 @@ def _apart(one: tuple[float, float, float], other: tuple[float, float, float]) -
 def slot_profile(box: Box) -> Profile:
     """Return a slot that fills a box, its two short ends round."""
     x0, y0, x1, y1 = box
+    if mm(x1 - x0) == mm(y1 - y0):
+        return rounded(box, (x1 - x0) / 2)
     if y1 - y0 >= x1 - x0:
         r = (x1 - x0) / 2
         return Profile(((x0, y0 + r, 1.0), (x1, y0 + r, 0.0), (x1, y1 - r, 1.0), (x0, y1 - r, 0.0)))
