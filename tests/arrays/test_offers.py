@@ -145,3 +145,17 @@ def test_an_angle_at_which_a_tail_runs_into_a_unit_is_told_the_nearest_free_one(
     for angle in (154, 206):
         with pytest.raises(Refusal):
             load_array(data, {"place": [{"at": "P2", "angle_deg": angle}]})
+
+
+@pytest.mark.parametrize("bed", [10, 40, 50])
+def test_of_beds_a_tenth_less_than_the_one_offered_is_refused(bed: float) -> None:
+    """Base and cups each ask for another bed where they are cut one by one."""
+    assert refusal_of("forearm-patch", {"moulds.bed_x_mm": bed}).nearest == 58.9
+    assert patch_moulds(load_array("forearm-patch", {"moulds.bed_x_mm": 58.9})).plan
+    assert refusal_of("forearm-patch", {"moulds.bed_x_mm": 58.8}).field == "moulds.bed_x_mm"
+
+
+@pytest.mark.parametrize("name", ["forearm-pockets", "forearm-patch"])
+def test_a_strap_slot_as_long_as_wide_is_a_round_hole(name: str) -> None:
+    moulds = patch_moulds(load_array(name, {"sheet.strap_slot_mm": [3, 3]}))
+    assert moulds.plan

@@ -23,6 +23,8 @@ _PITCHES = 3
 """Pitches to either side of the present one that are tried."""
 _MANY = 64
 """Of an array with more places no other pitch or slot is tried: a try takes seconds."""
+_FEW = 16
+"""Of an array with more places no smaller bed is looked for than the tools of it ask for one by one."""
 _OF_BED, _OF_CIRCUIT = "moulds.bed_", "circuit."
 _COUNTS: dict[str, dict[str, str]] = {
     "grid": {"moulds.bed_x_mm": "columns", "moulds.bed_y_mm": "rows"},
@@ -53,6 +55,8 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
                 limit += f"; {_listed(pitches, 'and')} would also need {_listed(rest, 'and')}"
             changes, met = wider, None
     nearest = changes.pop(refusal.field)
+    if refusal.field.startswith(_OF_BED) and met is None and not changes and _places(data) <= _FEW:
+        nearest = _nearer(refusal, nearest, data, judge)
     if met is not None and met.field == refusal.field:
         return Refusal(refusal.field, refusal.value, limit)
     if changes:
@@ -69,12 +73,33 @@ def _present_pitches(data: Mapping[str, Any]) -> dict[str, Any]:
     return {_PITCH: pitch} if isinstance(pitch, int | float) else both
 
 
+def _nearer(refusal: Refusal, nearest: Any, data: Mapping[str, Any], judge: Judge) -> object:
+    """Return a bed that is accepted and smaller than the one that was found, where tries between find one."""
+    low, high, same = float(str(refusal.value)), float(nearest), 0
+    while (middle := math.floor((low + high) * 5) / 10) > low:
+        met = _met(data, {refusal.field: middle}, judge)
+        if met is None:
+            high = middle
+            continue
+        low, asked = middle, met.nearest if met.field == refusal.field else None
+        same += asked == high
+        if same > 1:
+            break  # its tools ask for no less
+        if isinstance(asked, float) and asked < high and _met(data, {refusal.field: asked}, judge) is None:
+            high, same = asked, 0
+    return high
+
+
 def _places(data: Mapping[str, Any]) -> int:
-    """Return how many places a layout with a pitch has; 0 for one that has no such counts."""
-    columns, rows, rings = (at(data, f"layout.{key}") for key in ("columns", "rows", "rings"))
+    """Return how many places a layout has by its counts, which nobody checked."""
+    layout = at(data, "layout")
+    rings, points = at(layout, "rings"), at(layout, "points_mm")
     if isinstance(rings, int):
         return 3 * rings * (rings + 1) + 1
-    return columns * rows if isinstance(columns, int) and isinstance(rows, int) else 0
+    if isinstance(points, list | tuple):
+        return len(points)
+    counts = (at(layout, key) for key in ("columns", "rows", "count", "bands"))
+    return math.prod(count for count in counts if isinstance(count, int))
 
 
 def _wider(pitches: Mapping[str, Any], data: Mapping[str, Any], judge: Judge) -> dict[str, object]:
