@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import random
+import time
 from typing import Any
 
 import pytest
 
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.outlines import slot_profile
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.errors import Refusal
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.mould_checks import check_moulds
 
 
@@ -64,3 +68,61 @@ def test_what_can_not_be_made_is_refused(name: str, changes: dict[str, Any], fie
     if nearest is not None:
         assert refused.value.nearest == nearest
     assert isinstance(refused.value.nearest, float)
+
+
+def test_the_corner_that_fits_a_circuit_is_found_in_few_tries(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A corner of 20 mm, far above what fits: tenths are halved, not counted down."""
+    from unitcad.arrays.circuit import outline as module
+
+    tries: list[float] = []
+    rounded = module._rounded
+    monkeypatch.setattr(
+        module, "_rounded", lambda laid, walls, corner: tries.append(corner) or rounded(laid, walls, corner)
+    )
+    module._outline.cache_clear()
+    with pytest.raises(Refusal) as refused:
+        module.outline(load_array("forearm-patch", {"circuit.corner_mm": 20}))
+    fits = refused.value.nearest
+    assert isinstance(fits, float)
+    assert len(tries) < 12
+    assert module.outline(load_array("forearm-patch", {"circuit.corner_mm": fits}))
+
+
+NUMBERS = {
+    "layout.pitch_mm": 20.0, "layout.columns": 3, "layout.rows": 3, "layout.rings": 2, "layout.count": 8,
+    "sheet.thickness_mm": 1.5, "sheet.margin_mm": 3.0, "sheet.corner_mm": 5.0, "sheet.strap_web_mm": 5.0,
+    "sheet.strap_slot_mm": [3.0, 20.0], "sheet.hold_mm": 0.2, "body.radius_mm": 40.0, "circuit.row_width_mm": 3.0,
+    "circuit.spine_mm": 10.0, "circuit.tail_mm": 10.0, "circuit.corner_mm": 1.0, "moulds.bed_x_mm": 100.0,
+    "moulds.bed_y_mm": 100.0, "moulds.bed_z_mm": 100.0, "moulds.plate_mm": 4.0, "moulds.land_mm": 1.0,
+    "moulds.groove_width_mm": 2.0, "moulds.plinth_clearance_mm": 0.15, "moulds.layer_mm": 0.2,
+    "moulds.least_wall_mm": 0.8, "moulds.filament_mm": 1.75, "unit.diameter_mm": 14.0,
+}  # fmt: skip
+"""A usual value of each key."""
+NONSENSE = (math.nan, math.inf, -1, 0, 1e308, 10**30, "x", True, None, [], {}, 1e-12)
+SECONDS = 20.0
+"""Of processor time, at most."""
+
+
+def far_out(seed: int) -> tuple[str, dict[str, Any]]:
+    """Return a template and changes of it, each a hundredth to a hundred times the usual value, or nonsense."""
+    pick = random.Random(seed)
+
+    def changed(value: Any) -> Any:
+        if isinstance(value, list):
+            return [changed(each) for each in value]
+        if pick.random() < 0.06:
+            return pick.choice(NONSENSE)
+        by = 10 ** pick.uniform(-2, 2)
+        return max(1, round(value * by)) if isinstance(value, int) else round(value * by, pick.choice([1, 3, 6]))
+
+    name = pick.choice(sorted(array_templates()))
+    return name, {path: changed(NUMBERS[path]) for path in pick.sample(sorted(NUMBERS), pick.randint(1, 3))}
+
+
+@pytest.mark.parametrize("seed", [*range(30), *(pytest.param(i, marks=pytest.mark.long) for i in range(30, 1000))])
+def test_values_far_out_are_planned_or_refused_within_seconds(seed: int) -> None:
+    name, changes = far_out(seed)
+    start = time.process_time()
+    with contextlib.suppress(UnitcadError):
+        patch_moulds(load_array(name, changes)).plan  # noqa: B018
+    assert time.process_time() - start < SECONDS

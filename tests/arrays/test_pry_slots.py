@@ -65,7 +65,7 @@ def test_every_piece_of_a_cut_base_has_a_slot_and_two_pins_clear_of_it(changes: 
             assert inside[0] < slot.middle - PRY_HALF_WIDTH < slot.middle + PRY_HALF_WIDTH < inside[1]
             for px, py in standing:
                 beside = math.hypot(max(x0 - px, 0, px - x1), max(y0 - py, 0, py - y1))
-                assert beside >= drawn.hole + wall or slot.customary
+                assert beside >= drawn.hole + wall
     assert {slot.piece for slot in drawn.pry} == {piece.number for piece in of_base}
 
 

@@ -141,11 +141,10 @@ def _more_pins(drawn: Drawing) -> tuple[tuple[float, float], ...]:
                     for end in ends
                     for at in _beside_slots(drawn, "back" if end > 0 else "front", [p.x for p in units], across, each)
                 ]
-                clear_of_pry = [place.y for place in units if abs(place.y) > PRY_HALF_WIDTH + 2 * PIN_RADIUS]
                 new += [
                     (side, at)
                     for side in sides
-                    for at in _beside_slots(drawn, "right" if side > 0 else "left", clear_of_pry, along, each)
+                    for at in _beside_slots(drawn, "right" if side > 0 else "left", [p.y for p in units], along, each)
                 ]
                 standing += [at for at in new if all(math.dist(at, pin) > 4 * PIN_RADIUS for pin in standing)]
     return tuple(standing[len(drawn.pins.places) :])
@@ -154,14 +153,15 @@ def _more_pins(drawn: Drawing) -> tuple[tuple[float, float], ...]:
 def _beside_slots(
     drawn: Drawing, side: Side, middles: Sequence[float], within: tuple[float, float], count: int
 ) -> list[float]:
-    """Return where pins stand on a side, as `_spots`; where slots were added there, clear of these, and anywhere."""
+    """Return where pins stand on a side, as `_spots`, clear of its pry slots: at units' middles, else anywhere."""
     by = PRY_HALF_WIDTH + drawn.hole + drawn.spec.moulds.least_wall_mm
-    added = [slot.middle for slot in drawn.pry if slot.side == side and not slot.customary]
-    if added:
-        steps = (within[0] + STEP * i for i in range(math.ceil((within[1] - within[0]) / STEP)))
-        every = [*steps, *(at + sign * by for at in added for sign in (-1, 1))]
-        middles = [at for at in every if all(abs(at - slot) >= by - 1e-9 for slot in added)]
-    return _spots(middles, within, count)
+    slots = [slot.middle for slot in drawn.pry if slot.side == side]
+    steps = (within[0] + STEP * i for i in range(math.ceil((within[1] - within[0]) / STEP)))
+    for tried in (middles, (*steps, *(at + sign * by for at in slots for sign in (-1, 1)))):
+        found = _spots([at for at in tried if all(abs(at - slot) >= by - 1e-9 for slot in slots)], within, count)
+        if found:
+            return found
+    return []
 
 
 def _spots(middles: Sequence[float], within: tuple[float, float], count: int) -> list[float]:
