@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import re
 from itertools import pairwise
 from xml.etree import ElementTree
 
@@ -16,6 +17,7 @@ from unitcad.arrays.circuit.outline import outline
 from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
 from unitcad.arrays.crosstalk_matrix import BAND_HZ, MOST_LOADED, SHAPE, crosstalk, pairs
 from unitcad.arrays.crosstalk_table import crosstalk_csv
+from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.attenuation import UniformDisc
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.inputs import body
@@ -244,3 +246,21 @@ def test_a_heat_map_of_many_units_draws_each_cell_once() -> None:
 def test_a_wider_pitch_hears_less() -> None:
     sums = [crosstalk(grid(3, 3, pitch), band=())["worst"]["sum"]["value"] for pitch in (17.0, 20.0, 25.0, 30.0)]
     assert all(a > b for a, b in pairwise(sums))
+
+
+def test_eight_units_round_a_limb_get_alike_and_the_middle_of_a_grid_gets_the_most() -> None:
+    """Symmetry: what differs is what the centres are rounded to."""
+    assert "With all other units on, all get alike: 0.22" in " ".join(
+        crosstalk_lines(crosstalk(load_array("wrist-band")))
+    )
+    assert "B2 gets the most" in " ".join(crosstalk_lines(crosstalk(load_array("forearm-patch"))))
+
+
+@pytest.mark.parametrize("name", ["sleeve-curved", "wrist-band", "forearm-pockets"])
+def test_the_patch_maps_title_lies_within_the_picture(name: str) -> None:
+    array = load_array(name)
+    drawn = patch_map_svg(array, crosstalk(array))
+    (wide,) = re.findall(r'viewBox="0 0 ([0-9.]+) ', drawn)
+    titles = re.findall(r'<text x="8" y="[0-9.]+" font-size="12"[^>]*>([^<]*)<', drawn)
+    assert len(titles) == 2
+    assert all(8 + 0.6 * 12 * len(title) <= float(wide) for title in titles)

@@ -28,6 +28,7 @@ from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measured_charts import charts_of
 from unitcad.lab.measuring import measure
 from unitcad.mould_checks import check_moulds
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.bodies import patch_glb
 from unitcad.serve.server import serve
 from unitcad.validation import templates
@@ -53,7 +54,9 @@ def test_answers_are_those_of_the_commands(pockets: Server) -> None:
     assert list(drawn.values()) == [patch_map_svg(array, data), heat_map_svg(data)]
     tools = pockets.ask(TEXT, "moulds", edit)
     moulds = patch_moulds(array)
-    assert [check["code"] for check in tools["checks"]] == [finding.code for finding in check_moulds(moulds)]
+    # As a build does: of sheet and tray, then of the unit and its moulds.
+    found = [*check_moulds(moulds), *check_moulds(MouldSet(array.unit))]
+    assert [check["code"] for check in tools["checks"]] == [finding.code for finding in found]
     meshes = trimesh.load_scene(io.BytesIO(base64.b64decode(tools["model"]["moulds"])), file_type="glb").geometry
     assert set(meshes) == set(tools["model"]["moulds_apart"]) > {tool.name for tool in moulds.plan.tools}
 

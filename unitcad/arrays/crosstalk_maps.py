@@ -24,6 +24,8 @@ _INK = "#111111"
 _FONT = 'font-family="sans-serif"'
 _MOST_NUMBERS, _MOST_NAMES = 20, 40
 """Units up to which each cell has its number, and each row and column its name."""
+_LETTER = 0.6
+"""Width of a letter over its size, about the mean."""
 _PAGE = 640.0
 _SCALE_PX = 90.0
 
@@ -89,10 +91,11 @@ def patch_map_svg(
     values = data["sums"]["own_drive"][key] if data else None
     high = _largest(values or ())
     how = {"sum": "all in phase", "root_sum_of_squares": "root of the sum of squares"}[key]
-    head = array.name
+    head = [array.name]
     if data:
-        head += f": amplitude at each unit from all others, % of one unit's edge level ({how})"
-    parts = [_open(wide, tall), _text(8, 20, head, 12, "start")]
+        head = [f"{array.name}: amplitude at each unit from all others", f"in % of one unit's edge level ({how})"]
+    wide = max(wide, *(_LETTER * 12 * len(line) + 16 for line in head))
+    parts = [_open(wide, tall), *(_text(8, 20 + 15 * i, line, 12, "start") for i, line in enumerate(head))]
     parts.append(
         f'<g transform="translate({number(edge - drawn[0] * scale)} {number(top + drawn[3] * scale)}) '
         f'scale({number(scale)})" stroke-width="{0.8 / scale:.4f}">'

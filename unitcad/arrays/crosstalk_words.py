@@ -12,6 +12,8 @@ IN_BRACKETS = (
     "In brackets is the range: tissue moduli, damping, thicknesses and frequency taken to both ends of their ranges, "
     "and how far finite elements differ from the computed decay."
 )
+ALIKE = 1e-3
+"""Sums that differ by less, as a share, are called alike."""
 Crosstalk = Mapping[str, Any]
 """What `crosstalk_matrix.crosstalk` returns."""
 
@@ -25,7 +27,7 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
         f"Of a unit's motion at its edge {_percent(nearest['centre'])} reaches the middle of its nearest neighbour "
         f"({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
         f"{_percent(nearest['nearest_edge'])} that neighbour's edge.",
-        f"With all other units on, {worst['place']} gets the most: {_times(worst['root_sum_of_squares'])} times one "
+        f"With all other units on, {_most(data)}: {_times(worst['root_sum_of_squares'])} times one "
         f"unit's edge level by the root of the sum of squares, as motors that are not synchronous add up; "
         f"{_times(worst['sum'])} times if all are in phase.",
         _absolute(data["absolute"]),
@@ -40,6 +42,13 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
             f"the sum of squares) and x {number(changes[1], 3)} (in phase)."
         )
     return [*lines, IN_BRACKETS]
+
+
+def _most(data: Crosstalk) -> str:
+    """Name the place that gets the most; places that stand alike differ by what their centres are rounded to."""
+    values = data["sums"]["own_drive"]["root_sum_of_squares"]
+    alike = max(values) - min(values) <= ALIKE * max(values)
+    return "all get alike" if alike else f"{data['worst']['place']} gets the most"
 
 
 def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:

@@ -163,12 +163,24 @@ def _tools(array: Array, answer: Answer) -> None:
     moulds = patch_moulds(array)
     answer.model = tools_model(array)
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
+    for folder, unit in unit_folders(array).items():
+        found = _checked(to_json(unit), moulds.construction.own_tails)
+        answer.checks += [{**finding, "where": f"{folder}: {finding['where']}"} for finding in found]
     apart = unit_folders(array) if moulds.construction.own_tails else {}
     volumes = [sum(solid.volume() for solid in moulds.meshes(step.layer)) for step in moulds.plan.steps]
     of_units = {name: _cast(to_json(unit)) for name, unit in apart.items()}
     made = array_procedure(moulds, volumes, printed_mm3(moulds), of_units)
     tools = ", ".join(tool.name for tool in moulds.plan.tools)
     answer.lines = [*in_short(asdict(made)), f"Tools of the sheet: {tools}"]
+
+
+@lru_cache(maxsize=8)
+def _checked(unit: str, apart: bool) -> list[dict[str, Any]]:
+    """Return what the mould checks find on a unit, given as JSON: with its moulds where it is cast `apart`."""
+    from unitcad.mould_checks import check_moulds, check_unit
+    from unitcad.moulds.mould_set import MouldSet
+
+    return [dict(finding.as_dict()) for finding in (check_moulds if apart else check_unit)(MouldSet(from_json(unit)))]
 
 
 @lru_cache(maxsize=8)
