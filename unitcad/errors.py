@@ -78,8 +78,9 @@ def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusa
     """Return a refusal, of class `kind`, of a name that is not in `known`, with the closest names that are."""
     known = sorted(known)
     close = difflib.get_close_matches(value, known, n=3, cutoff=0.6)
-    more = f" and {len(known) - _MOST_NAMES} more" if len(known) > _MOST_NAMES else ""
-    names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known[:_MOST_NAMES])}{more}"
+    most = _shown_of(known, _MOST_NAMES)
+    more = f" and {len(known) - most} more" if len(known) > most else ""
+    names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known[:most])}{more}"
     return kind(field, value, f"not known; {names}", close[0] if close else None)
 
 
@@ -90,12 +91,24 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
     """
     table, _, key = field.rpartition(".")
     known = list(known)
-    close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
-    nearest = f"{table}.{close[0]}" if table and close else close[0] if close else None
+    close = difflib.get_close_matches(key, known, n=len(known) or 1, cutoff=0.6)
+    # Among equals the table's first: bed_x_mm before bed_z_mm.
+    best = max(
+        (name for name in known if name in close),
+        key=lambda name: difflib.SequenceMatcher(None, name, key).ratio(),
+        default=None,
+    )
+    nearest = f"{table}.{best}" if table and best else best
     alike = sorted(known, key=lambda name: -difflib.SequenceMatcher(None, key, name).ratio())
-    more = len(known) - _MOST_KEYS
+    most = _shown_of(known, _MOST_KEYS)
+    more = len(known) - most
     rest = f" and {more} more{f' ({lists} lists all)' if lists else ''}" if more > 0 else ""
-    return UnknownKey(field, value, f"unknown key; known here: {', '.join(alike[:_MOST_KEYS])}{rest}", nearest)
+    return UnknownKey(field, value, f"unknown key; known here: {', '.join(alike[:most])}{rest}", nearest)
+
+
+def _shown_of(names: list[str], most: int) -> int:
+    """Return how many names to show: the last one rather than its number."""
+    return most + 1 if len(names) == most + 1 else most
 
 
 def misfit(error: Exception) -> str:

@@ -108,6 +108,10 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
     way = construction_of(asked.array, asked.body.cast)
     if way.cast == "curved" and asked.body.radius_mm is None:
         raise Refusal("body.radius_mm", None, "a curved mould needs the radius of the limb that it goes round", 40.0)
+    cavities = asked.moulds.cavities
+    if not way.own_tails and cavities != (1, 1):
+        limit = "all units are cast in one pour, so their moulds have no cavities side by side: leave it out"
+        raise Refusal("moulds.cavities", cavities if isinstance(cavities, str) else list(cavities), limit, [1, 1])
     if asked.circuit is not None and way.own_tails:
         limit = "its units are held with their own circuits; [circuit] is one for all, laid into notches"
         raise Refusal("array", asked.array, limit, "back-sheet")

@@ -6,8 +6,10 @@ from typing import Any
 
 from unitcad.arrays.array_tables import AskedArray, PlaceTable
 from unitcad.arrays.layouts import LayoutKind, Point, layouts
-from unitcad.errors import Refusal, unknown_name
+from unitcad.errors import Refusal, UnknownKey, unknown_name
 from unitcad.spec import convert
+from unitcad.spec.fields import fields_of
+from unitcad.text import listed
 
 
 def layout_of(asked: AskedArray) -> tuple[Any, LayoutKind]:
@@ -18,6 +20,12 @@ def layout_of(asked: AskedArray) -> tuple[Any, LayoutKind]:
     if not isinstance(name, str) or name not in layouts():
         raise unknown_name("layout.kind", str(name), layouts())
     kind = layouts()[name]
+    own = set(fields_of(kind.table))
+    of_others = {key for each in layouts().values() for key in fields_of(each.table)} - own
+    if foreign := [key for key in asked.layout if key in of_others]:
+        keys = listed([f"layout.{key}" for key in foreign])
+        limit = f"unknown key; a layout of the kind {name!r} has no such keys: leave out {keys}"
+        raise UnknownKey(f"layout.{foreign[0]}", asked.layout[foreign[0]], limit)
     return convert(asked.layout, kind.table, "layout"), kind
 
 

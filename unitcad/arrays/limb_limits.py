@@ -78,5 +78,6 @@ def _too_small(array: Array, radius: float, apart: float, middle: float) -> str:
         # Seen along the axis between the two, each unit's foot is an ellipse.
         gap = distance - outer * math.hypot(math.cos(turn) * across, along) / distance
         if gap < apart - 2 / 1024:
-            return f"at the skin {one.name} and {other.name} stand {gap:.3g} mm apart and need {apart:.4g} mm"
+            there = f"{gap:.3g}" if gap < apart - 0.05 else f"{gap:.5g}"
+            return f"at the skin {one.name} and {other.name} stand {there} mm apart and need {apart:.4g} mm"
     return ""

@@ -18,6 +18,8 @@ from unitcad.spec import Spec
 BESIDE_SLOT = 2.0
 """From a strap slot to a round corner, at least, mm."""
 
+LEAST_THICKNESS = 0.5
+"""Of a sheet, mm."""
 HOLD_MM = 0.2
 """How much smaller than its unit's a pocket's radius is where nothing else is asked for, mm."""
 MOST_HOLD = 0.25
@@ -29,7 +31,7 @@ def middle_radius(asked: AskedArray, way: Construction, units: list[Spec]) -> fl
     """Return the radius of the sheet's middle round the limb, mm; None where the array is worn flat."""
     if asked.body.radius_mm is None:
         return None
-    level = way.level(_distinct(units), _thickness(asked, way), asked.body.radius_mm)
+    level = way.level(_distinct(units), _thickness(asked, way, _distinct(units)), asked.body.radius_mm)
     return asked.body.radius_mm + (mm(level.low) + mm(level.high)) / 2
 
 
@@ -37,13 +39,18 @@ def _distinct(units: list[Spec]) -> tuple[Spec, ...]:
     return tuple({id(unit): unit for unit in units}.values())
 
 
-def _thickness(asked: AskedArray, way: Construction) -> float:
-    return way.thickness_mm if asked.sheet.thickness_mm is None else asked.sheet.thickness_mm
+def _thickness(asked: AskedArray, way: Construction, units: tuple[Spec, ...]) -> float:
+    """Return the sheet's thickness; where none is asked for, the construction's, or as much as there is room for."""
+    if asked.sheet.thickness_mm is not None:
+        return asked.sheet.thickness_mm
+    most = down(way.level(units, way.thickness_mm, asked.body.radius_mm).most)
+    return min(way.thickness_mm, most) if most >= LEAST_THICKNESS else way.thickness_mm
 
 
 def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: list[Spec]) -> Sheet:
     """Return the sheet. Raises Refusal for a thickness, length, corner or slot that does not fit."""
-    table, distinct, thickness = asked.sheet, _distinct(units), _thickness(asked, way)
+    table, distinct = asked.sheet, _distinct(units)
+    thickness = _thickness(asked, way, distinct)
     known = catalogue.materials({name: entry for unit in distinct for name, entry in unit.materials.items()})
     material = table.material or distinct[0].layers[-1].material
     catalogue.choose("sheet.material", material, known)
@@ -51,7 +58,9 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
     level = way.level(distinct, thickness, asked.body.radius_mm)
     if thickness > level.most + 1e-9:
         limit = f"beside the units' tails and backs there is room for a sheet of {level.most:.4g} mm"
-        raise Refusal("sheet.thickness_mm", thickness, limit, down(level.most) if level.most >= 0.5 else None)
+        raise Refusal(
+            "sheet.thickness_mm", thickness, limit, down(level.most) if level.most >= LEAST_THICKNESS else None
+        )
     if way.own_tails:
         _check_hold(hold, distinct, float(known[material].elongation_pct))
     elif table.hold_mm is not None:
