@@ -217,7 +217,7 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     manifest = json.loads((folder / "manifest.json").read_text())
     assert lines[0].startswith("14 mm across")
     assert duration(procedure["earliest_finish_min"]) in lines[1]
-    assert lines[2] == "to mix: 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
+    assert lines[2] == "to mix: 2 g of ecoflex-00-10, 4 g of dragon-skin-30"
     assert f"{len(manifest['laws'])} of {len(manifest['laws'])} mould checks passed" in lines[3]
     assert lines[4] == manifest["estimate"]["answer"]
     assert lines[5] == f"open {folder / 'report.html'}"

@@ -31,10 +31,9 @@ from unitcad.geometry.segments import Point, nearer
 from unitcad.moulds import filament
 from unitcad.moulds.base import core, outline, plate_top, pry_slot
 from unitcad.moulds.blade import blade
-from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.dovetails import Split, seen, split, strips
 from unitcad.moulds.labels import corner_labels, engraved, set_label
-from unitcad.moulds.layout import MARK, TEXT_MARGIN
+from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, stub_pieces
 from unitcad.moulds.pins import pin_holes, standing_pins
 from unitcad.moulds.plan import Plan, Step

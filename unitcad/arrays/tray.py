@@ -16,10 +16,10 @@ from unitcad.arrays.seam_weep import sheet_mm2, too_much
 from unitcad.designs import Dimensions
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.moulds.blade import bar
-from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.cuts import seams
 from unitcad.moulds.dovetails import Seam, split
 from unitcad.moulds.labels import engraved, set_label
+from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.pieces import base_piece, blade_piece
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from unitcad.designs.limits import filament_groove
 from unitcad.moulds.base import plate_bottom, pry_floor
-from unitcad.moulds.cup import groove_depth_of, window_section
+from unitcad.moulds.cup import window_section
+from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.lid import skirt_end
 from unitcad.moulds.mould_set import MouldSet
 

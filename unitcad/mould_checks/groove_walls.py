@@ -17,7 +17,7 @@ from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
 from unitcad.mould_checks.hollows import GRID, SLIVER, hollows, least_wall
 from unitcad.moulds.congruence import Congruence, cropped, once_each, reaching
-from unitcad.moulds.cup import groove_depth_of
+from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.column import Column

@@ -9,12 +9,10 @@ from unitcad.designs.dimensions import Exit
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.moulds.base import outline, plate_bottom, plate_top, tapered
-from unitcad.moulds.layout import MARK
+from unitcad.moulds.layout import EPS, MARK, groove_depth_of
 from unitcad.moulds.ribs import SQUARE, rib_shapes, slot_shapes
 from unitcad.shape import Extrude, Shape, box, cut, cylinder, moved, ring, union
 from unitcad.spec import Spec, printer_of
-
-EPS = 1e-6
 
 
 def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
@@ -89,12 +87,6 @@ def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
             )
             channel = cut(channel, stops)
     return moved(channel, cell.x, cell.y)
-
-
-def groove_depth_of(spec: Spec, rim: float) -> float:
-    """Return the depth of an overflow groove: the printer's, or half a low rim's height, down to a whole layer."""
-    depth, layer = min(spec.moulds.groove_depth_mm, rim / 2), spec.moulds.layer_mm
-    return math.floor(depth / layer + EPS) * layer if depth >= layer else depth
 
 
 def windows(spec: Spec, dims: Dimensions, lay: Layout, rim: float) -> list[Shape]:

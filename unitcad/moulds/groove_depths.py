@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from unitcad.catalogue import printers
-from unitcad.moulds.cup import groove_depth_of
+from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.text import listed, number
 

@@ -21,6 +21,8 @@ KEY_SHARE = 2 - math.sqrt(2)
 MARK = 3.5
 """Leg of the cut corner outside, above the plinth's: which way round a piece goes is seen before it is tried."""
 TEXT_MARGIN, TEXT_GAP = 1.0, 0.3
+EPS = 1e-6
+_LABEL_GAP = 0.6
 MOST_CELLS = 255
 """Cells are numbered by two hexadecimal digits."""
 
@@ -87,11 +89,11 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
     splay = moulds.plinth_height_mm * math.tan(math.radians(PLINTH_DRAFT_DEG))
     foot = plinth[0] + splay, plinth[1] + splay
     skirt = moulds.plinth_clearance_mm + moulds.skirt_wall_mm
-    corner = _corner_for_label(reach + 0.6, text_width("00", stroke), label)
+    corner = _corner_for_label(reach + _off_groove(spec, dims), text_width("00", stroke), label)
     # The numbers of the last column and row lie outside its bores too, and behind the cut corner.
     beside = [pitch / 2 + size + MARK / 2 + 0.1 if digits else 0.0 for size in number]
     cup = max(foot[0] + skirt, half[0] + max(corner, beside[0])), max(foot[1] + skirt, half[1] + max(corner, beside[1]))
-    margin = label + 2 * 0.6
+    margin = label + 2 * _LABEL_GAP
     cells = tuple(
         Cell(
             (i - (columns - 1) / 2) * pitch,
@@ -109,6 +111,19 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
 def _sides(dims: Dimensions, column: int, columns: int) -> tuple[int, ...]:
     """Return where a cell's tails leave: of two columns with one tail each, the left one's leaves to the left."""
     return (-1,) if dims.sides == (1,) and columns == 2 and column == 0 else dims.sides
+
+
+def _off_groove(spec: Spec, dims: Dimensions) -> float:
+    """Return how far a corner's label stands off the groove, mm: letters as deep as a low rim's groove leave a wall."""
+    lengths = spec.moulds
+    deep = any(groove_depth_of(spec, rim) <= lengths.engraving_depth_mm + EPS for rim in dims.heights)
+    return max(_LABEL_GAP, lengths.least_wall_mm) if deep else _LABEL_GAP
+
+
+def groove_depth_of(spec: Spec, rim: float) -> float:
+    """Return the depth of an overflow groove: the printer's, or half a low rim's height, down to a whole layer."""
+    depth, layer = min(spec.moulds.groove_depth_mm, rim / 2), spec.moulds.layer_mm
+    return math.floor(depth / layer + EPS) * layer if depth >= layer else depth
 
 
 def _corner_for_label(radius: float, width: float, height: float) -> float:
