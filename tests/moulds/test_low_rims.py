@@ -10,6 +10,7 @@ from unitcad.validation import from_data
 def test_a_label_as_deep_as_the_groove_keeps_a_wall_to_it() -> None:
     """The rim is 1.03 mm high: groove and letters are 0.4 mm deep. Letters 0.63 mm off the groove broke C230."""
     data = {
+        "name": "low",
         "design": "embedded",
         "diameter_mm": 10.0,
         "motor": {"diameter_mm": 3.0, "thickness_mm": 1.033, "fill": True},
