@@ -297,7 +297,7 @@ def test_save_and_build_from_the_page(running: Any, tmp_path: Path) -> None:
         assert words[0] == "The build is under way: starting"
         assert len(words) > 2, words
         assert "The build is under way: plan" not in words
-        assert any("laying out the tools" in each or "checking the moulds" in each for each in words), words
+        assert any("drawing the" in each or "checking the moulds" in each for each in words), words
         assert f"In {tmp_path / 'out'}/" in visit.page.inner_text(".job")
         assert "The build is done." in visit.page.inner_text(".job")
         with visit.context.expect_page() as opened:
