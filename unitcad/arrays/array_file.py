@@ -1,7 +1,7 @@
 """Array files: a template, a file or plain data to an array with everything settled, or one refusal.
 
-A unit is a template, a spec file beside the array
-file, or a table of a spec's keys in which `like` names where the others come from.
+A unit is a template, a spec file beside the array file, or a table of a spec's keys in which `like` names where the
+others come from.
 """
 
 from __future__ import annotations
@@ -68,15 +68,17 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
     try:
         return array_of(whole, lay_tails=lay_tails)
     except Refusal as first:
-        refusal = offered(first, whole, confirm_makeable if lay_tails else partial(array_of, lay_tails=False))
+        refusal = offered(first, whole, makeable_array if lay_tails else partial(array_of, lay_tails=False))
         if path is not None:
             _locate(refusal, path, data, written, whole)
         raise refusal from None
 
 
-def confirm_makeable(data: Mapping[str, Any]) -> None:
-    """Raise Refusal for plain data of which no array, or no tools or circuit of it, can be made."""
-    made_plan(array_of(data))
+def makeable_array(data: Mapping[str, Any]) -> Array:
+    """Return the array of plain data as `array_of` does. Raises Refusal also where no tools or circuit can be made."""
+    array = array_of(data)
+    made_plan(array)
+    return array
 
 
 def _locate(

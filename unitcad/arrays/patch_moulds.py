@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from msgspec import structs
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import confirm_makeable
+from unitcad.arrays.array_file import makeable_array
 from unitcad.arrays.circuit.laid import laid_circuit
 from unitcad.arrays.construction import Construction, construction_of
 from unitcad.arrays.limb_frame import at_place
@@ -188,8 +188,8 @@ class PatchMoulds(MouldSet):
             return made_plan(self.arranged)
         except Refusal as refusal:
             asked, places = self.arranged.asked, len(self.arranged.places)
-            better = offered(refusal, asked, confirm_makeable)
-            raise with_other_ways(better, asked, places, confirm_makeable) from None
+            better = offered(refusal, asked, makeable_array)
+            raise with_other_ways(better, asked, places, makeable_array) from None
 
     @cached_property
     def dimensions(self) -> Dimensions:

@@ -23,7 +23,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from msgspec import Meta, Struct, field, structs
 
-from unitcad.arrays.array_file import confirm_makeable
+from unitcad.arrays.array_file import makeable_array
 from unitcad.arrays.array_names import array_templates, confirm_known, is_array
 from unitcad.arrays.array_units import expanded
 from unitcad.arrays.offers import offered
@@ -182,7 +182,7 @@ class Sweep:
     def faults(self, index: int, first: UnitcadError) -> str:
         """Return what is wrong with a refused variant in one line, `first` being what it was refused for."""
         if isinstance(first, Refusal) and self.of_arrays:
-            told = offered(first, self._data(index), confirm_makeable) if index < EXPLAINED else _unoffered(first)
+            told = offered(first, self._data(index), makeable_array) if index < EXPLAINED else _unoffered(first)
             return str(told)
         if index >= EXPLAINED or not isinstance(first, Refusal):
             return str(first)

@@ -15,7 +15,7 @@ from manifold3d import CrossSection, JoinType, Manifold, OpType
 from unitcad.kernels.mesh import shells
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
-from unitcad.mould_checks.hollows import GRID, SLIVER, hollows, least_wall
+from unitcad.mould_checks.hollows import GRID, SLIVER, hollows, wall_limit
 from unitcad.moulds.congruence import Congruence, cropped, once_each, reaching
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
@@ -49,7 +49,7 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
     regions = _without(sections, silicone, level)
     if level > under_letters:
         regions = _beside(regions, silicone, level, moulds.spec.moulds.land_mm)
-    limit = min(least_wall(moulds), bottom - GRID)
+    limit = wall_limit(moulds, step)
     thinnest = farthest = 2 * limit
     if regions:
         groove = CrossSection.batch_boolean(regions, OpType.Add)

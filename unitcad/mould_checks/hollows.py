@@ -5,7 +5,9 @@ from __future__ import annotations
 from manifold3d import Manifold
 
 from unitcad.kernels.mesh import shells
+from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
 from unitcad.shape.profile import GRID_PER_MM
 
 GRID = 3 / GRID_PER_MM
@@ -27,3 +29,9 @@ def least_wall(moulds: MouldSet) -> float:
     """Return the least wall between two hollows, mm: what the printer prints, or a narrower land that is asked for."""
     lengths = moulds.spec.moulds
     return min(lengths.least_wall_mm, lengths.land_mm) - GRID
+
+
+def wall_limit(moulds: MouldSet, step: Step) -> float:
+    """Return the least wall of a pour's cup, mm: under a low rim the overflow groove's floor may be thinner."""
+    least = least_wall(moulds)
+    return min(least, step.rim - groove_depth_of(moulds.spec, step.rim) - GRID) if step.groove else least

@@ -12,8 +12,7 @@ from manifold3d import Manifold
 
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
-from unitcad.mould_checks.hollows import GRID, hollows, least_wall
-from unitcad.moulds.layout import groove_depth_of
+from unitcad.mould_checks.hollows import GRID, hollows, wall_limit
 from unitcad.moulds.mould_set import MouldSet
 
 SHOWN = 2.0
@@ -22,11 +21,9 @@ SHOWN = 2.0
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure the thinnest wall between two hollows of every cup."""
-    least, letters = least_wall(moulds), moulds.spec.moulds.engraving_depth_mm + GRID
+    letters = moulds.spec.moulds.engraving_depth_mm + GRID
     for step in moulds.plan.steps:
-        # Under a low rim the groove's floor may be thinner, as C230 has it.
-        floor = step.rim - groove_depth_of(moulds.spec, step.rim) - GRID
-        limit = min(least, floor) if step.groove else least
+        limit = wall_limit(moulds, step)
         farthest = SHOWN * limit
         pieces = hollows(moulds, moulds.plan.walled(step))
         deep = [piece for piece in pieces if (box := piece.bounding_box())[5] - box[2] > letters]

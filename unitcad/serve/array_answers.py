@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 from msgspec.structs import replace
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import array_of, to_toml
+from unitcad.arrays.array_file import array_of, makeable_array, to_toml
 from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.array_tables import AskedArray, BodyTable, CircuitTable, SheetTable
 from unitcad.arrays.array_units import expanded
 from unitcad.arrays.layouts import layouts
-from unitcad.arrays.made_plan import made_plan
 from unitcad.catalogue import materials
 from unitcad.errors import Refusal
 from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
@@ -42,9 +41,7 @@ def judge(data: dict[str, Any]) -> Mapping[str, Any]:
 
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
     """Return what `judge` does. Raises UnitcadError also for an array whose tools or circuit can't be made."""
-    array = array_of(data)
-    made_plan(array)
-    return array.asked
+    return makeable_array(data).asked
 
 
 def asked_toml(text: str, data: Mapping[str, Any], array: Array, trusted: Trusted) -> str:
