@@ -20,7 +20,7 @@ from unitcad import estimating
 from unitcad.errors import UnitcadError
 from unitcad.pipeline import Variant, artifacts
 from unitcad.pipeline.build import build
-from unitcad.pipeline.folder import folder_name, replacing
+from unitcad.pipeline.folder import folder_name, placing, replacing
 from unitcad.validation import load, templates
 
 NAMES = sorted(templates())
@@ -170,6 +170,44 @@ def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tm
     assert not folder.exists()
     assert _tree(build(spec, tmp_path, only=["unit"]).folder) == before
     assert [p.name for p in tmp_path.iterdir()] == [folder.name]
+
+
+def _result(folder: Path, **files: str) -> None:
+    folder.mkdir()
+    for name, text in files.items():
+        (folder / name).write_text(text)
+
+
+def test_a_result_that_another_process_puts_there_meanwhile_is_replaced_and_its_other_files_stay(
+    tmp_path: Path,
+) -> None:
+    folder, scratch = tmp_path / "unit", tmp_path / "scratch"
+    scratch.mkdir()
+    with placing(folder, scratch) as fresh:
+        (fresh / "spec.toml").write_text("new")
+        _result(folder, **{"spec.toml": "other", "notes.txt": "kept"})
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {"spec.toml": "new", "notes.txt": "kept"}
+    assert not list(scratch.iterdir())
+
+
+def test_a_result_that_appears_between_the_two_renames_is_not_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, rename = tmp_path / "unit", Path.rename
+    _result(folder, **{"spec.toml": "old", "notes.txt": "kept"})
+
+    def renamed(path: Path, target: Path) -> Path:
+        moved = rename(path, target)
+        if path == folder and not (tmp_path / "once").exists():
+            (tmp_path / "once").touch()
+            _result(folder, **{"spec.toml": "other", "more.txt": "kept too"})
+        return moved
+
+    monkeypatch.setattr(Path, "rename", renamed)
+    with replacing(folder) as fresh:
+        (fresh / "spec.toml").write_text("new")
+    texts = {path.name: path.read_text() for path in folder.iterdir()}
+    assert texts == {"spec.toml": "new", "notes.txt": "kept", "more.txt": "kept too"}
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import cache
 from pathlib import Path
 
@@ -68,16 +69,23 @@ def read_record(store: SharedStore, place: RecordPlace) -> tuple[Product, str]:
     return Product(manifest, record.own, record.shared), record.code
 
 
-def export(store: SharedStore, place: RecordPlace, folder: Path, cache: DiskStore) -> None:
+def export(
+    store: SharedStore,
+    place: RecordPlace,
+    folder: Path,
+    cache: DiskStore,
+    placing: Callable[[Path], AbstractContextManager[Path]] = replacing,
+) -> None:
     """Make a variant's folder from its record; files that it shares are links to `cache`, which keeps what comes in.
 
+    `placing` yields the fresh folder that takes the place of `folder`.
     Raises MissingContent for what the store lacks, UnitcadError for a folder that is none, OSError.
     """
     product, code = read_record(store, place)
     for sha256 in set(product.shared.values()):
         if not cache.has(sha256):
             cache.keep(store.content(sha256))
-    with replacing(folder) as fresh:
+    with placing(folder) as fresh:
         product.place(fresh, cache)
         files.write_new(fresh / "timings.json", json_bytes({"code": code, "seconds": {}}))
     sync([folder])

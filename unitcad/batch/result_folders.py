@@ -6,6 +6,7 @@ import contextlib
 import json
 import re
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 from msgspec import MsgspecError
@@ -20,7 +21,7 @@ from unitcad.batch.record_packs import export, read_record
 from unitcad.batch.remote import Receiver
 from unitcad.cache import DiskStore, MissingContent, SharedStore
 from unitcad.errors import UnitcadError, WrongArgument
-from unitcad.pipeline.folder import ADDRESS, STORE, whole
+from unitcad.pipeline.folder import ADDRESS, STORE, placing, whole
 
 FOLDERS_BELOW = 1000
 """Variants below which each has a folder, unless asked otherwise."""
@@ -56,18 +57,19 @@ def make_folders(out: Path, entries: Iterable[JournalEntry], store: SharedStore,
     Raises UnitcadError for what the store has lost, OSError.
     """
     done: set[str] = set()
-    for entry in entries:
-        if entry.record is None or not made(entry) or entry.folder in done:
-            continue
-        done.add(entry.folder)
-        if whole(out / entry.folder) is not None:
-            continue
-        try:
-            export(store, entry.record, out / entry.folder, cache)
-        except MissingContent as error:
-            raise UnitcadError(
-                f"variant {entry.index}: {error}; the same batch with --verify makes again what is missing"
-            ) from None
+    with files.scratch(out) as scratch:
+        for entry in entries:
+            if entry.record is None or not made(entry) or entry.folder in done:
+                continue
+            done.add(entry.folder)
+            if whole(out / entry.folder) is not None:
+                continue
+            try:
+                export(store, entry.record, out / entry.folder, cache, partial(placing, scratch=scratch))
+            except MissingContent as error:
+                raise UnitcadError(
+                    f"variant {entry.index}: {error}; the same batch with --verify makes again what is missing"
+                ) from None
 
 
 def export_variant(batch: Path, wanted: str, out: Path, cache: DiskStore, address: str | None = None) -> Path:

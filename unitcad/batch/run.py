@@ -36,8 +36,8 @@ from unitcad.pipeline.versions import code_version, kernel_versions
 
 WINDOW = 2048
 """Variants held in memory: enough to group those that share a geometry."""
-FIRST, NEXT = 4, 16
-"""Variants in the task that makes a geometry, and in those after it."""
+FIRST, NEXT = 4, 48
+"""Variants in the task that makes a geometry, and in those after it: variants of one task share estimates."""
 COLLECT_EVERY = 500
 """Geometries made between two checks of the cache's size."""
 
@@ -84,6 +84,8 @@ def run(
         if options.shard:
             write_shard(out, shard_record(sweep, head, options, count))
         batch.all()
+        if batch.lost:
+            clear_leftovers(out)
         if isinstance(destination, InStore) and folders_wanted(options, summary.variants):
             make_folders(out, journal.entries(), destination.store, cache)
         estimated = "estimate" in head.outputs and not options.shard  # of a shard nothing can be said
@@ -163,6 +165,7 @@ class _Batch:
         self.made: set[int] = set()
         self.seen: dict[int, int] = {}
         self.running: dict[Future[tasks.Answer], Task] = {}
+        self.lost = False  # whether a worker ended in the middle of its task
 
     def all(self) -> None:
         while not self.summary.stopped:
@@ -269,6 +272,7 @@ class _Batch:
         """Handle a task whose worker ended: each of its variants is tried alone, to see which one ended it."""
         if isinstance(error, CancelledError):
             raise UnitcadError(f"lost the scheduler after {self.summary.done} variants; the same command resumes")
+        self.lost = True
         job, *others = task.jobs
         if others:
             self.again.extend((task.geometry, job) for job in task.jobs)

@@ -105,10 +105,7 @@ def work(task: Task) -> Answer:
         return zlib.compress(pickle.dumps(_into_store(task, record_packs.store_at(task.store))))
     if task.out is None:
         return _each(task.jobs, task, lambda job, known: _remotely(job, task, known))
-    done = _each(task.jobs, task, lambda job, known: _locally(job, task))
-    # Before the journal notes them: what is noted is on the disk.
-    folders.sync(task.out / outcome.folder for outcome in done if outcome.folder)
-    return done
+    return _into_folders(task, task.out)
 
 
 def outcomes(answer: Answer) -> list[VariantOutcome]:
@@ -185,18 +182,29 @@ def failure(index: int, error: BaseException) -> VariantOutcome:
     return VariantOutcome(index, FAILED, reason=" ".join(text.split()))
 
 
-def _locally(job: Job, task: Task) -> VariantOutcome:
-    """Make a variant into its folder, with the cache on this disk."""
-    assert task.out is not None
+def _into_folders(task: Task, out: Path) -> list[VariantOutcome]:
+    """Make a task's variants into their folders, with the cache on this disk; when they return, all is on the disk."""
+    try:
+        with files.scratch(out) as scratch:
+            done = _each(task.jobs, task, lambda job, known: _locally(job, task, out, scratch))
+    except OSError as error:
+        return [failure(job.index, error) for job in task.jobs]
+    folders.sync(out / outcome.folder for outcome in done if outcome.folder)
+    return done
+
+
+def _locally(job: Job, task: Task, out: Path, scratch: Path) -> VariantOutcome:
+    """Make a variant into its folder in `out`."""
     assert task.cache is not None
     spec = of_text(job.spec)
-    folder = task.out / subject_of(spec).folder_name
+    folder = out / subject_of(spec).folder_name
     manifest = _finished(folder, spec, task, job.damaged)
     if manifest is not None:
         return _outcome(job, spec, folder.name, manifest, _manifest_sha256(folder), Counter({"file reused": 1}))
     store = _store(task.cache)
     before = Counter(store.counts)
-    built = build_into(folder, partial(product_of, spec, task.only, task.check), store, Stages())
+    maker = partial(product_of, spec, task.only, task.check)
+    built = build_into(folder, maker, store, Stages(), placing=partial(folders.placing, scratch=scratch))
     return _outcome(job, spec, folder.name, built.manifest, _manifest_sha256(folder), store.counts - before)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -120,10 +121,12 @@ def build_into(
     store: Store,
     wanted: Stages,
     unchanged: Callable[[], bool] = lambda: True,
+    placing: Callable[[Path], AbstractContextManager[Path]] = folders.replacing,
 ) -> Built:
     """Put what `maker` makes into a folder, in place of what it holds; files that the new result lacks stay.
 
-    `wanted` shows the stages and takes the files. Raises _Changed where the folder is not `unchanged` any more.
+    `wanted` shows the stages and takes the files; `placing` yields the fresh folder that takes its place. Raises
+    _Changed where the folder is not `unchanged` any more.
     """
     for left in reversed(range(TRIES)):
         stages, before = replace(wanted, seconds={}), Counter(store.counts)
@@ -134,7 +137,7 @@ def build_into(
                 "seconds": {stage: round(seconds, 4) for stage, seconds in stages.seconds.items()},
                 "store": dict(sorted((store.counts - before).items())),
             }
-            with folders.replacing(folder) as fresh:
+            with placing(folder) as fresh:
                 if not unchanged():
                     raise _Changed
                 product.place(fresh, store)

@@ -185,13 +185,49 @@ def replacing(folder: Path) -> Iterator[Path]:
         fresh.mkdir()
         try:
             yield fresh
-            if folder.exists():
+            while not _in_place(fresh, folder):
                 _keep_others(folder, fresh)
+                shutil.rmtree(aside, ignore_errors=True)
                 folder.rename(aside)
-            fresh.rename(folder)
         except BaseException:
             _restore(aside, folder)
             raise
+
+
+@contextlib.contextmanager
+def placing(folder: Path, scratch: Path) -> Iterator[Path]:
+    """Yield a fresh folder that takes `folder`'s place, as `replacing`; where it can, in the caller's `scratch`.
+
+    One scratch folder then serves many results: ext4 looks at every inode that was removed lately before it gives out a
+    new one, so removing three files for each result makes the files of all others slow.
+    """
+    if folder.exists():
+        with replacing(folder) as fresh:
+            yield fresh
+        return
+    fresh = scratch / folder.name
+    fresh.mkdir()
+    try:
+        yield fresh
+        if not _in_place(fresh, folder):
+            with replacing(folder) as there:
+                for path in fresh.iterdir():
+                    path.rename(there / path.name)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def _in_place(fresh: Path, folder: Path) -> bool:
+    """Rename `fresh` to `folder`, or return False where a result is there. Raises OSError."""
+    if folder.exists():
+        return False
+    try:
+        fresh.rename(folder)
+    except OSError:
+        if folder.exists():  # another process has put it there meanwhile
+            return False
+        raise
+    return True
 
 
 def clear_leftovers(out: Path) -> None:
