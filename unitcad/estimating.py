@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
+
+from msgspec.structs import replace
 
 from unitcad.attenuation.edge.closed_form import CONTROL_PASSES
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded, rounded_layered

@@ -74,7 +74,11 @@ def number(value: SupportsFloat, digits: int = 6, zeros: bool = False) -> str:
     `zeros` keeps those at its end, as an instrument shows them: 1.00. What is below a millionth is 0; from 1e15 on a
     power of ten has to say it.
     """
-    size = float(value)
+    return _number(float(value), digits, zeros)
+
+
+@lru_cache(maxsize=4096)  # variants of a batch say most numbers again
+def _number(size: float, digits: int, zeros: bool) -> str:
     if not 1e-6 <= abs(size) < 1e15:
         return "0" if abs(size) < 1e-6 else f"{size:.{digits}g}"
     rounded = float(f"{size:.{digits}g}")

@@ -1,10 +1,10 @@
 """Harmonic finite elements against the layered solver, against rigid bodies, energy and reciprocity, and each other."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 pytest.importorskip("skfem")
 

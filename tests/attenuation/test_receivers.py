@@ -1,10 +1,10 @@
 """Units side by side: reciprocity, power, closed forms, an independent solve, and figures that were once measured."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from unitcad.attenuation import HalfSpace, LayeredMedium, Point, UniformDisc

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
 import numpy as np
 
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
@@ -13,8 +13,7 @@ from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
 Drive = Literal["flat", "axial"]
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(msgspec.Struct, frozen=True):
     """A number and the range that it may lie in. No value but a range: nobody measured it, `note` says where from.
 
     Neither value nor range: not known, `note` is the reason.
@@ -45,8 +44,7 @@ class Quantity:
         )
 
 
-@dataclass(frozen=True)
-class SiliconeLayer:
+class SiliconeLayer(msgspec.Struct, frozen=True):
     """A layer of the unit: wall thickness (m), density (kg/m3), Young's modulus (Pa), Poisson's ratio, tan delta."""
 
     material: str
@@ -57,8 +55,7 @@ class SiliconeLayer:
     tan_delta: Quantity
 
 
-@dataclass(frozen=True)
-class LayerShape:
+class LayerShape(msgspec.Struct, frozen=True):
     """Where a layer of the unit ends, m: its outer radius, the height of its top and its cap (0: an open ring)."""
 
     outer_radius: float
@@ -66,8 +63,7 @@ class LayerShape:
     cap: float = 0.0
 
 
-@dataclass(frozen=True)
-class Pad:
+class Pad(msgspec.Struct, frozen=True):
     """The circuit's round pad, m: its radius, and its faces at the heights `low` and `high`."""
 
     radius: float
@@ -75,8 +71,7 @@ class Pad:
     high: float
 
 
-@dataclass(frozen=True)
-class Geometry:
+class Geometry(msgspec.Struct, frozen=True):
     """A unit's lengths in m, of the section through its axis; z = 0 is the skin, heights count away from it.
 
     cavity_radius   where Layer 1 begins; equal to the motor's radius if Layer 1 reaches the motor
@@ -102,8 +97,7 @@ class Geometry:
         return self.cavity_radius - self.motor_radius
 
 
-@dataclass(frozen=True)
-class TissueLayer:
+class TissueLayer(msgspec.Struct, frozen=True):
     """A layer of the body: thickness (m, None for the half-space), density (kg/m3), shear modulus (Pa), damping.
 
     damping is tan delta if `damping_law` is "loss_factor", a viscosity in Pa s if it is "kelvin_voigt".
@@ -118,8 +112,7 @@ class TissueLayer:
     damping: Quantity
 
 
-@dataclass(frozen=True)
-class EstimateInput:
+class EstimateInput(msgspec.Struct, frozen=True):
     """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known).
 
     `passes`: how often the wave from motor to skin passes the border between the layers; `drive`: how the motor's force

@@ -6,6 +6,7 @@ A message is the pickle of bytes, and these of a task or an answer: one that can
 from __future__ import annotations
 
 import faulthandler
+import gc
 import importlib
 import os
 import pickle
@@ -25,6 +26,8 @@ def serve(preload: tuple[str, ...]) -> None:
     tasks, answers = message_pipes()
     for name in preload:
         importlib.import_module(name)
+    gc.collect()
+    gc.freeze()  # modules last as long as the process: no later collection looks at them
     coming: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(tasks, coming), daemon=True).start()
     while True:

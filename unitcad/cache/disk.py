@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import platformdirs
 from filelock import FileLock
 
@@ -182,7 +183,7 @@ class DiskStore:
         except UnitcadError:
             checksum = payload = b""
         if _checksum(kind, key, payload) == checksum:
-            data = json.loads(payload)
+            data = msgspec.json.decode(payload)
             return data if intact(data) else None
         remove(path)
         self.counts["damaged"] += 1

@@ -7,7 +7,6 @@ store, so that a second run, or one that was interrupted, solves nothing twice.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cache, partial
 from importlib.resources import files
 from importlib.util import find_spec
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec.structs import replace
 
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.cache import Store, digest

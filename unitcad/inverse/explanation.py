@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.edge.estimates import rounded

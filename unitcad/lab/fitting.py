@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
+from msgspec.structs import replace
 
 from unitcad.attenuation.edge.fitted_models import KAPPA, MODELS
 from unitcad.attenuation.edge.lab_fit import LabFit, ModelFit, unit_key

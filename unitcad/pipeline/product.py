@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -187,4 +187,9 @@ def _left_out(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
             # The page offers the command for what was not asked for (report/app/estimate.js).
             yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
     if "step" not in spec.output.formats:
-        yield "boundary representation", "no STEP asked for" if find_spec("OCP") else NO_KERNEL
+        yield "boundary representation", "no STEP asked for" if _has_step_kernel() else NO_KERNEL
+
+
+@cache
+def _has_step_kernel() -> bool:
+    return find_spec("OCP") is not None

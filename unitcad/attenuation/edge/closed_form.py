@@ -7,6 +7,7 @@ through the walls of the layers, inside out, at the skin, and ends at the outer 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
@@ -14,7 +15,7 @@ import numpy as np
 
 Wave = Literal["p", "s"]
 Reading = Literal["loss_modulus", "kelvin_voigt", "literal"]
-READINGS: dict[str, str] = {
+READINGS: dict[Reading, str] = {
     "loss_modulus": "eta is a loss modulus E tan(delta) in Pa, which makes the exponent a number: the rate is twice "
     "the amplitude's true decay",
     "kelvin_voigt": "eta is a viscosity E tan(delta)/omega in Pa s and a factor omega/2 is missing: "
@@ -136,9 +137,14 @@ def paper_path(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus"
 
     f1, f2 and the skin's part cancel.
     """
+    return paper_paths(units, wave, (reading,))[reading]
+
+
+def paper_paths(units: Units, wave: Wave = "s", readings: Iterable[Reading] = tuple(READINGS)) -> dict[Reading, Any]:
+    """Return `paper_path` by several readings, which share the transmissions."""
     with _quiet():
-        decay = np.exp(-np.sum(paper_exponents(units, wave, reading), axis=-1))
-        return np.prod(paper_transmissions(units, wave), axis=-1) * decay
+        passed = np.prod(paper_transmissions(units, wave), axis=-1)
+        return {one: passed * np.exp(-np.sum(paper_exponents(units, wave, one), axis=-1)) for one in readings}
 
 
 def consistent_path(units: Units, wave: Wave = "s") -> Any:

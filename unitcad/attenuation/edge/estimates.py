@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import lru_cache
 from typing import Any
+
+from msgspec.structs import replace
 
 from unitcad.attenuation.curve import decay_at, layered_block
 from unitcad.attenuation.edge.answer import answer
@@ -256,10 +258,12 @@ def _quantity(quantity: Quantity, factor: float) -> dict[str, Any]:
 
 def rounded(data: Any) -> Any:
     """Return `data` with its floats to nine significant digits, so that the last bits of a platform do not show."""
+    if isinstance(data, str):  # the most frequent
+        return data
     if isinstance(data, float):
         return float(f"{data:.{SIGNIFICANT_DIGITS}g}")
     if isinstance(data, dict):
         return {key: rounded(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
+    if isinstance(data, (list, tuple)):  # a union would be made anew at each call
         return [rounded(value) for value in data]
     return data

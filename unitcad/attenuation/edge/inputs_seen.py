@@ -7,11 +7,11 @@ the diameter; a higher motor lifts caps and circuit.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from unitcad.attenuation.inputs import EstimateInput, Geometry, Pad, Quantity
 

@@ -213,6 +213,8 @@ def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any
     if unknown(variant):
         return {"wave_of_the_level": "s", "reading_of_eta": "loss_modulus", "constraints": None, "readings": None}
     units = corners(variant) if ranged(variant) else nominal(variant)
+    paths = _paths(units)
+    own = {i: _paths(units.control(i)) for i in controls}
     coefficients = {}
     for wave in _WAVES:
         z = cf.with_air(cf.impedances(units, wave), wave)
@@ -226,7 +228,7 @@ def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any
         "poisson_ratio_used": [layer.poisson_ratio.middle for layer in variant.layers],
         "interfaces": [f"Layer {i + 1} to {i + 2}" for i in range(len(variant.layers) - 1)] + ["last layer to air"],
         "coefficients": coefficients,
-        "readings": [_reading(variant, units, reading, controls) for reading in cf.READINGS],
+        "readings": [_reading(variant, units, reading, paths, own) for reading in cf.READINGS],
         "constraints": _constraints(variant, units, controls),
     }
 
@@ -241,12 +243,22 @@ def _constraints(variant: EstimateInput, units: Units, controls: list[int]) -> l
     ]
 
 
-def _reading(variant: EstimateInput, units: Units, reading: str, controls: list[int]) -> dict[str, Any]:
-    def ratio(index: int, wave: cf.Wave) -> dict[str, Any]:
-        control = cf.paper_path(units.control(index), wave, reading)  # type: ignore[arg-type]
-        return _by_corner(wave, cf.paper_path(units, wave, reading) / control, variant)  # type: ignore[arg-type]
+_Paths = dict[cf.Wave, dict[cf.Reading, Any]]
 
-    exponents = cf.paper_exponents(units, "s", reading)  # type: ignore[arg-type]
+
+def _paths(units: Units) -> _Paths:
+    return {wave: cf.paper_paths(units, wave) for wave in _WAVES}
+
+
+def _reading(
+    variant: EstimateInput, units: Units, reading: cf.Reading, paths: _Paths, controls: dict[int, _Paths]
+) -> dict[str, Any]:
+    """Return what one reading of eta gives, from the paths of the unit and of its controls."""
+
+    def ratio(index: int, wave: cf.Wave) -> dict[str, Any]:
+        return _by_corner(wave, paths[wave][reading] / controls[index][wave][reading], variant)
+
+    exponents = cf.paper_exponents(units, "s", reading)
     return {
         "eta": reading,
         "meaning": cf.READINGS[reading],
@@ -310,7 +322,8 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
     if not rows:
         return extra and {"level": None, **extra}
     index = rows[0]
-    differs, shared = _differs_in(variant, table.inputs[index].section), measurements().unit
+    lengths = _other_lengths(sections([variant.geometry]), table.inputs[index].section)
+    differs, shared = [*_differs_from_all(variant), *lengths], measurements().unit
     return {
         "level": float(table.levels[index]),
         **(extra or {}),
@@ -342,9 +355,9 @@ def unlike_measured(variant: EstimateInput) -> list[str]:
         "design": bool(alike) and not own,
         "silicones": any(layer.material not in measured for layer in variant.layers),
     }
-    by_unit = [_differs_in(variant, table.inputs[i].section) for i in own or alike]
-    lengths = min(by_unit, key=len) if by_unit else _differs_from_all(variant)
-    return [*(name for name, other in kinds.items() if other), *lengths]
+    shape = sections([variant.geometry])
+    lengths = min((_other_lengths(shape, table.inputs[i].section) for i in own or alike), key=len, default=[])
+    return [*(name for name, other in kinds.items() if other), *_differs_from_all(variant), *lengths]
 
 
 def _differs_from_all(variant: EstimateInput) -> list[str]:
@@ -362,9 +375,8 @@ def _differs_from_all(variant: EstimateInput) -> list[str]:
     return [name for name, other in of_all.items() if other]
 
 
-def _differs_in(variant: EstimateInput, shapes: cf.Section | None) -> list[str]:
-    """Return what of a unit is not as in the measured ones, against the nearest of their possible shapes."""
-    own, of_all = sections([variant.geometry]), _differs_from_all(variant)
+def _other_lengths(own: cf.Section, shapes: cf.Section | None) -> list[str]:
+    """Return which lengths of a unit are not as in a measured one, against the nearest of its possible shapes."""
     by_shape = []
     assert shapes is not None  # every unit of the catalogue's table has a section
     for i in range(len(np.atleast_1d(shapes.cavity_radius))):
@@ -372,11 +384,11 @@ def _differs_in(variant: EstimateInput, shapes: cf.Section | None) -> list[str]:
             np.diff(np.append(one.cavity_radius[k], one.outer_radii[k])) for one, k in ((own, 0), (shapes, i))
         )
         of_shape = {
-            "walls": not np.allclose(radii, measured, rtol=0.0, atol=_SAME),
-            "caps": not np.allclose(own.caps[0], shapes.caps[i], rtol=0.0, atol=_SAME),
+            "walls": np.any(np.abs(np.subtract(radii, measured)) > _SAME),
+            "caps": np.any(np.abs(own.caps[0] - shapes.caps[i]) > _SAME),
             "height of the cavity": abs(own.core_height[0] - shapes.core_height[i]) > _SAME,
         }
-        by_shape.append([*of_all, *(name for name, other in of_shape.items() if other)])
+        by_shape.append([name for name, other in of_shape.items() if other])
     return min(by_shape, key=len)
 
 

@@ -8,6 +8,7 @@ unit predicted by constants fitted without it (Yao, Vehtari, Simpson and Gelman,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -60,15 +61,21 @@ class Predictive:
         t = (np.log(np.asarray(level, dtype=float))[..., None] - self.centre) / self.scale
         return stdtr(self.degrees_of_freedom, t)
 
-    def quantile(self, share: float) -> np.ndarray:
-        """Return the level that a share of the distribution lies below, shape (...), to 1e-9 of it."""
+    def quantile(self, share: float | Sequence[float]) -> np.ndarray:
+        """Return the level that a share of the distribution lies below, shape (...), to 1e-9 of it.
+
+        Of n shares, shape (n, ...).
+        """
         from scipy.special import stdtrit
 
-        each = self.centre + self.scale * stdtrit(self.degrees_of_freedom, share)
+        shares = np.asarray(share, dtype=float)
+        shares = shares.reshape(shares.shape + (1,) * (self.centre.ndim - 1))
+        each = self.centre + self.scale * stdtrit(self.degrees_of_freedom, shares[..., None])
         low, high = each.min(axis=-1), each.max(axis=-1)
-        while np.nanmax(high - low, initial=0.0) > 1e-9:
+        widest = float(np.nanmax(high - low, initial=0.0))
+        for _ in range(math.ceil(math.log2(max(widest / 1e-9, 1.0)))):
             middle = (low + high) / 2.0
-            below = self.at_most(np.exp(middle)) < share
+            below = self.at_most(np.exp(middle)) < shares
             low, high = np.where(below, middle, low), np.where(below, high, middle)
         return np.exp((low + high) / 2.0)
 
@@ -76,7 +83,7 @@ class Predictive:
     def range(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The level's 10 %, 50 % and 90 % points, each of shape (...)."""
         low, high = (percent / 100 for percent in PERCENT)
-        return self.quantile(low), self.quantile(0.5), self.quantile(high)
+        return tuple(self.quantile((low, 0.5, high)))
 
 
 @dataclass(frozen=True)

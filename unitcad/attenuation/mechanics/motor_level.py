@@ -10,11 +10,12 @@ and at theta = 90 degrees (u_theta).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
+from msgspec.structs import replace
 
 from unitcad.attenuation.inputs import EstimateInput, Quantity, body
 from unitcad.attenuation.layered.medium import LayeredMedium

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+from msgspec.structs import replace
 
 from unitcad.attenuation.even_draws import position, positions
 from unitcad.attenuation.inputs import EstimateInput, Geometry, Quantity
