@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from msgspec import structs
 from typer.testing import CliRunner
 
 from unitcad.accuracy.result import Plot, Result, markdown
@@ -206,8 +207,7 @@ def test_many_ranges_are_taken_one_at_a_time():
         text += [f"materials.{name}.like=ecoflex-00-10"]
     spec = load("encapsulating", [])
     variant = estimate_input(spec)
-    layers = tuple(type(variant.layers[0])(**{**vars(variant.layers[0]), "material": name}) for name in names)
-    many = type(variant)(**{**vars(variant), "layers": layers})
+    many = structs.replace(variant, layers=tuple(structs.replace(variant.layers[0], material=name) for name in names))
     assert corners(many).omega.size == 1 + 2 * (7 * 2 + 1)
 
 

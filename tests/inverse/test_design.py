@@ -114,7 +114,7 @@ def test_mass_is_that_of_the_drawn_bodies(found: Candidates) -> None:
 
 
 def test_crosstalk_is_that_of_the_layered_curve(found: Candidates) -> None:
-    variant = replace(found.geometries[0].variant)
+    variant = found.geometries[0].variant
     block = layered_block(variant)["drives"][variant.drive]["u"]
     ratio = crosstalk_ratio(variant, variant.diameter / 2 + 13e-3)
     for end in ("value", "low", "high"):
