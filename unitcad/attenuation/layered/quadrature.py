@@ -143,14 +143,12 @@ def _span(seen: Seen) -> float:
     return float(seen.r.max()) + seen.load.reach
 
 
-def _summed(
-    seen: Seen, panels: w.Array, kernel: w.Array, rule: Rule, pieces: np.ndarray
-) -> tuple[w.Array, np.ndarray, np.ndarray, np.ndarray]:
+def _summed(seen: Seen, panels: w.Array, kernel: w.Array, rule: Rule, pieces: np.ndarray) -> tuple[w.Array, ...]:
     """Return of each panel, all on the axis or all off it, the sums of what `_integrated` returns of its `pieces`."""
     ends = np.cumsum(pieces)
     cut, values = (panels, kernel) if ends[-1] == len(panels) else _cut(panels, kernel, rule, pieces)
     step = max(1, _CHUNK // (rule.count * seen.r.size * len(kernel)))
-    first, sums = 0, []
+    first, sums = 0, list[tuple[w.Array, ...]]()
     while first < len(panels):
         low = ends[first] - pieces[first]
         last = max(int(np.searchsorted(ends, low + step, side="right")), first + 1)
@@ -172,8 +170,8 @@ def _cut(panels: w.Array, kernel: w.Array, rule: Rule, pieces: np.ndarray) -> tu
         share = (place + side) / count
         cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
     for number in np.unique(pieces[pieces > 1]):
-        re, im = np.moveaxis(_pair(kernel[:, pieces == number]) @ rule.spread(int(number)), -2, 0)
-        values[:, count == number] = (re + 1j * im).reshape(len(kernel), -1, rule.count)
+        read_off = kernel[:, pieces == number] @ rule.spread(int(number))
+        values[:, count == number] = read_off.reshape(len(kernel), -1, rule.count)
     return cut, values
 
 
