@@ -170,8 +170,8 @@ def _cut(panels: w.Array, kernel: w.Array, rule: Rule, pieces: np.ndarray) -> tu
         share = (place + side) / count
         cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
     for number in np.unique(pieces[pieces > 1]):
-        read_off = kernel[:, pieces == number] @ rule.spread(int(number))
-        values[:, count == number] = read_off.reshape(len(kernel), -1, rule.count)
+        re, im = np.moveaxis(_pair(kernel[:, pieces == number]) @ rule.spread(int(number)), -2, 0)  # as `products` do
+        values[:, count == number] = (re + 1j * im).reshape(len(kernel), -1, rule.count)
     return cut, values
 
 
