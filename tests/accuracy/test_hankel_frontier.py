@@ -8,7 +8,7 @@ from unitcad.accuracy.hankel_frontier import Best
 
 
 def test_fftlog_has_the_range_and_bias_that_come_nearest(monkeypatch):
-    """With the range and bias of the other table 128 points are 40 times as far off."""
+    """With the range and bias of the other table 128 points are 80 times as far off."""
     case = cases()[0]
     exact = brute_force(case)
     monkeypatch.setattr(hankel_frontier, "_POINTS", (64, 128))

@@ -126,7 +126,7 @@ def run(quick: bool, say: Say) -> Result:
                 f"The reference has {_NODES:,} nodes, unitcad {min(counts):,} to {max(counts):,}.{doubt}",
             )
         )
-        if case.name == "damped" and not quick:  # elsewhere FFTLog reaches no error that is of use
+        if case.name == "damped" and not quick:  # elsewhere its points would have to resolve poles
             tables.append(beside_fftlog(case, reference))
         names = dict.fromkeys(row.method for row in rows)
         plots.append(
