@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from scipy import special
 
-from unitcad.accuracy import hankel_cost
+from unitcad.accuracy import hankel_cost, hankel_frontier
 from unitcad.accuracy import hankel_peers as peers
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved, machine
@@ -126,6 +126,8 @@ def run(quick: bool, say: Say) -> Result:
                 f"The reference has {_NODES:,} nodes, unitcad {min(counts):,} to {max(counts):,}.{doubt}",
             )
         )
+        if case.name == "damped" and not quick:  # elsewhere its points would have to resolve poles
+            tables.append(beside_fftlog(case, reference))
         names = dict.fromkeys(row.method for row in rows)
         plots.append(
             Plot(
@@ -165,6 +167,13 @@ def run(quick: bool, say: Say) -> Result:
         measured=machine("numpy", "scipy", "libdlf", "python-flint"),
         summary=Summary(tuple(_picked(ends)), max(closest)[1], 0),
     )
+
+
+def beside_fftlog(case: Case, reference: np.ndarray, repeats: int = 21) -> Table:
+    """Tabulate a case at every error beside FFTLog, of which the best setting is taken."""
+    own = hankel_frontier.by_response(lambda rtol: _by_unitcad(case, rtol)[0], reference)
+    other = hankel_frontier.by_fftlog(case.remainder, case.known, RADII, reference)
+    return hankel_frontier.table(case.name, own, other, repeats)
 
 
 def _picked(ends: dict[str, list[tuple[str, float, float]]]) -> Iterator[tuple[str, str, str]]:

@@ -66,18 +66,22 @@ def filtered(f: Integrand, r: np.ndarray, name: str) -> np.ndarray:
         return (f(base[None] / r[:, None]) @ j0) / r
 
 
-def logarithmic(f: Integrand, r: np.ndarray, n: int) -> np.ndarray:
-    """Apply FFTLog (scipy's fht) on n points, then a cubic spline in log r."""
-    k = np.geomspace(*FFTLOG_K, n)
+def logarithmic(
+    f: Integrand, r: np.ndarray, n: int, ends: tuple[float, float] = FFTLOG_K, bias: float = FFTLOG_BIAS
+) -> np.ndarray:
+    """Apply FFTLog (scipy's fht) on n points between the ends (1/m), then a cubic spline in log r."""
+    k = np.geomspace(*ends, n)
     step = math.log(k[1] / k[0])
-    offset = fft.fhtoffset(step, mu=0.0, initial=-math.log(k[n // 2] * 5e-3), bias=FFTLOG_BIAS)
+    offset = fft.fhtoffset(step, mu=0.0, initial=-math.log(k[n // 2] * 5e-3), bias=bias)
     grid = math.exp(offset) / k[::-1]
     with np.errstate(all="ignore"):
         sampled: Any = f(k)
         # fht transforms a(k) r J(kr) dk into A(r).
-        both = [np.asarray(fft.fht(a, step, 0.0, offset, FFTLOG_BIAS)) / grid for a in (sampled.real, sampled.imag)]
-    spline = [interpolate.CubicSpline(np.log(grid), part)(np.log(r)) for part in both]
-    return spline[0] + 1j * spline[1]
+        both = np.asarray(fft.fht(np.stack([sampled.real, sampled.imag]), step, 0.0, offset, bias)) / grid
+    if not np.all(np.isfinite(both)):
+        return np.full(r.shape, np.nan + 0j)
+    re, im = interpolate.CubicSpline(np.log(grid), both, axis=1)(np.log(r))
+    return re + 1j * im
 
 
 def uniform(f: Integrand, r: np.ndarray, n: int) -> np.ndarray:

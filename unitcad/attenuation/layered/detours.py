@@ -17,6 +17,7 @@ import numpy as np
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.path import wavenumbers
+from unitcad.attenuation.layered.rule import Rule
 
 _LAST = 4  # coefficients in which a pole is looked for
 _NEXT = 0.05  # imaginary part of t up to which a pole is next to the axis
@@ -45,10 +46,10 @@ class Poles(NamedTuple):
     rest: np.ndarray
 
 
-def poles(kernel: w.Array, nodes: np.ndarray, to_legendre: np.ndarray, k: np.ndarray) -> Poles:
+def poles(kernel: w.Array, rule: Rule, k: np.ndarray) -> Poles:
     """Return the pole that each panel's kernel, shape (rows, panels, nodes), would have; k: wavenumber over half."""
-    last = to_legendre[-_LAST:].T
-    plain, turned = kernel @ last, (kernel * nodes) @ last
+    last = rule.to_legendre[-_LAST:].T
+    plain, turned = kernel @ last, (kernel * rule.nodes) @ last
     size = np.sum(np.abs(plain) ** 2, axis=(0, 2))
     safe = np.where(size > 0, size, 1.0)
     at = np.sum(np.conj(plain) * turned, axis=(0, 2)) / safe

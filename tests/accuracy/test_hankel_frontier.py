@@ -1,0 +1,32 @@
+"""The displacement beside FFTLog: each error has the first setting that reaches it, FFTLog the best of its ranges."""
+
+import numpy as np
+
+from unitcad.accuracy import hankel_frontier
+from unitcad.accuracy.hankel import RADII, beside_fftlog, brute_force, cases
+from unitcad.accuracy.hankel_frontier import Best
+
+
+def test_fftlog_has_the_range_and_bias_that_come_nearest(monkeypatch):
+    """With the range and bias of the other table 128 points are 80 times as far off."""
+    case = cases()[0]
+    exact = brute_force(case)
+    monkeypatch.setattr(hankel_frontier, "_POINTS", (64, 128))
+    few, many = hankel_frontier.by_fftlog(case.remainder, case.known, RADII, exact)
+    assert many.error < few.error < 1e-2
+    assert many.error < 2e-4
+    assert np.max(np.abs(many.solve() - exact)) == many.error * np.max(np.abs(exact))
+    monkeypatch.setattr(hankel_frontier, "TARGETS", (1e-3, 1e-12))
+    found = beside_fftlog(case, exact, repeats=3)
+    assert [row[0] for row in found.rows] == [1e-3, 1e-12]
+    assert found.rows[0][1].startswith("128 points")
+    assert found.rows[0][3] == "rtol 0.1"
+    assert found.rows[0][5] > 0
+    assert found.rows[1][1:] == (None,) * 5
+
+
+def test_the_first_setting_that_reaches_an_error_is_taken(monkeypatch):
+    monkeypatch.setattr(hankel_frontier, "TARGETS", (1e-3,))
+    settings = [Best(name, error, lambda: np.zeros(1)) for name, error in (("a", 2e-3), ("b", 5e-4), ("c", 1e-9))]
+    (row,) = hankel_frontier.table("damped", settings, settings[2:], 3).rows
+    assert (row[3], row[1]) == ("b", "c")
