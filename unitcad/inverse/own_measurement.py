@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.edge.lab_fit import own_block
-from unitcad.attenuation.edge.level import measured_block
+from unitcad.attenuation.edge.paper_units import measured_block
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.estimating import estimate_input

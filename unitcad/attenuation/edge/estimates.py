@@ -13,8 +13,9 @@ from unitcad.attenuation.curve import decay_at, layered_block
 from unitcad.attenuation.edge.answer import answer
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments, choice, forms, in_order, pairwise
 from unitcad.attenuation.edge.lab_fit import LabFit, error_block, own_block
-from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown, unlike_measured
+from unitcad.attenuation.edge.level import model_block, ranged, unknown
 from unitcad.attenuation.edge.measured_levels import Moduli
+from unitcad.attenuation.edge.paper_units import measured_block, unlike_measured
 from unitcad.attenuation.edge.predictive import HELD, STACKED, predictive_of
 from unitcad.attenuation.edge.scores import RANGE_PERCENT, Assessment
 from unitcad.attenuation.inputs import EstimateInput, Quantity
