@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import special
 
+from unitcad.attenuation.layered.gauss_rule import COARSE, FINEST
 from unitcad.attenuation.layered.integral import Body, Problem
 from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.path import halved_towards
 from unitcad.attenuation.layered.quadrature import evaluate, nodes
 from unitcad.attenuation.layered.rheology import LossFactor
-from unitcad.attenuation.layered.rule import COARSE, FINEST
 
 
 class Seen(NamedTuple):

@@ -10,10 +10,10 @@ from unitcad.accuracy.random_media import trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.detours import around, poles
+from unitcad.attenuation.layered.gauss_rule import FINEST
 from unitcad.attenuation.layered.loads import Point, UniformDisc
 from unitcad.attenuation.layered.path import from_origin, wavenumbers
 from unitcad.attenuation.layered.rheology import LossFactor
-from unitcad.attenuation.layered.rule import FINEST
 
 REFERENCES = json.loads((Path(__file__).parent / "references" / "undamped.json").read_text())
 NODES, WEIGHTS = FINEST.nodes, FINEST.weights

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from unitcad.attenuation.layered import waves as w
+from unitcad.attenuation.layered.gauss_rule import Rule
 from unitcad.attenuation.layered.path import wavenumbers
-from unitcad.attenuation.layered.rule import Rule
 
 _LAST = 4  # coefficients in which a pole is looked for
 _NEXT = 0.05  # imaginary part of t up to which a pole is next to the axis

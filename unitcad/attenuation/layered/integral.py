@@ -1,6 +1,6 @@
 """The Hankel integral of a medium's compliance along a path of panels, with a bound on its error.
 
-Composite Gauss-Legendre (`quadrature`); where the tolerance is loose, by a coarse `rule` first. A panel whose last
+Composite Gauss-Legendre (`quadrature`); where the tolerance is loose, by a coarse `gauss_rule` first. A panel whose last
 Legendre coefficients have not died by the finest rule is halved towards the pole that they show, or goes around it.
 Each row of the kernel meets the Bessel function of its own order. At the surface the static half-space of one of the
 layers, known in closed form, is taken out first. What bounds the tail and the first panels are sampled in one call:
@@ -17,10 +17,10 @@ import numpy as np
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.detours import Poles, around
+from unitcad.attenuation.layered.gauss_rule import FINEST, first_rule
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, from_origin, halved_towards, onwards, pieced
 from unitcad.attenuation.layered.quadrature import Evaluated, evaluate, nodes, panel_poles
-from unitcad.attenuation.layered.rule import FINEST, first_rule
 from unitcad.attenuation.layered.stack import Stack
 from unitcad.attenuation.layered.statics import Direction, static_kernel, static_kernels
 from unitcad.attenuation.layered.tail import grid, joined, measure_tail

@@ -16,9 +16,9 @@ import numpy as np
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.bessel import bessel_bounds, bessels
 from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, poles
+from unitcad.attenuation.layered.gauss_rule import Rule
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import wavenumbers
-from unitcad.attenuation.layered.rule import Rule
 
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
