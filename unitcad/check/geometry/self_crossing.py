@@ -84,7 +84,7 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
     normal = np.stack([topology.areas[:, axis].take(order) for axis in range(3)])
     solid = (normal != 0).any(axis=0)
     if not solid.all():
-        order, normal = order[solid], normal[:, solid]
+        order, normal = order[solid], normal.compress(solid, axis=1)  # keeps each axis in one piece
     if len(order) < 2:
         return Crossings()
     tick()
