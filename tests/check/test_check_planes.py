@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from unitcad.check.geometry.contact import face_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.triangle_mesh import area_vectors
 from unitcad.check.geometry.triangles import meet
@@ -95,3 +96,24 @@ def test_slabs_keep_faces_that_touch(seed: int) -> None:
     kept = slabs.meeting(i[touch], j[touch])
     assert len(kept[0]) == touch.sum()
     assert len(slabs.meeting(i[~touch], j[~touch])[0]) < (~touch).sum()
+
+
+def test_boxes_that_touch_hold_faces_that_do_no_more() -> None:
+    """On a lattice, where most boxes have sides in common."""
+    a, b = _pairs("lattice", np.random.default_rng(7))
+    points = np.ascontiguousarray(np.concatenate([a, b]).reshape(-1, 3).T)
+    faces = np.ascontiguousarray(np.arange(6 * N).reshape(-1, 3).T)
+    apart, flush = face_boxes(points, faces).relation(np.arange(N), np.arange(N, 2 * N))
+    solid = [(area_vectors(c.reshape(-1, 3), np.arange(3 * N).reshape(-1, 3)) != 0).any(axis=1) for c in (a, b)]
+    exact = meet(a, b)
+    assert (apart == ((a.min(axis=1) > b.max(axis=1)) | (b.min(axis=1) > a.max(axis=1))).any(axis=1)).all()
+    assert not (apart & exact.touches & solid[0] & solid[1]).any()
+    rows = flush & solid[0] & solid[1]
+    assert (rows & exact.touches).sum() > 20
+    assert not (rows & (exact.crosses | exact.overlaps)).any()
+    touch = np.zeros(N, bool)  # in a plane that does not hold a side of one and all of the other
+    for one, other in ((a, b), (b, a)):
+        plane = one.max(axis=1)
+        held = (one == plane[:, None]).sum(axis=1) + (other == plane[:, None]).sum(axis=1)
+        touch |= ((plane == other.min(axis=1)) & (held < 5)).any(axis=1)
+    assert (flush == (touch & ~apart)).all()

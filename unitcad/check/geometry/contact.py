@@ -12,59 +12,103 @@ import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
-
-def by_boxes(a: Floats, b: Floats) -> tuple[Bools, Bools]:
-    """Return for pairs of triangles (corner, axis, n) whether their boxes are apart, and whether they can only touch.
-
-    They can where their boxes do, and the plane between these holds no side of one and all of the other.
-    """
-    (low_a, high_a), (low_b, high_b) = _box(a), _box(b)
-    apart = np.asarray(((low_a > high_b) | (low_b > high_a)).any(axis=0))
-    flush = np.zeros(a.shape[2], bool)
-    for axis in range(3):
-        for plane, other in ((high_a[axis], low_b[axis]), (low_a[axis], high_b[axis])):
-            rows = np.flatnonzero((plane == other) & ~(apart | flush))
-            if len(rows):
-                at = plane[rows]
-                one, two = ((corners[:, axis].take(rows, axis=1) == at).sum(axis=0) for corners in (a, b))
-                flush[rows] = one + two < 5
-    return apart, flush
+_FACES = 1 << 14  # faces whose corners stay in the processor's cache
+_LATELY = 1 << 16  # pairs of shells remembered: those found again are near each other in the order of the faces
+_FIVE = np.uint16(0x333)  # added to sums of corners, four bits an axis: the fourth bit says five or more
 
 
-def _box(corners: Floats) -> tuple[Floats, Floats]:
-    """Return low and high corner (axis, n) of the corners' box."""
-    a, b, c = corners
-    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+@dataclass(frozen=True)
+class FaceBoxes:
+    """Boxes of faces, (3, n) each, and how many corners of each face lie on their sides: four bits an axis, (n,)."""
+
+    low: Floats
+    high: Floats
+    on_low: Ints
+    on_high: Ints
+
+    def relation(self, i: Ints, j: Ints) -> tuple[Bools, Bools]:
+        """Return for pairs of faces whether their boxes are apart, and whether the faces can only touch.
+
+        They can where their boxes do, and the plane between these holds no side of one and all of the other.
+        """
+        apart, flush = np.zeros((2, len(i)), bool)
+        above, below = (
+            one.take(i, mode="clip") + other.take(j, mode="clip") + _FIVE
+            for one, other in ((self.on_high, self.on_low), (self.on_low, self.on_high))
+        )
+        for axis in range(3):
+            low_a, low_b = (self.low[axis].take(f, mode="clip") for f in (i, j))
+            high_a, high_b = (self.high[axis].take(f, mode="clip") for f in (i, j))
+            apart |= low_a > high_b
+            apart |= low_b > high_a
+            for plane, other, corners in ((high_a, low_b, above), (low_a, high_b, below)):
+                meets = plane == other
+                if meets.any():
+                    meets &= (corners & np.uint16(8 << 4 * axis)) == 0
+                    flush |= meets
+        return apart, flush & ~apart
+
+
+def face_boxes(columns: Floats, ids: Ints) -> FaceBoxes:
+    """Return the boxes of faces from vertices (3, n) and their ids (3, m)."""
+    low, high = np.empty(ids.shape), np.empty(ids.shape)
+    on_low, on_high = np.zeros(ids.shape[1], np.uint16), np.zeros(ids.shape[1], np.uint16)
+    for start in range(0, ids.shape[1], _FACES):
+        block = slice(start, start + _FACES)
+        for axis, column in enumerate(columns):
+            at = [column.take(corner[block], mode="clip") for corner in ids]
+            for find, side, on in ((np.minimum, low, on_low), (np.maximum, high, on_high)):
+                find(find(at[0], at[1]), at[2], out=side[axis, block])
+                for corner in at:
+                    on[block] += (corner == side[axis, block]).astype(np.uint16) << np.uint16(4 * axis)
+    return FaceBoxes(low, high, on_low, on_high)
 
 
 @dataclass
 class Contacts:
-    """Pairs of shells that meet, each with the first pair of faces found (k, 2), or with `every` one."""
+    """Pairs of shells that meet, each with the first pair of faces found, or with `every` one.
+
+    `noted` are pairs of faces in blocks, some of shells that were noted before; `lately` has the keys of some shells
+    that were, each at its own place.
+    """
 
     shells: int
     every: bool = False
-    known: Ints = field(default_factory=lambda: np.empty(0, np.int64))
-    pairs: list[Ints] = field(default_factory=list)
+    noted: list[tuple[Ints, Ints]] = field(default_factory=list)
+    lately: Ints = field(default_factory=lambda: np.full(_LATELY, -1))
 
     def keys(self, one: Ints, other: Ints) -> Ints:
         """Return a number for each pair of shells, in either order."""
         return np.minimum(one, other).astype(np.int64) * self.shells + np.maximum(one, other)
 
-    def open(self, keys: Ints) -> Bools:
-        """Return which keys are still asked for."""
-        return np.ones(len(keys), bool) if self.every else ~self._knows(keys)
-
-    def _knows(self, keys: Ints) -> Bools:
-        """Return which keys are known, by bisection: `numpy.isin` hashes all that are known at each call."""
-        if not len(self.known):
-            return np.zeros(len(keys), bool)
-        return self.known.take(np.searchsorted(self.known, keys), mode="clip") == keys
+    def open(self, keys: Ints) -> Ints:
+        """Return which keys (k,) may not be known yet: all that are not, and some others."""
+        if self.every:
+            return np.arange(len(keys))
+        return np.flatnonzero(self.lately.take(keys % _LATELY) != keys)
 
     def add(self, keys: Ints, pairs: Ints) -> None:
-        """Note pairs of faces that meet, one for each pair of shells that is not known."""
-        rows = np.unique(keys, return_index=True)[1]
-        rows = rows[~self._knows(keys[rows])]
-        if len(rows):
-            self.known = np.sort(np.concatenate([self.known, keys[rows]]), kind="stable")  # merges
-        if len(rows) or self.every:
-            self.pairs.append(pairs if self.every else pairs[rows])
+        """Note pairs of faces that meet (k, 2), one for each pair of shells or `every` one."""
+        if not self.every and len(keys):
+            keys, first = np.unique(keys, return_index=True)
+            pairs = pairs[first]
+            self.lately[keys % _LATELY] = keys
+        self.noted.append((keys, pairs))
+
+    def pairs(self) -> tuple[Ints, Ints]:
+        """Return the keys of shells that meet and pairs of their faces (k, 2), in the order of the keys."""
+        if not self.noted:
+            return np.empty(0, np.int64), np.empty((0, 2), np.int32)
+        keys, pairs = (np.concatenate(part) for part in zip(*self.noted, strict=True))
+        if self.every:
+            order = np.argsort(keys, kind="stable")
+            keys, pairs = keys[order], pairs[order]
+        else:
+            keys, first = np.unique(keys, return_index=True)
+            pairs = pairs[first]
+        self.noted = [(keys, pairs)]  # sorted, the next time takes less
+        return keys, pairs
+
+    def shells_of(self, keys: Ints) -> Ints:
+        """Return the pairs of shells (k, 2) of these keys, the smaller number first."""
+        return np.stack(np.divmod(keys, self.shells), axis=1)

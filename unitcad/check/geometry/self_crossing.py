@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check.geometry import contact, coverings, triangles
-from unitcad.check.geometry.contact import Contacts
+from unitcad.check.geometry import coverings, triangles
+from unitcad.check.geometry.contact import Contacts, FaceBoxes, face_boxes
 from unitcad.check.geometry.edges import balanced
 from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.stars import height_fields
@@ -41,6 +41,7 @@ class Faces:
     normal: Floats
     safe: Ints
     planes: Planes
+    boxes: FaceBoxes
     shell: Ints
     original: Ints
     several: bool
@@ -69,9 +70,7 @@ class Crossings:
 
     def touching(self) -> Ints:
         """Return pairs of shells (k, 2) whose faces meet, the smaller number first."""
-        if self.faces is None:
-            return np.empty((0, 2), np.int64)
-        return np.unique(np.sort(self.faces.shell[joined(self.contact.pairs)], axis=1), axis=0).astype(np.int64)
+        return self.contact.shells_of(np.unique(self.contact.pairs()[0]))
 
 
 def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Crossings:
@@ -84,7 +83,7 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
     normal = np.stack([topology.areas[:, axis].take(order) for axis in range(3)])
     solid = (normal != 0).any(axis=0)
     if not solid.all():
-        order, normal = order[solid], normal[:, solid]
+        order, normal = order[solid], normal.compress(solid, axis=1)  # keeps each axis in one piece
     if len(order) < 2:
         return Crossings()
     tick()
@@ -105,7 +104,7 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
                 tick()
         _decide(faces, waiting, crossings)
     except Interrupted as stop:
-        crossings.contact.pairs.clear()  # shells that touch there may cross elsewhere
+        crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
         crossings.stopped = stop
     _leaning(faces, crossings)
     return crossings
@@ -122,6 +121,7 @@ def _prepared(topology: Topology, order: Ints, normal: Floats) -> Faces:
         normal,
         np.where(smooth.take(corners), corners, np.int32(-1)),
         planes_of(columns, places, normal),
+        face_boxes(columns, corners),
         topology.shells[order],
         topology.kept[order],
         several,
@@ -154,7 +154,7 @@ def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
 
 
 def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings) -> None:
-    """Decide pairs of faces that are near each other: planes and boxes first, then exact signs."""
+    """Decide pairs of faces that are near each other: boxes and planes first, then exact signs."""
     if not waiting or crossings.kept > _FEW:
         return
     i = np.concatenate([pair[0] for pair in waiting])
@@ -164,45 +164,56 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings
         rows = slice(start, start + _PAIRS)
         state[rows], shared[rows] = _sieved(faces, i[rows], j[rows])
     if faces.several:
-        some = np.flatnonzero(np.where(shared > 0, state != _OPEN, state == _FLUSH))
-        some = some[faces.shell[i[some]] != faces.shell[j[some]]]
-        _contacts(faces, i[some], j[some], shared[some] > 0, crossings)
+        some = np.flatnonzero((state == _FLUSH) | ((state == _APART) & (shared > 0)))
+        _contacts(faces, i[some], j[some], crossings)
     left = np.flatnonzero(state == _OPEN)
     _decide_exactly(faces, i[left], j[left], shared[left], crossings)
 
 
 def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
-    """Return the state of pairs by planes and boxes, and how many corners the faces of each share."""
-    planes = faces.planes
+    """Return the state of pairs by boxes and planes, and how many corners the faces share of those boxes leave open."""
+    state, shared = np.zeros((2, len(i)), np.int8)
+    apart, flush = faces.boxes.relation(i, j)
+    state[apart] = _APART
+    state[flush] = _FLUSH
+    rows = np.flatnonzero(state == _OPEN)
+    i, j, planes = i[rows], j[rows], faces.planes
     ids_a, ids_b = (planes.vertices(f) for f in (i, j))
-    shared = np.zeros(len(i), np.int8)
-    for k in range(3):
-        for m in range(3):
-            shared += ids_a[k] == ids_b[m]
-    apart = planes.one_side(i, ids_b, shared)
-    left = np.flatnonzero(~apart)
-    apart[left] = planes.one_side(j[left], ids_a.take(left, axis=1), shared[left])
+    shared[rows] = common = _common(ids_a, ids_b)
+    clear = planes.one_side(i, ids_b, common)
+    left = np.flatnonzero(~clear)
+    clear[left] = planes.one_side(j[left], ids_a.take(left, axis=1), common[left])
     # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
-    edge = np.flatnonzero((shared >= 2) & ~apart)
+    edge = np.flatnonzero((common >= 2) & ~clear)
     if len(edge):
         open_ = facing(faces, i[edge], j[edge]) > 0
         if faces.doubled:
             open_ &= ~coverings.run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
-        apart[edge] = open_
-    state = apart.astype(np.int8)
-    left = np.flatnonzero(~apart)
+        clear[edge] = open_
+    left = np.flatnonzero(~clear & (common < 3))
     a, b = (planes.corners(ids.take(left, axis=1)) for ids in (ids_a, ids_b))
-    clear, flush = contact.by_boxes(a, b)
-    rest = np.flatnonzero(~(clear | flush) & (shared.take(left) < 3))
-    clear[rest] = planes.seen_apart(i[left[rest]], a.take(rest, axis=2), b.take(rest, axis=2), shared[left[rest]])
-    state[left[flush]] = _FLUSH
-    state[left[clear]] = _APART
+    clear[left] = planes.seen_apart(i[left], a, b, common[left])
+    state[rows[clear]] = _APART
     return state, shared
 
 
-def _contacts(faces: Faces, i: Ints, j: Ints, sharing: Bools, crossings: Crossings) -> None:
-    """Note the shells that meet, of pairs of faces that can do no more than touch; those `sharing` a corner do."""
-    keys, pair = crossings.contact.keys(faces.shell[i], faces.shell[j]), np.stack([i, j], axis=1)
+def _common(a: Ints, b: Ints) -> Ints:
+    """Return how many corners faces share, by their vertices (corner, n)."""
+    shared = np.zeros(a.shape[1], np.int8)
+    for k in range(3):
+        for m in range(3):
+            shared += a[k] == b[m]
+    return shared
+
+
+def _contacts(faces: Faces, i: Ints, j: Ints, crossings: Crossings) -> None:
+    """Note the shells that meet, of pairs of faces that can do no more than touch; those that share a corner do."""
+    one, other = faces.shell[i], faces.shell[j]
+    keys = crossings.contact.keys(one, other)
+    asked = crossings.contact.open(keys)
+    asked = asked[one[asked] != other[asked]]
+    i, j, keys = i[asked], j[asked], keys[asked]
+    pair, sharing = np.stack([i, j], axis=1), _common(faces.planes.vertices(i), faces.planes.vertices(j)) > 0
     crossings.contact.add(keys[sharing], pair[sharing])
     asked = np.flatnonzero(~sharing)
     asked = asked[crossings.contact.open(keys[asked])]

@@ -94,26 +94,23 @@ def _pairs(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[F
 
 def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
     """Return pairs of shells whose faces meet and do not cross."""
-    touching, contact = joined(crossings.contact.pairs), crossings.contact
-    if not len(touching):
+    contact = crossings.contact
+    keys, touching = contact.pairs()
+    first = np.flatnonzero(np.append(True, keys[1:] != keys[:-1])) if len(keys) else keys
+    first = first[~np.isin(keys[first], contact.keys(*faces.shell[joined(crossings.crossing)].T))]
+    n = len(first)
+    if not n:
         return
-    met = np.sort(faces.shell[touching], axis=1)
-    shells, first, which = np.unique(met, axis=0, return_index=True, return_inverse=True)
-    through = contact.keys(*faces.shell[joined(crossings.crossing)].T)
-    only = ~np.isin(contact.keys(*shells.T), through)
-    if not only.any():
-        return
-    n = int(only.sum())
-    order, which = np.argsort(which, axis=None, kind="stable"), np.sort(which, axis=None)
 
     def region(at: int) -> tuple[Ints, tuple[float, float, float]]:
         """Return the faces of a pair of shells that touch, and the middle of what their boxes share."""
-        at = int(np.flatnonzero(only)[at])
-        begin, end = np.searchsorted(which, at + np.arange(2))
-        x, y, z = (topology.low[shells[at]].max(axis=0) + topology.high[shells[at]].min(axis=0)).tolist()
-        return faces.original[np.unique(touching[order[begin:end]])], (x / 2, y / 2, z / 2)
+        key = keys[first[at]]
+        begin, end = np.searchsorted(keys, [key, key + 1])
+        shells = contact.shells_of(keys[begin : begin + 1])[0]
+        x, y, z = (topology.low[shells].max(axis=0) + topology.high[shells].min(axis=0)).tolist()
+        return faces.original[np.unique(touching[begin:end])], (x / 2, y / 2, z / 2)
 
-    places = _places(topology, faces, touching[first[only]], region)
+    places = _places(topology, faces, touching[first], region)
     yield G003.finding(f"{counted(n, 'pair')} of shells that touch", n, places)
 
 
