@@ -1,10 +1,10 @@
 """The Hankel integral of a medium's compliance along a path of panels, with a bound on its error.
 
-Composite Gauss-Legendre (`quadrature`); where the tolerance is loose, by a coarse `gauss_rule` first. A panel whose last
-Legendre coefficients have not died by the finest rule is halved towards the pole that they show, or goes around it.
-Each row of the kernel meets the Bessel function of its own order. At the surface the static half-space of one of the
-layers, known in closed form, is taken out first. What bounds the tail and the first panels are sampled in one call:
-most of what a call takes does not hang on how many wavenumbers there are.
+Composite Gauss-Legendre (`quadrature`); where the tolerance is loose, a coarse `gauss_rule` is tried first. A panel
+whose last Legendre coefficients have not died by the finest rule is halved towards the pole that they show, or goes
+around it. Each row of the kernel meets the Bessel function of its own order. At the surface the static half-space of
+one of the layers, known in closed form, is taken out first. What bounds the tail and the first panels are sampled in
+one call: most of what a call takes does not hang on how many wavenumbers there are.
 """
 
 from __future__ import annotations
