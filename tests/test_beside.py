@@ -180,3 +180,8 @@ def test_no_more_processes_run_than_there_are_cores(
     monkeypatch.setattr("unitcad.children.Answering.__init__", lambda self, module, first: asked.append(first))
     started(step, rest)
     assert asked == begun
+
+
+def test_processes_start_before_numpy_is_loaded():
+    code = "import sys; import unitcad.cli.build_command, unitcad.pipeline.beside; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0

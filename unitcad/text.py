@@ -1,4 +1,4 @@
-"""Text from others, made safe for a terminal, Markdown or a spreadsheet; values as TOML."""
+"""Text from others, made safe for a terminal, Markdown, XML or a spreadsheet; values as TOML."""
 
 from __future__ import annotations
 
@@ -95,3 +95,17 @@ def listed(words: Iterable[str]) -> str:
 def spaced(name: str) -> str:
     """Return a body's name as it is read: "cup1" as "cup 1", which stays."""
     return re.sub(r"(?<=[^\d\s])(?=\d+$)", " ", name)
+
+
+# As xml.sax.saxutils has them; importing that loads urllib, http and ssl.
+def xml_text(text: str) -> str:
+    """Return a text as the content of an XML element."""
+    return text.replace("&", "&amp;").replace(">", "&gt;").replace("<", "&lt;")
+
+
+def xml_attribute(text: str) -> str:
+    """Return a text as the value of an XML attribute, with its quotation marks."""
+    value = xml_text(text).replace("\n", "&#10;").replace("\r", "&#13;").replace("\t", "&#9;")
+    if '"' in value and "'" not in value:
+        return f"'{value}'"
+    return '"' + value.replace('"', "&quot;") + '"'

@@ -98,17 +98,18 @@ def _built(
     as_json: bool,
 ) -> bool:
     """Build the specs and print what came out; return whether every check passed."""
-    from unitcad.arrays.array import Array
-    from unitcad.arrays.array_file import load_array
-    from unitcad.arrays.array_names import confirm_known, is_array
-    from unitcad.cli.output import print_json, progress
-    from unitcad.pipeline.array_build import build_array
-    from unitcad.pipeline.build import build as build_spec
-    from unitcad.pipeline.folder import PAGE, held
-    from unitcad.pipeline.subjects import subject_of, unit_of
-    from unitcad.validation import load
-
+    # The processes first: they load their modules while this one loads its own.
     with _beside(only, formats) as beside:
+        from unitcad.arrays.array import Array
+        from unitcad.arrays.array_file import load_array
+        from unitcad.arrays.array_names import confirm_known, is_array
+        from unitcad.cli.output import print_json, progress
+        from unitcad.pipeline.array_build import build_array
+        from unitcad.pipeline.build import build as build_spec
+        from unitcad.pipeline.folder import PAGE, held
+        from unitcad.pipeline.subjects import subject_of, unit_of
+        from unitcad.validation import load
+
         changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
         allow_code(code)
         # Every spec is validated before the first one is built.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from xml.sax.saxutils import escape, quoteattr
+
+from unitcad.text import xml_attribute, xml_text
 
 TEXT_PX = 12.0
 CHARACTER_PX = 0.62 * TEXT_PX
@@ -76,7 +77,7 @@ def line(start: Point, end: Point, kind: str) -> str:
 def text(content: str, at: Point, anchor: str = "middle") -> str:
     """Draw a line of text, its middle at the height of `at`."""
     x, y = at
-    return f'<text x="{number(x)}" y="{number(y + 0.35 * TEXT_PX)}" text-anchor="{anchor}">{escape(content)}</text>'
+    return f'<text x="{number(x)}" y="{number(y + 0.35 * TEXT_PX)}" text-anchor="{anchor}">{xml_text(content)}</text>'
 
 
 def dot(at: Point) -> str:
@@ -87,7 +88,7 @@ def dot(at: Point) -> str:
 def outline(loops: Sequence[Sequence[Point]], fill: str, name: str) -> str:
     """Draw a filled region with holes, titled."""
     path = "".join("M" + "L".join(f"{number(x)} {number(y)}" for x, y in loop) + "Z" for loop in loops)
-    return f'<path d="{path}" fill={quoteattr(fill)} fill-rule="evenodd"><title>{escape(name)}</title></path>'
+    return f'<path d="{path}" fill={xml_attribute(fill)} fill-rule="evenodd"><title>{xml_text(name)}</title></path>'
 
 
 def dimension(start: Point, end: Point) -> list[str]:

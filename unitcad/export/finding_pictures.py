@@ -16,7 +16,6 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from unitcad.check.geometry.triangle_mesh import LARGEST, Mesh, weld_exact
 from unitcad.check.rules.registry import rules
 from unitcad.export import drawing, raster, threemf
 from unitcad.export.marks import Marks, marks_of
-from unitcad.text import printable
+from unitcad.text import printable, xml_attribute, xml_text
 
 COLOURS = {"error": (0.86, 0.10, 0.12), "warning": (0.98, 0.58, 0.05), "info": (0.15, 0.45, 0.90)}
 PART = (0.74, 0.79, 0.85)
@@ -256,14 +255,14 @@ class _View:
             )
             if path:
                 drawn.append(f'<path class="halo" d="{path}"/>')
-                drawn.append(f'<path class="{kind}" stroke={quoteattr(self.colour)} d="{path}"/>')
+                drawn.append(f'<path class="{kind}" stroke={xml_attribute(self.colour)} d="{path}"/>')
         return drawn
 
     def _points(self) -> list[str]:
         if not len(self.marks.points):
             return []
         at = self.view.project(self.marks.points)[:, :2]
-        form = f'<circle class="point" r="5" fill={quoteattr(self.colour)} cx="%s" cy="%s"/>'
+        form = f'<circle class="point" r="5" fill={xml_attribute(self.colour)} cx="%s" cy="%s"/>'
         return [form % (drawing.number(x), drawing.number(y)) for x, y in at.tolist()]
 
     def _where(self) -> list[str]:
@@ -319,9 +318,7 @@ def _page(title: str, finding: Finding, views: Sequence[_View], place: Location 
     top = 2 * _MARGIN + 20 + 17 * len(lines)
     width = _MARGIN + len(views) * (SIZE[0] + _MARGIN)
     height = top + SIZE[1] + 46
-    marks = [
-        f'<text class="title" x="{_MARGIN}" y="{_MARGIN + 12}">{drawing.escape(_fitting(printable(title)))}</text>'
-    ]
+    marks = [f'<text class="title" x="{_MARGIN}" y="{_MARGIN + 12}">{xml_text(_fitting(printable(title)))}</text>']
     for i, line in enumerate(lines):
         marks.append(drawing.text(line, (_MARGIN, _MARGIN + 32 + 17 * i), "start"))
     for i, view in enumerate(views):
@@ -332,7 +329,7 @@ def _page(title: str, finding: Finding, views: Sequence[_View], place: Location 
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" {size} '
         f'viewBox="0 0 {drawing.number(width)} {drawing.number(height)}">'
-        f"<title>{drawing.escape(printable(title))}</title><style>{_STYLE}</style>"
+        f"<title>{xml_text(printable(title))}</title><style>{_STYLE}</style>"
         f'<rect {size} fill="#fff"/>'
     )
     return "\n".join([head, *marks, "</svg>", ""])

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
-from xml.sax.saxutils import escape
 
 import numpy as np
 from manifold3d import CrossSection
@@ -19,6 +18,7 @@ from unitcad.export.threemf import colour_hex
 from unitcad.kernels.mesh import realise
 from unitcad.shape.body import Body
 from unitcad.shape.profile import GRID_PER_MM
+from unitcad.text import xml_text
 
 HAIR_MM = 1 / 3000
 """The cut lies this far off its plane, and so in no plane of the length grid: a face in the plane itself, shared by two
@@ -120,7 +120,7 @@ def section(
     width, height = size.split()
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" width="{width}" height="{height}" viewBox="0 0 {size}">'
-        f"<title>{escape(title or 'section')}</title><style>{_STYLE}</style>"
+        f"<title>{xml_text(title or 'section')}</title><style>{_STYLE}</style>"
         f'<rect width="{width}" height="{height}" fill="#fff"/>'
     )
     return "\n".join([head, *marks, "</svg>", ""])

@@ -9,9 +9,10 @@ import io
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
+
+from unitcad.text import xml_attribute
 
 GAP_MM = 5.0
 
@@ -100,7 +101,7 @@ def _model(parts: Sequence[MeshPart], bed_mm: tuple[float, float]) -> str:
         "<resources>",
         '<basematerials id="1">',
         *(
-            f"<base name={quoteattr(part.name)} displaycolor={quoteattr(colour_hex(colour))}/>"
+            f"<base name={xml_attribute(part.name)} displaycolor={xml_attribute(colour_hex(colour))}/>"
             for part in parts
             for colour in part.palette or (part.colour,)
         ),
@@ -109,7 +110,7 @@ def _model(parts: Sequence[MeshPart], bed_mm: tuple[float, float]) -> str:
     base = 0
     for index, part in enumerate(parts):
         lines += [
-            f'<object id="{index + 2}" type="model" name={quoteattr(part.name)} pid="1" pindex="{base}">',
+            f'<object id="{index + 2}" type="model" name={xml_attribute(part.name)} pid="1" pindex="{base}">',
             "<mesh>",
             "<vertices>",
             *_rows('<vertex x="%s" y="%s" z="%s"/>', np.asarray(part.vertices, np.float32).astype(str)),
@@ -124,7 +125,7 @@ def _model(parts: Sequence[MeshPart], bed_mm: tuple[float, float]) -> str:
     lines += ["</resources>", "<build>"]
     for (index, copy), (x, y) in zip(built, places, strict=True):
         move = " ".join(f"{value + 0.0:.6f}" for value in (x, y, 0.0) - low[index])
-        named = f" partnumber={quoteattr(copy)}" if copy else ""
+        named = f" partnumber={xml_attribute(copy)}" if copy else ""
         lines.append(f'<item objectid="{index + 2}" transform="1 0 0 0 1 0 0 0 1 {move}"{named}/>')
     return "\n".join([*lines, "</build>", "</model>", ""])
 

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any, Self
 
 from unitcad.children import Answering, Lost, cores
 from unitcad.errors import UnitcadError
-from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape.body import Body
-from unitcad.spec import Spec, to_json
-from unitcad.spec.custom_code import is_custom
 
+# Nothing heavier is imported here: a build starts the processes before it loads its own modules.
 if TYPE_CHECKING:
     from contextlib import ExitStack
+
+    from unitcad.moulds.mould_set import MouldSet
+    from unitcad.shape.body import Body
+    from unitcad.spec import Spec
 
 _CHILD = "unitcad.pipeline.beside_child"
 
@@ -87,6 +88,9 @@ class Beside:
 
     def estimate(self, spec: Spec, here: Callable[[], dict[str, Any]]) -> Callable[[], dict[str, Any]]:
         """Ask for a spec's estimate; return what gives it, by `here` where the process has not begun or is lost."""
+        from unitcad.spec import to_json
+        from unitcad.spec.custom_code import is_custom
+
         if self._rest is None or is_custom(spec.design):
             return here
         asked = self._rest.answer(("estimate", to_json(spec)))
@@ -96,6 +100,9 @@ class Beside:
         self, moulds: MouldSet, names: Sequence[str], here: Callable[[str], bytes]
     ) -> Callable[[], dict[str, bytes]]:
         """Ask for pictures of a procedure by the names of their views; return what gives them, as `estimate`."""
+        from unitcad.moulds.mould_set import MouldSet
+        from unitcad.spec.custom_code import is_custom
+
         process = self._rest or self._step
         if process is None or type(moulds) is not MouldSet or moulds.altered or is_custom(moulds.spec.design):
             return lambda: {name: here(name) for name in names}

@@ -57,10 +57,9 @@ def _step(bodies: Sequence[Body], name: str) -> bytes | str:
 
 
 def _estimate(spec: str) -> dict[str, Any]:
-    from unitcad.cache import MemoryStore
-    from unitcad.pipeline.artifacts import estimated
+    from unitcad.estimating import estimate_spec
 
-    return estimated(MouldSet(from_json(spec)), MemoryStore())
+    return estimate_spec(from_json(spec))
 
 
 if __name__ == "__main__":

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from xml.sax.saxutils import escape, quoteattr
 
 from unitcad.check.findings import SEVERITIES, FileReport, Finding, with_places
 from unitcad.check.rules.registry import rules
+from unitcad.text import xml_attribute, xml_text
 
 
 def junit(reports: Sequence[FileReport], fail_on: str) -> str:
@@ -25,8 +25,8 @@ def junit(reports: Sequence[FileReport], fail_on: str) -> str:
                 f"{item.code} {item.severity}{' (known)' if item.known else ''}: {with_places(item, 3)}"
                 for item in rest
             )
-            inner += f"<system-out>{escape(_xml(others))}</system-out>"
-        name = f"name={quoteattr(_xml(report.path))}" + _time(report.seconds)
+            inner += f"<system-out>{xml_text(_xml(others))}</system-out>"
+        name = f"name={xml_attribute(_xml(report.path))}" + _time(report.seconds)
         cases.append(f'<testcase classname="unitcad.check" {name}>{inner}</testcase>')
     known = [report.seconds for report in reports if report.seconds is not None]
     total = sum(known) if known else None
@@ -46,8 +46,8 @@ def _failure(finding: Finding) -> str:
     rule = rules()[finding.code]
     places = [f"at {text}" for place in finding.locations if (text := str(place))]
     body = "\n".join([f"{finding.code} {rule.title}: {finding.message}", *places, f"Fix: {rule.fix}"])
-    head = f"type={quoteattr(finding.code)} message={quoteattr(_xml(with_places(finding, 3)))}"
-    return f"<failure {head}>{escape(_xml(body))}</failure>"
+    head = f"type={xml_attribute(finding.code)} message={xml_attribute(_xml(with_places(finding, 3)))}"
+    return f"<failure {head}>{xml_text(_xml(body))}</failure>"
 
 
 def _xml(text: str) -> str:
