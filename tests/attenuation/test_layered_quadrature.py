@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from scipy import special
 
-from unitcad.attenuation.layered.gauss_rule import COARSE, FINEST
 from unitcad.attenuation.layered.integral import Body, Problem
 from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.path import halved_towards
 from unitcad.attenuation.layered.quadrature import evaluate, nodes
 from unitcad.attenuation.layered.rheology import LossFactor
+
+PHASE = 8.0 * np.pi
 
 
 class Seen(NamedTuple):
@@ -39,16 +40,15 @@ def _exact(seen: Seen, low: float, high: float) -> np.ndarray:
 
 @pytest.mark.parametrize("load", [UniformDisc(3.5e-3), Point()])
 @pytest.mark.parametrize(("low", "high"), [(500.0, 1000.0), (1e3, 2e3), (4e3, 8e3)])
-@pytest.mark.parametrize(("rule", "least"), [(COARSE, 1e-4), (FINEST, 1e-6)], ids=["coarse", "finest"])
-def test_the_kernel_of_a_long_panel_is_read_off_at_its_pieces(load, low, high, rule, least):
+def test_the_kernel_of_a_long_panel_is_read_off_at_its_pieces(load, low, high):
     seen = Seen(load, np.array([0.5e-3, 7e-3, 45e-3]))
     panels = np.array([[low, high, 0, 0], [0.5 * low, low, 0, 0]], dtype=complex)
-    k, _ = nodes(panels, rule)
-    found = evaluate(seen, panels, _kernel(k.ravel()).reshape(2, *k.shape), rule, rule.phase)
+    k, _ = nodes(panels)
+    found = evaluate(seen, panels, _kernel(k.ravel()).reshape(2, *k.shape), PHASE)
     exact = np.array([_exact(seen, *panels[i, :2].real) for i in range(2)])
     size = np.max(np.abs(exact), axis=(0, 2))[:, None]
     assert np.all(np.abs(found.parts - exact) <= found.errors + 1e-12 * size)
-    assert np.all(found.errors < least * size)
+    assert np.all(found.errors < 1e-6 * size)
 
 
 def test_a_tight_tolerance_far_out_takes_few_wavenumbers():

@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from unitcad.attenuation.layered import waves as w
-from unitcad.attenuation.layered.gauss_rule import Rule
 from unitcad.attenuation.layered.path import wavenumbers
 
 _LAST = 4  # coefficients in which a pole is looked for
@@ -46,10 +45,10 @@ class Poles(NamedTuple):
     rest: np.ndarray
 
 
-def poles(kernel: w.Array, rule: Rule, k: np.ndarray) -> Poles:
+def poles(kernel: w.Array, nodes: np.ndarray, to_legendre: np.ndarray, k: np.ndarray) -> Poles:
     """Return the pole that each panel's kernel, shape (rows, panels, nodes), would have; k: wavenumber over half."""
-    last = rule.to_legendre[-_LAST:].T
-    plain, turned = kernel @ last, (kernel * rule.nodes) @ last
+    last = to_legendre[-_LAST:].T
+    plain, turned = kernel @ last, (kernel * nodes) @ last
     size = np.sum(np.abs(plain) ** 2, axis=(0, 2))
     safe = np.where(size > 0, size, 1.0)
     at = np.sum(np.conj(plain) * turned, axis=(0, 2)) / safe

@@ -1,10 +1,9 @@
 """The Hankel integral of a medium's compliance along a path of panels, with a bound on its error.
 
-Composite Gauss-Legendre (`quadrature`); where the tolerance is loose, a coarse `gauss_rule` is tried first. A panel
-whose last Legendre coefficients have not died by the finest rule is halved towards the pole that they show, or goes
-around it. Each row of the kernel meets the Bessel function of its own order. At the surface the static half-space of
-one of the layers, known in closed form, is taken out first. What bounds the tail and the first panels are sampled in
-one call: most of what a call takes does not hang on how many wavenumbers there are.
+Composite Gauss-Legendre (`quadrature`); a panel whose last Legendre coefficients have not died is halved towards the
+pole that they show, or goes around it. Each row of the load's kernel meets the Bessel function of its own order. At the
+surface the static half-space of one of the layers, known in closed form, is taken out first. What bounds the tail and
+the first panels are sampled in one call: most of what a call takes does not hang on how many wavenumbers there are.
 """
 
 from __future__ import annotations
@@ -17,7 +16,6 @@ import numpy as np
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.detours import Poles, around
-from unitcad.attenuation.layered.gauss_rule import FINEST, first_rule
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, from_origin, halved_towards, onwards, pieced
 from unitcad.attenuation.layered.quadrature import Evaluated, evaluate, nodes, panel_poles
@@ -29,7 +27,7 @@ from unitcad.errors import UnitcadError
 _MAX_ROUNDS = 40
 _MOST_SAMPLES = 8_192  # kernel values worked out at once
 _PHASE_RTOL = 1e-8
-"""From which on pieces are of the rule's phase: there the finest is off by some 1e-9 of the waves over a piece."""
+"""From which on pieces are of `PHASE`: there the rule is off by some 1e-9 of the waves over a piece."""
 _FIRST_PIECES = 32
 _FAR = 2.0
 """Of a panel's half: the distance of a pole that leaves few of the last coefficients."""
@@ -158,8 +156,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     beyond = grid(load, r, z, end)
     stop = _first_stop(beyond, end, rtol, PHASE / span)
     pending = from_origin(end, stop, span, materials)
-    rule = first_rule(rtol)
-    k, slope = nodes(pending, rule)
+    k, slope = nodes(pending)
     raw = bare.kernel(np.concatenate([beyond, k.ravel()]))
     by_body = np.split(raw[:, : beyond.size], len(each))
     tail = joined(
@@ -176,14 +173,14 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     bodies = (replace(body, reference=one) for body, one in zip(bare.bodies, tail.references, strict=True))
     problem = replace(bare, bodies=tuple(bodies))
     kernel = problem.less_static(raw[:, beyond.size :]).reshape(-1, *k.shape) * slope
-    narrowed = min(1.0, (rtol / _PHASE_RTOL) ** (1 / 32))
+    phase = PHASE * min(1.0, (rtol / _PHASE_RTOL) ** (1 / 32))
     known, rounded = problem.static_part()
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
     skipped = np.zeros(known.shape)  # by the detours
     count, done, exhausted, gained = beyond.size, 0, False, 0.0
     put_off = _PutOff.none(len(pending), known.shape)
     for left in range(_MAX_ROUNDS, -1, -1):
-        found = evaluate(problem, pending, kernel, rule, narrowed * rule.phase)
+        found = evaluate(problem, pending, kernel, phase)
         if not np.all(np.isfinite(found.parts)):
             raise overflow(bare.bodies[0].omega)
         count += k.size
@@ -207,11 +204,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         quadrature += found.errors[kept].sum(0)
         gained += float(found.gains[kept].sum())
         size += found.sizes[kept].sum(0)
-        if not whole_round and rule is not FINEST:
-            pending, rule = pending[bad], FINEST
-            done -= len(pending)
-            put_off = _PutOff.none(len(pending), known.shape)
-        elif not whole_round:
+        if not whole_round:
             sure = tolerance(float(np.max(whole - off - skipped)))  # beside a pole |u| is at first far too large
             left_out = _DETOURS_SHARE * sure - float(skipped.max())
             now, later, pieces = _detours(problem, pending, found, bad, limit, left_out, span)
@@ -234,7 +227,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             pending = onwards(stop, further, span)
             put_off = _PutOff.none(len(pending), known.shape)
             stop = further
-        k, slope = nodes(pending, rule)
+        k, slope = nodes(pending)
         kernel = problem.kernel(k.ravel()).reshape(-1, *k.shape) * slope
     rest = tail.bound(stop)
     error = quadrature + skipped + rest + 4e-15 * size + rounded
@@ -317,8 +310,7 @@ def _detours(
     def lossier(panel: w.Array, loss: float) -> Poles:
         bodies = (replace(body, medium=body.medium.with_loss(loss)) for body in problem.bodies)
         lossy = replace(problem, bodies=tuple(bodies))
-        k, slope = nodes(panel[None], found.rule)
-        return panel_poles(panel[None], lossy.kernel(k.ravel()).reshape(-1, *k.shape) * slope, found.rule)
+        return panel_poles(panel[None], _sampled(lossy, panel[None]))
 
     at = np.flatnonzero(clear)
     of = Poles(found.poles.at[at], found.poles.uncertainty[at], found.poles.rest[:, at])
@@ -331,3 +323,9 @@ def _detours(
     beyond = beyond[np.argsort(hidden[beyond])]
     now[beyond[np.cumsum(hidden[beyond]) <= left]] = True
     return which & now, which & ~now & found.blurred, pieces
+
+
+def _sampled(problem: Problem, panels: w.Array) -> w.Array:
+    """Return the kernel with dk/ds at each panel's nodes, shape (rows, panels, nodes)."""
+    k, slope = nodes(panels)
+    return problem.kernel(k.ravel()).reshape(-1, *k.shape) * slope

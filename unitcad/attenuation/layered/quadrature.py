@@ -1,25 +1,30 @@
 """Gauss and Legendre over the panels of a Hankel integral, with a bound of the error of each.
 
-A panel's kernel is known at the nodes of a rule. Where the Bessel functions swing faster than they can be seen there,
-the panel is cut into pieces, and the kernel's Legendre series is read off at the nodes of each: the kernel, which costs
-most, is sampled as it varies, not as the waves do.
+A panel's kernel is known at 16 nodes. Where the Bessel functions swing faster than they can be seen there, the panel is
+cut into pieces, and the kernel's Legendre series is read off at the nodes of each: the kernel, which costs most, is
+sampled as it varies, not as the waves do.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from scipy.special import factorial2
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.bessel import bessel_bounds, bessels
 from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, poles
-from unitcad.attenuation.layered.gauss_rule import Rule
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.path import wavenumbers
+from unitcad.attenuation.layered.path import pieced, wavenumbers
 
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_COUNT = _NODES.size
+_TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_NODES, _COUNT - 1))
+_DEGREES = np.arange(2 * _COUNT, _COUNT, -1)
+_ODD_FACTORIALS = np.array([float(factorial2(2 * m - 1)) for m in _DEGREES])
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
 _CANCELLED = 4e-15
@@ -51,48 +56,31 @@ class Seen(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Evaluated:
-    """Of each panel, row and radius: the integral, a bound of its error, its absolute size, that of the waves alone.
+class Evaluated(NamedTuple):
+    """Of each panel, row and radius: the integral, a bound of its error, its absolute size.
 
-    gains: of each panel, by how much halving it lessens the largest part of its error; kernel (with dk/ds): what was
-    integrated; closeness: the wavenumber over half of what a panel covers of it.
+    gains: of each panel, by how much halving it lessens the largest part of its error; poles: the one of each panel;
+    hidden (panels, rows, radii): what a detour around it may leave out; blurred: where that may be rounding's alone.
     """
 
     parts: np.ndarray
     errors: np.ndarray
     sizes: np.ndarray
-    covered: np.ndarray
     gains: np.ndarray
-    kernel: w.Array
-    closeness: np.ndarray
-    rule: Rule
-
-    @cached_property
-    def poles(self) -> Poles:
-        """The pole of each panel."""
-        return poles(self.kernel, self.rule, self.closeness)
-
-    @cached_property
-    def hidden(self) -> np.ndarray:
-        """What a detour around each panel's pole may leave out, shape (panels, rows, radii)."""
-        return HIDDEN * self.poles.rest.T[..., None] * self.covered
-
-    @property
-    def blurred(self) -> np.ndarray:
-        """Where what a detour may leave out may be rounding's alone."""
-        return self.poles.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * self.closeness)
+    poles: Poles
+    hidden: np.ndarray
+    blurred: np.ndarray
 
 
-def nodes(panels: w.Array, rule: Rule) -> tuple[w.Array, w.Array]:
+def nodes(panels: w.Array) -> tuple[w.Array, w.Array]:
     """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, nodes)."""
     half = (panels[:, 1] - panels[:, 0]) / 2.0
-    return wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * rule.nodes)
+    return wavenumbers(panels, panels[:, :2].mean(1)[:, None] + half[:, None] * _NODES)
 
 
-def panel_poles(panels: w.Array, kernel: w.Array, rule: Rule) -> Poles:
+def panel_poles(panels: w.Array, kernel: w.Array) -> Poles:
     """Return the pole that each panel's kernel (with dk/ds), shape (rows, panels, nodes), would have."""
-    return poles(kernel, rule, _closeness(wavenumbers(panels, panels[:, :2])[0]))
+    return poles(kernel, _NODES, _TO_LEGENDRE, _closeness(wavenumbers(panels, panels[:, :2])[0]))
 
 
 def _closeness(ends: w.Array) -> np.ndarray:
@@ -100,7 +88,7 @@ def _closeness(ends: w.Array) -> np.ndarray:
     return np.abs(ends).max(axis=1) / (np.abs(ends[:, 1] - ends[:, 0]) / 2.0)
 
 
-def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, rule: Rule, phase: float) -> Evaluated:
+def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Evaluated:
     """Integrate over each panel, on the axis or off it, its kernel (with dk/ds) of shape (rows, panels, nodes).
 
     The rows are those of the first body, of the second one, and so on.
@@ -114,70 +102,83 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, rule: Rule, phase: fl
     all that is left of the last coefficients: halving doubles it. Where the kernel is little beside what it is less by,
     their difference's rounding is left, and stays.
     """
-    rest = 2.0 * np.abs(kernel @ rule.to_legendre[-2:].T).sum(axis=-1).T
+    rest = 2.0 * np.abs(kernel @ _TO_LEGENDRE[-2:].T).sum(axis=-1).T
     ends, slope = wavenumbers(panels, panels[:, :2])
     closeness = _closeness(ends)
     rounding = (ROUNDING * closeness * np.abs(kernel).max(axis=-1)).T
+    found = poles(kernel, _NODES, _TO_LEGENDRE, closeness)
     turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(seen)
     pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
-    off_axis = np.any(panels[:, :2].imag, axis=1)
-    if not np.any(off_axis):
-        sums = _summed(seen, panels, kernel, rule, pieces)
-    else:
-        shape = (len(panels), len(kernel), seen.r.size)
-        sums = np.empty(shape, dtype=np.complex128), *np.empty((3, *shape))
-        for which in (np.flatnonzero(~off_axis), np.flatnonzero(off_axis)):
-            if which.size:
-                for whole, part in zip(
-                    sums, _summed(seen, panels[which], kernel[:, which], rule, pieces[which]), strict=True
-                ):
-                    whole[which] = part
+    on_axis = (panels[:, :2].imag == 0).all(axis=1)
+    shape = (len(panels), len(kernel), seen.r.size)
+    sums = np.empty(shape, dtype=np.complex128), *np.empty((3, *shape))
+    for which in (np.flatnonzero(on_axis), np.flatnonzero(~on_axis)):
+        for some, summed in _summed(seen, panels[which], kernel[:, which], pieces[which]):
+            for whole, part in zip(sums, summed, strict=True):
+                whole[which[some]] = part
     parts, sizes, covered, swing = sums
     errors = 2.0 * np.maximum(rest, rounding)[..., None] * covered + swing
     halved = 2.0 * (2.0 * rounding + _CANCELLED * np.abs(seen.taken_out))[..., None] * covered
-    gains = np.maximum(errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0)
-    return Evaluated(parts, errors, sizes, covered, gains, kernel, closeness, rule)
+    return Evaluated(
+        parts,
+        errors,
+        sizes,
+        np.maximum(errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0),
+        found,
+        HIDDEN * found.rest.T[..., None] * covered,
+        found.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * closeness),
+    )
 
 
 def _span(seen: Seen) -> float:
     return float(seen.r.max()) + seen.load.reach
 
 
-def _summed(seen: Seen, panels: w.Array, kernel: w.Array, rule: Rule, pieces: np.ndarray) -> tuple[w.Array, ...]:
-    """Return of each panel, all on the axis or all off it, the sums of what `_integrated` returns of its `pieces`."""
-    ends = np.cumsum(pieces)
-    cut, values = (panels, kernel) if ends[-1] == len(panels) else _cut(panels, kernel, rule, pieces)
-    step = max(1, _CHUNK // (rule.count * seen.r.size * len(kernel)))
-    first, sums = 0, list[tuple[w.Array, ...]]()
-    while first < len(panels):
-        low = ends[first] - pieces[first]
-        last = max(int(np.searchsorted(ends, low + step, side="right")), first + 1)
-        some = slice(low, ends[last - 1])
-        found = _integrated(seen, cut[some], values[:, some], rule)
-        if some.stop - low > last - first:
-            found = tuple(np.add.reduceat(one, (ends - pieces)[first:last] - low, axis=0) for one in found)
-        sums.append(found)
-        first = last
-    return sums[0] if len(sums) == 1 else tuple(np.concatenate(part) for part in zip(*sums, strict=True))
+def _summed(
+    seen: Seen, panels: w.Array, kernel: w.Array, pieces: np.ndarray
+) -> Iterator[tuple[np.ndarray, tuple[w.Array, ...]]]:
+    """Yield, for some panels after others, which they are and their sums of what `_integrated` returns.
+
+    All are on the axis or all off it, each cut into so many `pieces`.
+    """
+    if not len(panels):
+        return
+    kinds = [(int(count), np.flatnonzero(pieces == count)) for count in np.unique(pieces)]
+    order = np.concatenate([which for _, which in kinds])
+    cut = np.concatenate([panels[which] if n == 1 else _pieces(panels[which], n) for n, which in kinds])
+    values = np.concatenate([_on_pieces(kernel[:, which], n) for n, which in kinds], axis=1)
+    firsts = np.concatenate([[0], np.cumsum(pieces[order])])
+    step = max(1, _CHUNK // (_COUNT * seen.r.size * len(kernel)))
+    for some in np.split(np.arange(len(order)), np.flatnonzero(np.diff(firsts[:-1] // step)) + 1):
+        low, high = firsts[some[0]], firsts[some[-1] + 1]
+        found = _integrated(seen, cut[low:high], values[:, low:high])
+        if high - low > some.size:
+            found = tuple(np.add.reduceat(one, firsts[some] - low, axis=0) for one in found)
+        yield order[some], found
 
 
-def _cut(panels: w.Array, kernel: w.Array, rule: Rule, pieces: np.ndarray) -> tuple[w.Array, w.Array]:
-    """Cut each panel into equal pieces; return them, and the kernel at their nodes, shape (rows, pieces, nodes)."""
-    of = np.repeat(np.arange(len(panels)), pieces)
-    cut, values, count = panels[of], kernel[:, of], pieces[of]
-    place = np.arange(len(of)) - (np.cumsum(pieces) - pieces)[of]
-    for side in (0, 1):
-        share = (place + side) / count
-        cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
-    for number in np.unique(pieces[pieces > 1]):
-        re, im = np.moveaxis(_pair(kernel[:, pieces == number]) @ rule.spread(int(number)), -2, 0)  # as `products` do
-        values[:, count == number] = (re + 1j * im).reshape(len(kernel), -1, rule.count)
-    return cut, values
+def _pieces(panels: w.Array, count: int) -> w.Array:
+    share = np.linspace(0.0, 1.0, count + 1)
+    return pieced(panels, panels[:, :1] * (1.0 - share) + panels[:, 1:2] * share)
 
 
-def _integrated(
-    seen: Seen, panels: w.Array, kernel: w.Array, rule: Rule
-) -> tuple[w.Array, np.ndarray, np.ndarray, np.ndarray]:
+def _on_pieces(kernel: w.Array, count: int) -> w.Array:
+    """Return a kernel known at its panels' nodes at those of their equal pieces, shape (rows, pieces, nodes)."""
+    if count == 1:
+        return kernel
+    re, im = np.moveaxis(_pair(kernel) @ _spread(count), -2, 0)
+    return (re + 1j * im).reshape(len(kernel), -1, _COUNT)
+
+
+@lru_cache(maxsize=64)
+def _spread(count: int) -> np.ndarray:
+    """Return the matrix from values at a panel's nodes to those at the nodes of its equal pieces."""
+    middles = (2.0 * np.arange(count) + 1.0) / count - 1.0
+    at = (middles[:, None] + _NODES / count).ravel()
+    return (np.polynomial.legendre.legvander(at, _COUNT - 1) @ _TO_LEGENDRE).T
+
+
+def _integrated(seen: Seen, panels: w.Array, kernel: w.Array) -> tuple[w.Array, np.ndarray, np.ndarray, np.ndarray]:
     """Return of each panel, row and radius the integral, its absolute size, that of the waves alone, the rule's error.
 
     The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `weight`: their coefficient of degree m is
@@ -185,29 +186,28 @@ def _integrated(
     meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
     six halves: there their envelope takes the place of the weight. Off the axis both grow by e^{|Im k| span}.
     """
-    load, r, span, count = seen.load, seen.r, _span(seen), len(panels)
+    load, r, span, rows = seen.load, seen.r, _span(seen), len(kernel)
     half = (panels[:, 1] - panels[:, 0]) / 2.0
-    k = nodes(panels, rule)[0]
+    k = nodes(panels)[0].ravel()
     if not np.any(panels[:, :2].imag):
         k, half = k.real, half.real  # Bessel functions of real numbers are cheaper
-    scale = load.transform(k) * (half[:, None] * rule.weights)
-    waves = bessels(seen.orders, k[..., None] * r) * scale[..., None]
-    by_body = kernel.reshape(-1, *waves.shape[:3])
-    size, of_waves = np.abs(by_body)[..., None, :], np.abs(waves)
-    sizes = (size @ of_waves)[..., 0, :]
-    covered = np.broadcast_to(of_waves.sum(axis=-2), sizes.shape)
+    waves = bessels(seen.orders, k[:, None] * r) * load.transform(k)[:, None]
+    waves = waves.reshape(len(seen.orders), half.size, _COUNT, -1) * half[:, None, None]
+    by_body = kernel.reshape(-1, len(seen.orders), half.size, _COUNT)
+    size = np.abs(by_body) * _WEIGHTS
+    both = np.stack([size, np.broadcast_to(_WEIGHTS, size.shape)], axis=-2) @ np.abs(waves)
     ends, slope = wavenumbers(panels, panels[:, :2])
     half = np.abs(half)
     phi = half * np.abs(slope).max(axis=1) * span
-    powers = phi[:, None] ** rule.degrees / rule.odd_factorials
-    swing = (np.abs(by_body @ rule.to_legendre.T) * powers).sum(axis=-1)
+    powers = phi[:, None] ** _DEGREES / _ODD_FACTORIALS
+    swing = np.einsum("brpj,pj->brp", np.abs(by_body @ _TO_LEGENDRE.T), powers)
     swing *= 3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span)
     least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
     at = np.maximum(least, covers) / 2.0
     envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None]
     weight = np.minimum(envelope * bessel_bounds(seen.orders, at[:, None] * r), load.weight)
-    quantities = products(by_body, waves), sizes, covered, swing[..., None] * weight
-    parts, sizes, covered, oscillation = (one.reshape(len(kernel), count, -1).swapaxes(0, 1) for one in quantities)
+    quantities = products(by_body * _WEIGHTS, waves), both[..., 0, :], both[..., 1, :], swing[..., None] * weight
+    parts, sizes, covered, oscillation = (one.reshape(rows, half.size, -1).swapaxes(0, 1) for one in quantities)
     return parts, sizes, covered, oscillation
 
 
