@@ -23,7 +23,7 @@ _PAIR_BOUND = 64 * _EPS * _EPS  # the same for pairs: at most five operations in
 _TINY = 1e-270  # more than underflow takes from a determinant of coordinates that fit single precision
 _HALF = 2.0**62
 _ZERO = 10_000  # stands for the exponent of the lowest bit of 0
-_BLOCK = 1 << 12  # rows whose intermediate values stay in the processor's cache
+_BLOCK = 1 << 13  # rows whose intermediate values stay in the processor's cache
 
 
 def orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:

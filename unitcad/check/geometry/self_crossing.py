@@ -24,7 +24,7 @@ from unitcad.geometry.boxes import box_order, boxes_of, frame_of, meeting_pairs,
 from unitcad.geometry.ticks import Interrupted, Tick
 
 _BLOCK = 1 << 17
-_PAIRS = 1 << 12  # pairs whose corners stay in the processor's cache
+_PAIRS = 1 << 15  # pairs looked at together: enough to outweigh the calls, few enough for the cache
 _OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothing but perhaps touching
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 

@@ -23,6 +23,8 @@ LARGEST = float(np.finfo(np.float32).max)
 SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
 """Coordinates below this are 0 as float32, and are taken for it: even doubles do not hold their products."""
 
+_BLOCK = 1 << 15  # points that stay in the processor's cache
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -88,19 +90,22 @@ def same_place(points: Floats) -> Ints:
 
 
 def _same_places(vertices: Floats, index: Ints, flat: Floats) -> bool:
-    return all(np.array_equal(vertices[:, axis][index], flat[:, axis]) for axis in range(3))
+    blocks = (slice(start, start + _BLOCK) for start in range(0, len(flat), _BLOCK))
+    return all(np.array_equal(vertices.take(index[block], axis=0), flat[block]) for block in blocks)
 
 
 def _mix(bits: NDArray[np.unsignedinteger]) -> NDArray[np.uint64]:
     """Return a 64-bit hash of each row of three integers (multiply and xor-shift, as in splitmix64)."""
-    key = np.zeros(len(bits), np.uint64)
-    for column in range(3):
-        key += bits[:, column]
-        key *= np.uint64(0x9E3779B97F4A7C15)
-        key ^= key >> np.uint64(29)
-        key *= np.uint64(0xBF58476D1CE4E5B9)
-        key ^= key >> np.uint64(32)
-    return key
+    keys = np.zeros(len(bits), np.uint64)
+    for start in range(0, len(bits), _BLOCK):
+        key = keys[start : start + _BLOCK]
+        for column in range(3):
+            key += bits[start : start + _BLOCK, column]
+            key *= np.uint64(0x9E3779B97F4A7C15)
+            key ^= key >> np.uint64(29)
+            key *= np.uint64(0xBF58476D1CE4E5B9)
+            key ^= key >> np.uint64(32)
+    return keys
 
 
 def float32_step(vertices: Floats) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from unitcad.check.geometry.predicates import orient2d, orient3d, sides
 from unitcad.geometry.arrays import Bools, Floats, Ints, cross
 
-_BLOCK = 1 << 12  # pairs whose corners stay in the processor's cache
+_BLOCK = 1 << 13  # pairs whose corners stay in the processor's cache
 
 
 @dataclass(frozen=True)

@@ -73,10 +73,11 @@ def _binary_size(data: memoryview) -> int:
 
 def _mesh(corners: Floats, normals: Floats, findings: list[Finding]) -> Mesh | None:
     """Return the mesh of corners (m, 3, 3); none where one is no float32 number (V001)."""
+    corners = np.ascontiguousarray(corners)
     with np.errstate(over="ignore"):
-        finite = np.isfinite(corners.astype(np.float32, copy=False)).all(axis=(1, 2))
+        finite = np.isfinite(corners.astype(np.float32, copy=False))
     if not finite.all():
-        bad = np.flatnonzero(~finite)
+        bad = np.flatnonzero(~finite.all(axis=(1, 2)))
         findings.append(faces_not_finite(len(bad), (Location(face=int(i)) for i in bad)))
         return None
     vertices, faces = weld_exact(corners)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -150,7 +150,7 @@ def _relate(
     pairs = pairs[sound[pairs].all(axis=1)]
     one, other = pairs.T
     touch = np.isin(one * n + other, np.sort(touching.astype(np.int64), axis=1) @ np.array([n, 1]))
-    groups = _faces_by_shell(topology.shells, n)
+    faces_of = _faces_by_shell(topology.shells, n)
     sides = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
     least = np.minimum(np.abs(volumes[one]), np.abs(volumes[other]))
     close = np.flatnonzero(touch & (sides.prod(axis=1) > _SHARE * least))
@@ -161,7 +161,7 @@ def _relate(
         a, b = pairs[at].tolist()
         if a != before:  # pairs are sorted: what comes before it comes no more
             before, solids = a, {i: solid for i, solid in solids.items() if i >= a}
-        common = _shared(topology, groups, a, b, solids)
+        common = _shared(topology, faces_of, a, b, solids)
         if volumes[a] * volumes[b] > 0 and common > _SHARE * least[at]:
             overlaps.append((a, b))
         elif common > (1 - _SHARE) * least[at]:  # a cavity that touches the wall
@@ -170,8 +170,8 @@ def _relate(
         within = (low[inner] >= low[outer]).all(axis=1) & (high[inner] <= high[outer]).all(axis=1)
         for at in np.flatnonzero(within & ~touch).tolist():
             tick()
-            point = vertices[faces[groups[inner[at]][0], 0]]
-            depth[inner[at]] += winding_number(vertices, faces[groups[outer[at]]], point) != 0
+            point = vertices[faces[faces_of(inner[at])[0], 0]]
+            depth[inner[at]] += winding_number(vertices, faces[faces_of(outer[at])], point) != 0
 
 
 def _where(topology: Topology, *shells: int) -> Location:
@@ -181,19 +181,21 @@ def _where(topology: Topology, *shells: int) -> Location:
     return at_region(topology.kept[np.isin(topology.shells, which)], middle)
 
 
-def _faces_by_shell(labels: Ints, n: int) -> list[Ints]:
+def _faces_by_shell(labels: Ints, n: int) -> Callable[[int], Ints]:
+    """Return a function that gives the faces of a shell."""
     order = np.argsort(labels, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(labels, minlength=n))[:-1])
+    ends = np.cumsum(np.bincount(labels, minlength=n))
+    return lambda shell: order[ends[shell - 1] if shell else 0 : ends[shell]]
 
 
-def _shared(topology: Topology, groups: list[Ints], a: int, b: int, solids: dict[int, Manifold]) -> float:
+def _shared(topology: Topology, faces_of: Callable[[int], Ints], a: int, b: int, solids: dict[int, Manifold]) -> float:
     """Return the volume that two shells share, mm3, by manifold3d's boolean; `solids` keeps what it has made.
 
     Shells that face inwards are turned first; one that manifold3d refuses gives 0 (its own faults are reported).
     """
     for i in (a, b):
         if i not in solids:
-            used, local = np.unique(topology.mesh.faces[groups[i]], return_inverse=True)
+            used, local = np.unique(topology.mesh.faces[faces_of(i)], return_inverse=True)
             local = local.reshape(-1, 3)
             solids[i] = solid_of(topology.mesh.vertices[used], local[:, ::-1] if topology.volumes[i] < 0 else local)
     return (solids[a] ^ solids[b]).volume()
