@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
+from msgspec.structs import replace
 
 from unitcad.accuracy.level_scores import score_tables
 from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Summary, Table, stars
