@@ -85,17 +85,20 @@ def _other_lengths(own: Section, shapes: Section | None) -> list[str]:
     """Return which lengths of a unit are not as in a measured one, against the nearest of its possible shapes."""
     by_shape = []
     assert shapes is not None  # every unit of the catalogue's table has a section
+    walls = _walls(own, 0)
     for i in range(len(np.atleast_1d(shapes.cavity_radius))):
-        radii, measured = (
-            np.diff(np.append(one.cavity_radius[k], one.outer_radii[k])) for one, k in ((own, 0), (shapes, i))
-        )
         of_shape = {
-            "walls": np.any(np.abs(np.subtract(radii, measured)) > _SAME),
+            "walls": np.any(np.abs(walls - _walls(shapes, i)) > _SAME),
             "caps": np.any(np.abs(own.caps[0] - shapes.caps[i]) > _SAME),
             "height of the cavity": abs(own.core_height[0] - shapes.core_height[i]) > _SAME,
         }
         by_shape.append([name for name, other in of_shape.items() if other])
     return min(by_shape, key=len)
+
+
+def _walls(section: Section, row: int) -> np.ndarray:
+    """Return the walls of a row of a section, from the inside out, m."""
+    return np.diff(np.append(section.cavity_radius[row], section.outer_radii[row]))
 
 
 def printed_besides(design: str, layers: tuple[str, ...]) -> dict[str, Any] | None:
