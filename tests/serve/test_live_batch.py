@@ -51,10 +51,10 @@ def test_a_row_opens_in_another_tab(running: Any, batch: Path) -> None:
         visit = Live(running, own)
         with visit.context.expect_page() as opened:
             visit.page.locator("#variants tbody th a").last.click(modifiers=["Control"])
-        opened.value.wait_for_function("() => /passed/.test(document.querySelector('#state').textContent)")
+        opened.value.locator("#state", has_text="passed").wait_for()
         assert own.token not in opened.value.url
         opened.value.reload()
-        opened.value.wait_for_function("() => /passed/.test(document.querySelector('#state').textContent)")
+        opened.value.locator("#state", has_text="passed").wait_for()
         visit.close()
 
 
