@@ -159,7 +159,7 @@ def replace_all(folder: Path, contents: Mapping[str, bytes], last: str, former: 
             (inside / name).replace(folder / name)
 
 
-def write_new(path: Path, content: bytes, *, sync: bool = False) -> None:
+def write_new(path: str | os.PathLike[str], content: bytes, *, sync: bool = False) -> None:
     """Make a file that is not there yet; none is left where that fails.
 
     Raises FileExistsError, also for a link, or OSError.
@@ -174,7 +174,8 @@ def write_new(path: Path, content: bytes, *, sync: bool = False) -> None:
         except BaseException:
             with contextlib.suppress(OSError):
                 file.close()
-            path.unlink(missing_ok=True)
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(path)
             raise
 
 

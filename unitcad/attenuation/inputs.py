@@ -112,7 +112,7 @@ class TissueLayer(msgspec.Struct, frozen=True):
     damping: Quantity
 
 
-class EstimateInput(msgspec.Struct, frozen=True):
+class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
     """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known).
 
     `passes`: how often the wave from motor to skin passes the border between the layers; `drive`: how the motor's force

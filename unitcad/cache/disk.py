@@ -121,7 +121,7 @@ class DiskStore:
         except (OSError, UnitcadError):
             raise self._missing(sha256) from None
 
-    def place(self, sha256: str, target: Path) -> None:
+    def place(self, sha256: str, target: str | os.PathLike[str]) -> None:
         """Make a hard link at `target`; a copy where links fail (other disk, no right, no support)."""
         if not self.has(sha256):
             raise self._missing(sha256)
@@ -133,7 +133,7 @@ class DiskStore:
             os.link(name, target)
             return
         except FileNotFoundError:
-            if not target.parent.is_dir():
+            if not Path(target).parent.is_dir():
                 raise
             raise self._missing(sha256) from None
         except OSError as error:
@@ -144,7 +144,7 @@ class DiskStore:
         if full:
             # The file has as many links as the file system allows: a fresh one takes its place.
             with contextlib.suppress(OSError):
-                self._write(Path(name), target.read_bytes(), shared=True)
+                self._write(Path(name), Path(target).read_bytes(), shared=True)
                 self._verified[sha256] = _signature(name)
 
     def peek(self, key: str) -> Any:

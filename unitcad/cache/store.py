@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Protocol
 
 from unitcad.errors import UnitcadError
@@ -48,7 +48,7 @@ class Store(Protocol):
         """Return content by its SHA-256. Raises MissingContent."""
         ...
 
-    def place(self, sha256: str, target: Path) -> None:
+    def place(self, sha256: str, target: str | os.PathLike[str]) -> None:
         """Put content at `target`, which does not exist yet. Raises MissingContent or OSError."""
         ...
 
@@ -106,7 +106,7 @@ class MemoryStore:
             raise MissingContent(f"content {sha256[:12]} is not here")
         return self.contents[sha256]
 
-    def place(self, sha256: str, target: Path) -> None:
+    def place(self, sha256: str, target: str | os.PathLike[str]) -> None:
         write_new(target, self.content(sha256), sync=True)
 
 

@@ -36,6 +36,10 @@ def grip_of(moulds: MouldSet) -> str:
 
 def tongue_prop(moulds: MouldSet) -> Prop | None:
     """Return the pad under the tongues' grips, one on each side that tongues leave to; None without tongues."""
+    return moulds.once("tongue prop", lambda: _tongue_prop(moulds))
+
+
+def _tongue_prop(moulds: MouldSet) -> Prop | None:
     lay, exit = moulds.plan.layout, moulds.dimensions.exit
     if not exit or not moulds.plan.of_kind("tongue"):
         return None

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import count
+from typing import Any
 
 import msgspec
 
@@ -21,6 +21,8 @@ from unitcad.moulds.plan import Step
 from unitcad.shape.body import Body
 from unitcad.text import markdown, number, spaced
 
+_TYPED = msgspec.json.Decoder(Procedure)
+_NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=lambda text: float(f"{float(text):.9g}"))
 UNPRINTED = "Nothing of this tooling has been printed yet: every clearance is a choice with a check behind it."
 
 
@@ -36,10 +38,12 @@ def files(procedure: Procedure) -> dict[str, str]:
 
 def to_json(procedure: Procedure) -> str:
     """Write the procedure as JSON: the same records; numbers to nine significant digits."""
-    # json refuses what is not finite; msgspec is the faster reader, and json's own indenting is not compiled.
-    exact = json.dumps(msgspec.to_builtins(procedure), allow_nan=False)
-    data = msgspec.json.Decoder(float_hook=lambda text: float(f"{float(text):.9g}")).decode(exact)
-    return msgspec.json.format(msgspec.json.encode(data), indent=1).decode() + "\n"
+    exact = msgspec.json.encode(procedure)
+    try:
+        _TYPED.decode(exact)
+    except msgspec.ValidationError as error:  # msgspec writes what is not finite as null
+        raise ValueError(f"a number of the procedure is not finite: {error}") from None
+    return msgspec.json.format(msgspec.json.encode(_NINE_DIGITS.decode(exact)), indent=1).decode() + "\n"
 
 
 def to_markdown(procedure: Procedure) -> str:

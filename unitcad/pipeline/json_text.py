@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
 _FAST = msgspec.json.Encoder()
-_STRICT = json.JSONEncoder(allow_nan=False)
 
 
 def json_bytes(data: Mapping[str, Any]) -> bytes:
@@ -31,6 +29,21 @@ def json_bytes(data: Mapping[str, Any]) -> bytes:
 
 def _line(value: Any) -> bytes:
     text = _FAST.encode(value)
-    if b"null" in text:  # msgspec writes what is not finite as null
-        _STRICT.encode(value)
+    if b"null" in text and not finite(value):  # msgspec writes what is not finite as null
+        raise ValueError(f"a number that is not finite in {value!r:.200}")
     return text
+
+
+def finite(value: Any) -> bool:
+    """Tell whether every number in lists and dicts is finite."""
+    left = [value]
+    while left:
+        one = left.pop()
+        kind = type(one)
+        if kind is dict:
+            left.extend(one.values())
+        elif kind is list or kind is tuple:
+            left.extend(one)
+        elif isinstance(one, float) and one - one != 0.0:
+            return False
+    return True

@@ -105,6 +105,13 @@ def _units(variant: EstimateInput, rows: np.ndarray) -> Units:
     )
 
 
+@lru_cache(maxsize=4)
+def _control_corners(variant: EstimateInput, layer: int) -> Units:
+    """Return the corners of the control of a layer, which every model's ratio reads."""
+    return corners(variant).control(layer)
+
+
+@lru_cache(maxsize=4)
 def unknown(variant: EstimateInput) -> str:
     """Return why there can be no number: the first input that is not known; empty if all are."""
     for (name, field), quantity in _inputs(variant):
@@ -113,13 +120,14 @@ def unknown(variant: EstimateInput) -> str:
     return ""
 
 
-def ranged(variant: EstimateInput) -> list[str]:
+@lru_cache(maxsize=4)
+def ranged(variant: EstimateInput) -> tuple[str, ...]:
     """Return the assumptions of the inputs that are known as a range only: their result is a range without a value."""
-    return [
+    return tuple(
         f"{name} {field}: {quantity.note}"
         for (name, field), quantity in _inputs(variant)
         if quantity.value is None and quantity.known
-    ]
+    )
 
 
 def spread(variant: EstimateInput, predict: Callable[[Units], Any]) -> dict[str, Any]:
@@ -197,10 +205,11 @@ def _ratio(variant: EstimateInput, model: str, index: int, constants: Mapping[st
     name = variant.layers[index].material
     if model in ("fitted", "bush"):
         path = path_of(model, constants)
-        return {"control": name, **spread(variant, lambda u: path(u) / path(u.control(index)))}
+        return {"control": name, **spread(variant, lambda u: path(u) / path(_control_corners(variant, index)))}
     along = cf.paper_path if model == "paper" else cf.consistent_path
     by_wave = {
-        wave: spread(variant, lambda u, wave=wave: along(u, wave) / along(u.control(index), wave)) for wave in _WAVES
+        wave: spread(variant, lambda u, wave=wave: along(u, wave) / along(_control_corners(variant, index), wave))
+        for wave in _WAVES
     }
     return {"control": name, **by_wave["s"], "wave": "s", "p": by_wave["p"]}
 

@@ -1,0 +1,54 @@
+"""JSON of results: a number that is not finite is refused, wherever it stands; None is written as null."""
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from unitcad.casting.procedure import Procedure, procedure
+from unitcad.casting.written import to_json
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.json_text import json_bytes
+from unitcad.validation.load import load
+
+DATA: dict[str, Any] = {"none": None, "list": [1, {"deep": [None, 0.5]}], "map": {"a": {"b": 1e-300, "c": None}}}
+
+
+def test_what_is_written_is_what_json_reads_back() -> None:
+    assert json.loads(json_bytes(DATA)) == DATA
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", [{"x": 0}, {"x": [0]}, {"x": {"y": [None, 0]}}, {"x": [{"y": (0,)}]}])
+def test_a_number_that_is_not_finite_is_refused(number: float, place: dict[str, Any]) -> None:
+    def filled(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: filled(each) for key, each in value.items()}
+        if isinstance(value, (list, tuple)):
+            return type(value)(filled(each) for each in value)
+        return number if value == 0 else value
+
+    with pytest.raises(ValueError, match="not finite"):
+        json_bytes({**DATA, **filled(place)})
+
+
+@pytest.fixture(scope="module")
+def made() -> Procedure:
+    return procedure(MouldSet(load("encapsulating")), [300.0, 500.0], 30000.0)
+
+
+def test_a_procedure_is_written_as_its_records(made: Procedure) -> None:
+    data = json.loads(to_json(made))
+    assert data["earliest_finish_min"] == float(f"{made.earliest_finish_min:.9g}")
+    assert [pour["part_a_g"] for pour in data["pours"]] == [float(f"{pour.part_a_g:.9g}") for pour in made.pours]
+
+
+def test_a_procedure_with_a_number_that_is_not_finite_is_refused(made: Procedure) -> None:
+    for wrong in (
+        replace(made, bench_min=math.nan),
+        replace(made, pours=(replace(made.pours[0], part_a_g=math.inf), *made.pours[1:])),
+    ):
+        with pytest.raises(ValueError, match="not finite"):
+            to_json(wrong)
