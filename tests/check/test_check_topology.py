@@ -102,7 +102,7 @@ def test_pinch_by_both_ways() -> None:
     across = mesh_edges.opposite(edges, 3 * len(faces))
     assert mesh_edges.pinched_closed(faces, across, 16).tolist() == [7]
     assert mesh_edges.pinched_open(faces, edges, 16).tolist() == [7]
-    assert mesh_edges.shells_of(np.zeros((16, 3)), faces, edges).max() == 1
+    assert mesh_edges.shells_of(faces, edges, mesh_edges.turns_of(np.zeros((16, 3)), faces, edges)).max() == 1
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from unitcad.check.geometry import edges as mesh_edges
-from unitcad.check.geometry.edges import Edges
+from unitcad.check.geometry.edges import Edges, Turns
 from unitcad.check.geometry.predicates import orient3d
 from unitcad.check.geometry.topology import Topology, max_side_squared
 from unitcad.check.geometry.triangle_mesh import area_vectors, float32_steps
@@ -51,15 +51,12 @@ def wide(a: Floats, b: Floats) -> Bools:
     return high
 
 
-def through_edges(vertices: Floats, faces: Ints, edges: Edges, shells: Ints) -> Ints:
+def through_edges(turns: Turns | None, shells: Ints) -> Ints:
     """Return edges round which the winding number of one shell takes three values or more."""
-    if edges.closed:
+    if turns is None:
         return np.empty(0, np.int64)
-    many = np.flatnonzero((edges.size > 3) & mesh_edges.balanced(faces, edges))
-    if not len(many):
-        return many
-    half, group, ends, turn = mesh_edges.around(vertices, faces, edges, many)
-    shell = shells[half // 3]
+    group, ends, turn = turns.group, turns.ends, turns.turn
+    shell = shells[turns.half // 3]
     order = np.lexsort((turn, shell, group))
     group, ends, turn, shell = group[order], ends[order], turn[order], shell[order]
     own = np.append(True, (group[1:] != group[:-1]) | (shell[1:] != shell[:-1]))
@@ -74,7 +71,7 @@ def through_edges(vertices: Floats, faces: Ints, edges: Edges, shells: Ints) -> 
     np.minimum.at(low, of, level[between])
     np.maximum.at(high, of, level[between])
     evenly = np.add.reduceat(change, start) == 0
-    return many[np.unique(group[start][(high - low > 1) & evenly])]
+    return turns.many[np.unique(group[start][(high - low > 1) & evenly])]
 
 
 def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> Ints:

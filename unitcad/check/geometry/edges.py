@@ -30,6 +30,22 @@ class Edges:
     closed: bool
 
 
+@dataclass(frozen=True)
+class Turns:
+    """The half-edges of the edges `many` by edge and angle, and what is known of each.
+
+    `group` is the place of its edge in `many`, `ends` whether the solid ends at its face, `turn` the rank of its angle,
+    the same for faces in one plane. By angle about the edge, the solid begins at faces that run from its high vertex to
+    its low one and ends at the others.
+    """
+
+    many: Ints
+    half: Ints
+    group: Ints
+    ends: Bools
+    turn: Ints
+
+
 def half_edges(faces: Ints) -> tuple[Ints, Ints]:
     """Return start and end vertex of every half-edge, (3 m,) each."""
     start = np.ascontiguousarray(faces).reshape(-1)
@@ -125,15 +141,15 @@ def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
     return np.flatnonzero(several).astype(np.int32)
 
 
-def shells_of(vertices: Floats, faces: Ints, edges: Edges) -> Ints:
+def shells_of(faces: Ints, edges: Edges, turns: Turns | None) -> Ints:
     """Return the shell of each face, numbered by their first face.
 
-    Faces are joined across edges of two faces, and in pairs across edges of four, six and so on.
+    Faces are joined across edges of two faces, and in pairs across edges of four, six and so on, by their `turns`.
     """
     pairs = edges.first[edges.size == 2]
     left, right = edges.order[pairs], edges.order[pairs + 1]
-    if not edges.closed and len(many := np.flatnonzero((edges.size > 2) & balanced(faces, edges))):
-        one, other = _paired(vertices, faces, edges, many)
+    if turns is not None:
+        one, other = _paired(edges, turns)
         left, right = np.concatenate([left, one]), np.concatenate([right, other])
     return components(len(faces), left // 3, right // 3)
 
@@ -144,15 +160,17 @@ def balanced(faces: Ints, edges: Edges) -> Bools:
     return 2 * np.add.reduceat(along.astype(np.int32), edges.first) == edges.size if len(along) else along
 
 
-def around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Ints, Ints, Bools, Ints]:
-    """Return the half-edges of the edges `many` by edge and angle, and what is known of each.
+def turns_of(vertices: Floats, faces: Ints, edges: Edges) -> Turns | None:
+    """Return the turns at the edges of four, six and so on faces that are balanced; None where there are none."""
+    if edges.closed:
+        return None
+    many = np.flatnonzero((edges.size > 2) & balanced(faces, edges))
+    return _around(vertices, faces, edges, many) if len(many) else None
 
-    That is the place of its edge in `many`, whether the solid ends at its face, and its turn: the rank of its angle,
-    the same for faces in one plane. By angle about the edge, the solid begins at faces that run from its high vertex to
-    its low one and ends at the others.
-    """
+
+def _around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> Turns:
     size = edges.size[many]
-    group = np.repeat(np.arange(len(many)), size)
+    group = np.repeat(np.arange(len(many), dtype=np.int32), size)
     starts = np.cumsum(size) - size
     half = edges.order[edges.first[many][group] + np.arange(len(group)) - starts[group]]
     face, side = half // 3, half % 3
@@ -172,17 +190,17 @@ def around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Int
     angle, half, ends = angle[order], half[order], ends[order]
     fresh = np.diff(angle, prepend=-np.inf) > _SAME_ANGLE
     fresh[starts] = True
-    return half, group, ends, np.cumsum(fresh) - 1
+    return Turns(many, half, group, ends, np.cumsum(fresh, dtype=np.int32) - np.int32(1))
 
 
-def _paired(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Ints, Ints]:
-    """Return half-edges at the balanced edges `many` in pairs that have the solid between them.
+def _paired(edges: Edges, turns: Turns) -> tuple[Ints, Ints]:
+    """Return half-edges at the edges of `turns` in pairs that have the solid between them.
 
     Where it begins twice before it ends (solids that overlap), first begun is first ended, so that faces in one place
     need no order. Where it begins and ends in one plane, one solid ends and the next one begins.
     """
-    half, group, ends, turn = around(vertices, faces, edges, many)
-    size = edges.size[many]
+    half, group, ends, turn = turns.half, turns.group, turns.ends, turns.turn
+    size = edges.size[turns.many]
     starts = np.cumsum(size) - size
     place = np.arange(len(group)) - starts[group]
     order = np.lexsort((half, ~ends, turn, group))

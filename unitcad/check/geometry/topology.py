@@ -9,7 +9,7 @@ import numpy as np
 
 from unitcad.check.geometry import edges as mesh_edges
 from unitcad.check.geometry import volumes
-from unitcad.check.geometry.edges import Edges
+from unitcad.check.geometry.edges import Edges, Turns
 from unitcad.check.geometry.seams import connected, join, t_junctions
 from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
 from unitcad.geometry.arrays import Bools, Floats, Ints, extent, extents
@@ -35,9 +35,10 @@ class OpenEdges:
 class Topology:
     """A mesh without degenerate faces whose open edges are welded, and what follows from that.
 
-    `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2; `shells` labels faces. `stored` are
-    the faces before welding moved any, with vertices in one place joined. `low` and `high`: each shell's box, mm;
-    `volumes`: what it encloses, mm3, below zero where its faces look inwards; `closed`: whether it has an inside.
+    `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2; `shells` labels faces,
+    `turns` has those round edges of four and more. `stored` are the faces before welding moved any, with vertices in
+    one place joined. `low` and `high`: each shell's box, mm; `volumes`: what it encloses, mm3, below zero where its
+    faces look inwards; `closed`: whether it has an inside.
     `repeated` are the file's faces that use a vertex twice, `unused` counts vertices that no face uses, `opened` has
     the edges of one face, if any. `pinched` are vertices of several fans, `twice` faces with the vertices of another
     one, `unbalanced` edges of an even number of faces along which more run one way than the other.
@@ -46,6 +47,7 @@ class Topology:
     mesh: Mesh
     kept: Ints
     edges: Edges
+    turns: Turns | None
     shells: Ints
     n_shells: int
     areas: Floats
@@ -83,7 +85,9 @@ class Topology:
         if self.stored is self.mesh.faces:
             return self
         edges = mesh_edges.edges_of(self.stored, len(self.mesh.vertices))
-        return replace(self, mesh=replace(self.mesh, faces=self.stored), edges=edges, areas=self.stored_areas)
+        return replace(
+            self, mesh=replace(self.mesh, faces=self.stored), edges=edges, turns=None, areas=self.stored_areas
+        )
 
 
 def topology_of(mesh: Mesh, tick: Tick) -> Topology:
@@ -110,7 +114,8 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
         pinched = mesh_edges.pinched_open(faces, edges, len(vertices))
         twice = _duplicates(faces)
     tick()
-    shells = mesh_edges.shells_of(vertices, faces, edges)
+    turns = mesh_edges.turns_of(vertices, faces, edges)
+    shells = mesh_edges.shells_of(faces, edges, turns)
     low, high = _boxes(vertices, faces, shells)
     volume = volumes.signed(vertices, faces, areas, shells, len(low))
     closed = volumes.closed(faces, edges, shells, len(low))
@@ -124,6 +129,7 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
         replace(mesh, faces=faces, normals=None),
         kept,
         edges,
+        turns,
         shells,
         len(low),
         areas,

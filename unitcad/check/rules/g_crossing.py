@@ -9,7 +9,7 @@ import numpy as np
 from unitcad.check.detail import detail
 from unitcad.check.findings import Finding, Location, counted, point
 from unitcad.check.geometry.coverings import folded_edges, kinds, through_edges
-from unitcad.check.geometry.edges import edges_of
+from unitcad.check.geometry.edges import edges_of, turns_of
 from unitcad.check.geometry.self_crossing import Crossings, Faces, facing, joined
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import float32_step, same_place
@@ -144,7 +144,7 @@ def _places(
 def _along_edges(topology: Topology) -> Iterator[Finding]:
     """Apply G008 and G009 along edges. Vertices in one place are one, whether or not the file lists them apart."""
     mesh, edges, faces = topology.mesh, topology.edges, topology.mesh.faces
-    kept, shells, areas = topology.kept, topology.shells, topology.areas
+    kept, shells, areas, turns = topology.kept, topology.shells, topology.areas, topology.turns
     if mesh.indexed:
         place = same_place(mesh.vertices)
         if not np.array_equal(place, np.arange(len(place))):
@@ -152,8 +152,9 @@ def _along_edges(topology: Topology) -> Iterator[Finding]:
             whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
             faces, kept, shells, areas = faces[whole], kept[whole], shells[whole], areas[whole]
             edges = edges_of(faces, len(mesh.vertices))
+            turns = turns_of(mesh.vertices, faces, edges)
     for rule, which, text in (
-        (G008, through_edges(mesh.vertices, faces, edges, shells), "at which a shell passes through itself"),
+        (G008, through_edges(turns, shells), "at which a shell passes through itself"),
         (G009, folded_edges(mesh.vertices, faces, edges, areas), "at which two faces fold onto each other"),
     ):
         if len(which):
