@@ -8,8 +8,9 @@ sampled as it varies, not as the waves do.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Protocol
 
 import numpy as np
 from scipy.special import factorial2
@@ -56,20 +57,37 @@ class Seen(Protocol):
         ...
 
 
-class Evaluated(NamedTuple):
-    """Of each panel, row and radius: the integral, a bound of its error, its absolute size.
+@dataclass(frozen=True)
+class Evaluated:
+    """Of each panel, row and radius: the integral, a bound of its error, its absolute size, that of the waves alone.
 
-    gains: of each panel, by how much halving it lessens the largest part of its error; poles: the one of each panel;
-    hidden (panels, rows, radii): what a detour around it may leave out; blurred: where that may be rounding's alone.
+    gains: of each panel, by how much halving it lessens the largest part of its error; kernel (with dk/ds): what was
+    integrated; closeness: the wavenumber over half of what a panel covers of it. Poles are looked for when asked: where
+    no panel is bad, nobody does.
     """
 
     parts: np.ndarray
     errors: np.ndarray
     sizes: np.ndarray
+    covered: np.ndarray
     gains: np.ndarray
-    poles: Poles
-    hidden: np.ndarray
-    blurred: np.ndarray
+    kernel: w.Array
+    closeness: np.ndarray
+
+    @cached_property
+    def poles(self) -> Poles:
+        """The pole of each panel."""
+        return poles(self.kernel, _NODES, _TO_LEGENDRE, self.closeness)
+
+    @cached_property
+    def hidden(self) -> np.ndarray:
+        """What a detour around each panel's pole may leave out, shape (panels, rows, radii)."""
+        return HIDDEN * self.poles.rest.T[..., None] * self.covered
+
+    @property
+    def blurred(self) -> np.ndarray:
+        """Where what a detour may leave out may be rounding's alone."""
+        return self.poles.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * self.closeness)
 
 
 def nodes(panels: w.Array) -> tuple[w.Array, w.Array]:
@@ -106,7 +124,6 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
     ends, slope = wavenumbers(panels, panels[:, :2])
     closeness = _closeness(ends)
     rounding = (ROUNDING * closeness * np.abs(kernel).max(axis=-1)).T
-    found = poles(kernel, _NODES, _TO_LEGENDRE, closeness)
     turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(seen)
     pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
     on_axis = (panels[:, :2].imag == 0).all(axis=1)
@@ -119,15 +136,8 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
     parts, sizes, covered, swing = sums
     errors = 2.0 * np.maximum(rest, rounding)[..., None] * covered + swing
     halved = 2.0 * (2.0 * rounding + _CANCELLED * np.abs(seen.taken_out))[..., None] * covered
-    return Evaluated(
-        parts,
-        errors,
-        sizes,
-        np.maximum(errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0),
-        found,
-        HIDDEN * found.rest.T[..., None] * covered,
-        found.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * closeness),
-    )
+    gains = np.maximum(errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0)
+    return Evaluated(parts, errors, sizes, covered, gains, kernel, closeness)
 
 
 def _span(seen: Seen) -> float:

@@ -116,6 +116,8 @@ class Stack:
 
     def without_empty_layers(self) -> Stack:
         """Return the same stack without layers of no thickness, which change nothing."""
+        if all(layer.thickness > 0 for layer in self.layers):
+            return self  # and what it knows of its materials
         return Stack([layer for layer in self.layers if layer.thickness > 0], self.half_space, self.least_loss)
 
     def with_loss(self, tan_delta: float) -> Stack:

@@ -67,9 +67,9 @@ def decaying_root(squared: Array) -> Array:
 
     Below that axis it goes on from there, so that a wavenumber may leave the real axis either way.
     """
-    left = squared.real < 0
-    root = np.sqrt(np.where(left, -squared, squared))
-    return np.where(left, 1j * root, root)
+    root = np.sqrt(squared)
+    below = (squared.real < 0) & np.signbit(squared.imag)
+    return np.where(below, -root, root) if np.any(below) else root
 
 
 def rates(material: Material, k: Array) -> tuple[Array, Array]:
