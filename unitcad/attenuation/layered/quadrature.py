@@ -239,4 +239,6 @@ def products(kernel: w.Array, waves: w.Array) -> w.Array:
 
 def _pair(values: w.Array) -> np.ndarray:
     """Return the real and the imaginary part, one more axis before the last."""
-    return np.stack([values.real, values.imag], axis=-2)
+    pair = np.empty((*values.shape[:-1], 2, values.shape[-1]))
+    pair[..., 0, :], pair[..., 1, :] = values.real, values.imag
+    return pair
