@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from scipy import special
 
+from unitcad.attenuation.layered import waves as w
+from unitcad.attenuation.layered.detours import poles
 from unitcad.attenuation.layered.integral import Body, Problem
 from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.path import halved_towards
+from unitcad.attenuation.layered.path import from_origin, halved_towards
 from unitcad.attenuation.layered.quadrature import evaluate, nodes
 from unitcad.attenuation.layered.rheology import LossFactor
 
@@ -65,6 +67,25 @@ def test_the_kernel_is_the_same_in_chunks(monkeypatch, chunk):
     whole = problem.kernel(k)
     monkeypatch.setattr("unitcad.attenuation.layered.integral._MOST_SAMPLES", chunk)
     assert np.allclose(problem.kernel(k), whole, rtol=1e-12, atol=0.0)
+
+
+def test_panels_are_longer_beyond_the_waves():
+    """Waves end at 100 /m, the last pole may lie at 240: panels of 20, then of 80, and as long as they are far."""
+    soft, hard = w.Material(1e4 + 1e3j, 0.01, 100.0**2 + 0j), w.Material(1e9 + 1e7j, 0.3, 144.0 - 1j)
+    panels = from_origin(240.0, 500.0, 1e-3, (soft, hard))[:, :2].real
+    ends = [0, 20, 40, 60, 80, 100, 120, 160, 240, 480, 500]
+    assert panels[panels[:, 1] >= 20, 1] == pytest.approx(ends[1:])
+    assert np.all(panels[1:, 0] == panels[:-1, 1])
+
+
+def test_poles_are_looked_for_only_where_a_panel_is_bad(monkeypatch):
+    medium = LayeredMedium([Layer(4e-3, 1000, 9e3, 0.49, LossFactor(0.5))], HalfSpace(1000, 9e4, 0.49, LossFactor(0.5)))
+    calls = []
+    monkeypatch.setattr("unitcad.attenuation.layered.quadrature.poles", lambda *args: calls.append(0) or poles(*args))
+    medium.response(UniformDisc(3.5e-3), 785.0, [1e-3, 30e-3], rtol=1e-2)
+    assert not calls
+    medium.response(UniformDisc(3.5e-3), 785.0, [1e-3, 30e-3], rtol=1e-10)
+    assert calls
 
 
 def test_panels_are_halved_towards_their_poles():

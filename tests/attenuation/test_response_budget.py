@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from unitcad.accuracy.extreme_responses import LEAST_GAIN
+from unitcad.accuracy.hankel import DISC, RADII, cases
 from unitcad.accuracy.random_media import trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.loads import Point, UniformDisc
@@ -86,6 +87,15 @@ def test_a_tighter_rtol_takes_the_detours_of_a_looser_one(kind, seed):
     ]
     errors = [response.error for response in found]
     assert all(tight <= LEAST_GAIN * min(errors[:i]) for i, tight in enumerate(errors) if i)
+
+
+def test_the_forearm_takes_few_wavenumbers():
+    """466 at rtol 1e-3 when the panels between the last wave and the last pole were as long as the others."""
+    case = cases()[0]
+    found = {rtol: case.medium.response(DISC, case.omega, RADII, rtol=rtol) for rtol in (1e-3, 1e-9)}
+    assert found[1e-3].wavenumbers < 400
+    off = np.max(np.abs(found[1e-3].u_z - found[1e-9].u_z))
+    assert off <= found[1e-3].error + found[1e-9].error <= 1e-3 * found[1e-3].largest
 
 
 @pytest.mark.parametrize("seed", [9104, 9116, 9121])

@@ -24,7 +24,7 @@ def bessel(order: int, x: Any) -> Any:
 def bessels(orders: tuple[int, ...], x: Any) -> Any:
     """Return J of each of the orders 0, 1 or 2 at real x >= 0 or complex x, shape (orders,) + x.shape."""
     if np.iscomplexobj(x):
-        return np.stack([special.jv(order, x) for order in orders])
+        return np.array([special.jv(order, x) for order in orders])
     zeroth, first = special.j0(x), special.j1(x)
     values = {0: zeroth, 1: first}
     if 2 in orders:
@@ -35,7 +35,7 @@ def bessels(orders: tuple[int, ...], x: Any) -> Any:
             series = (1.0 + series) * -quarter / (m * (m + 2.0))
         with np.errstate(divide="ignore", invalid="ignore"):
             values[2] = np.where(x < 1.0, quarter / 2.0 * (1.0 + series), 2.0 * first / x - zeroth)
-    return np.stack([values[order] for order in orders])
+    return np.array([values[order] for order in orders])
 
 
 _ABOVE_ASYMPTOTE = np.array([1.0, 1.035, 1.089])

@@ -184,7 +184,8 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         if not np.all(np.isfinite(found.parts)):
             raise overflow(bare.bodies[0].omega)
         count += k.size
-        whole, off = np.abs(known + total + found.parts.sum(0)), quadrature + found.errors.sum(0)
+        parts, errors = found.parts.sum(0), found.errors.sum(0)
+        whole, off = np.abs(known + total + parts), quadrature + errors
         wanted = tolerance(float(np.max(whole)) or 1.0)
         done += pending.shape[0]
         limit = _PANELS_SHARE * wanted / max(done, 1)
@@ -200,8 +201,8 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         good = ~(bad | dropped)
         whole_round = bool(np.all(good))
         kept = slice(None) if whole_round else good
-        total = total + found.parts[kept].sum(0)
-        quadrature += found.errors[kept].sum(0)
+        total = total + (parts if whole_round else found.parts[kept].sum(0))
+        quadrature += errors if whole_round else found.errors[kept].sum(0)
         gained += float(found.gains[kept].sum())
         size += found.sizes[kept].sum(0)
         if not whole_round:

@@ -82,20 +82,22 @@ def _thick(material: w.Material, h: float, k: w.Array, rates: tuple[w.Array, w.A
     """
     waves = w.waves(material, k, *rates)
     d, tr = waves.displacement, waves.traction
-    jd, jt = w.mirrored(d), -w.mirrored(tr)
     of_u, of_t = below.t.swapaxes(0, 1), below.u.swapaxes(0, 1)
-    system = w.product(of_u, jd) - w.product(of_t, jt)
-    given = w.product(of_t, tr) - w.product(of_u, d)
+    # The waves up are those down but for signs (J d and -J t), so both sides have the same terms.
+    u_r, u_z = of_u[:, 0, None] * d[0], of_u[:, 1, None] * d[1]
+    t_r, t_z = of_t[:, 0, None] * tr[0], of_t[:, 1, None] * tr[1]
+    system = (u_r - u_z) + (t_r - t_z)
+    given = (t_r + t_z) - (u_r + u_z)
     e = w.decay(material, waves, h)
     reflected = w.product(w.adjugate(system), w.product(given, e)) / w.determinant(system)
     back = w.product(e, reflected)
     bottom = None
     if below.bottom is not None:
         bottom = (
-            w.product(d, e) + w.product(jd, reflected),
-            w.product(tr, e) + w.product(jt, reflected),
+            w.product(d, e) + w.mirrored(w.product(d, reflected)),
+            w.product(tr, e) - w.mirrored(w.product(tr, reflected)),
         )
-    return Plane(d + w.product(jd, back), tr + w.product(jt, back), bottom)
+    return Plane(d + w.mirrored(w.product(d, back)), tr - w.mirrored(w.product(tr, back)), bottom)
 
 
 def charted(raw: Plane) -> Plane:

@@ -7,7 +7,6 @@ sampled as it varies, not as the waves do.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Protocol
@@ -19,7 +18,7 @@ from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.bessel import bessel_bounds, bessels
 from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, poles
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.path import pieced, wavenumbers
+from unitcad.attenuation.layered.path import wavenumbers
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _COUNT = _NODES.size
@@ -93,7 +92,7 @@ class Evaluated:
 def nodes(panels: w.Array) -> tuple[w.Array, w.Array]:
     """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, nodes)."""
     half = (panels[:, 1] - panels[:, 0]) / 2.0
-    return wavenumbers(panels, panels[:, :2].mean(1)[:, None] + half[:, None] * _NODES)
+    return wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * _NODES)
 
 
 def panel_poles(panels: w.Array, kernel: w.Array) -> Poles:
@@ -126,13 +125,17 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
     rounding = (ROUNDING * closeness * np.abs(kernel).max(axis=-1)).T
     turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(seen)
     pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
-    on_axis = (panels[:, :2].imag == 0).all(axis=1)
-    shape = (len(panels), len(kernel), seen.r.size)
-    sums = np.empty(shape, dtype=np.complex128), *np.empty((3, *shape))
-    for which in (np.flatnonzero(on_axis), np.flatnonzero(~on_axis)):
-        for some, summed in _summed(seen, panels[which], kernel[:, which], pieces[which]):
-            for whole, part in zip(sums, summed, strict=True):
-                whole[which[some]] = part
+    off_axis = np.any(panels[:, :2].imag, axis=1)
+    if not np.any(off_axis):
+        sums = _summed(seen, panels, kernel, pieces)
+    else:
+        shape = (len(panels), len(kernel), seen.r.size)
+        sums = np.empty(shape, dtype=np.complex128), *np.empty((3, *shape))
+        for which in (np.flatnonzero(~off_axis), np.flatnonzero(off_axis)):
+            if which.size:
+                summed = _summed(seen, panels[which], kernel[:, which], pieces[which])
+                for whole, part in zip(sums, summed, strict=True):
+                    whole[which] = part
     parts, sizes, covered, swing = sums
     errors = 2.0 * np.maximum(rest, rounding)[..., None] * covered + swing
     halved = 2.0 * (2.0 * rounding + _CANCELLED * np.abs(seen.taken_out))[..., None] * covered
@@ -144,40 +147,36 @@ def _span(seen: Seen) -> float:
     return float(seen.r.max()) + seen.load.reach
 
 
-def _summed(
-    seen: Seen, panels: w.Array, kernel: w.Array, pieces: np.ndarray
-) -> Iterator[tuple[np.ndarray, tuple[w.Array, ...]]]:
-    """Yield, for some panels after others, which they are and their sums of what `_integrated` returns.
-
-    All are on the axis or all off it, each cut into so many `pieces`.
-    """
-    if not len(panels):
-        return
-    kinds = [(int(count), np.flatnonzero(pieces == count)) for count in np.unique(pieces)]
-    order = np.concatenate([which for _, which in kinds])
-    cut = np.concatenate([panels[which] if n == 1 else _pieces(panels[which], n) for n, which in kinds])
-    values = np.concatenate([_on_pieces(kernel[:, which], n) for n, which in kinds], axis=1)
-    firsts = np.concatenate([[0], np.cumsum(pieces[order])])
+def _summed(seen: Seen, panels: w.Array, kernel: w.Array, pieces: np.ndarray) -> tuple[w.Array, ...]:
+    """Return of each panel, all on the axis or all off it, the sums of what `_integrated` returns of its `pieces`."""
+    ends = np.cumsum(pieces)
+    cut, values = (panels, kernel) if ends[-1] == len(panels) else _cut(panels, kernel, pieces)
     step = max(1, _CHUNK // (_COUNT * seen.r.size * len(kernel)))
-    for some in np.split(np.arange(len(order)), np.flatnonzero(np.diff(firsts[:-1] // step)) + 1):
-        low, high = firsts[some[0]], firsts[some[-1] + 1]
-        found = _integrated(seen, cut[low:high], values[:, low:high])
-        if high - low > some.size:
-            found = tuple(np.add.reduceat(one, firsts[some] - low, axis=0) for one in found)
-        yield order[some], found
+    first, sums = 0, list[tuple[w.Array, ...]]()
+    while first < len(panels):
+        low = ends[first] - pieces[first]
+        last = max(int(np.searchsorted(ends, low + step, side="right")), first + 1)
+        some = slice(low, ends[last - 1])
+        found = _integrated(seen, cut[some], values[:, some])
+        if some.stop - low > last - first:
+            found = tuple(np.add.reduceat(one, (ends - pieces)[first:last] - low, axis=0) for one in found)
+        sums.append(found)
+        first = last
+    return sums[0] if len(sums) == 1 else tuple(np.concatenate(part) for part in zip(*sums, strict=True))
 
 
-def _pieces(panels: w.Array, count: int) -> w.Array:
-    share = np.linspace(0.0, 1.0, count + 1)
-    return pieced(panels, panels[:, :1] * (1.0 - share) + panels[:, 1:2] * share)
-
-
-def _on_pieces(kernel: w.Array, count: int) -> w.Array:
-    """Return a kernel known at its panels' nodes at those of their equal pieces, shape (rows, pieces, nodes)."""
-    if count == 1:
-        return kernel
-    re, im = np.moveaxis(_pair(kernel) @ _spread(count), -2, 0)
-    return (re + 1j * im).reshape(len(kernel), -1, _COUNT)
+def _cut(panels: w.Array, kernel: w.Array, pieces: np.ndarray) -> tuple[w.Array, w.Array]:
+    """Cut each panel into equal pieces; return them, and the kernel at their nodes, shape (rows, pieces, nodes)."""
+    of = np.repeat(np.arange(len(panels)), pieces)
+    cut, values, count = panels[of], kernel[:, of], pieces[of]
+    place = np.arange(len(of)) - (np.cumsum(pieces) - pieces)[of]
+    for side in (0, 1):
+        share = (place + side) / count
+        cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
+    for number in np.unique(pieces[pieces > 1]):
+        re, im = np.moveaxis(_pair(kernel[:, pieces == number]) @ _spread(int(number)), -2, 0)  # as `products` does
+        values[:, count == number] = (re + 1j * im).reshape(len(kernel), -1, _COUNT)
+    return cut, values
 
 
 @lru_cache(maxsize=64)
@@ -196,28 +195,31 @@ def _integrated(seen: Seen, panels: w.Array, kernel: w.Array) -> tuple[w.Array, 
     meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
     six halves: there their envelope takes the place of the weight. Off the axis both grow by e^{|Im k| span}.
     """
-    load, r, span, rows = seen.load, seen.r, _span(seen), len(kernel)
+    load, r, span = seen.load, seen.r, _span(seen)
     half = (panels[:, 1] - panels[:, 0]) / 2.0
-    k = nodes(panels)[0].ravel()
+    k = nodes(panels)[0]
     if not np.any(panels[:, :2].imag):
         k, half = k.real, half.real  # Bessel functions of real numbers are cheaper
-    waves = bessels(seen.orders, k[:, None] * r) * load.transform(k)[:, None]
-    waves = waves.reshape(len(seen.orders), half.size, _COUNT, -1) * half[:, None, None]
-    by_body = kernel.reshape(-1, len(seen.orders), half.size, _COUNT)
-    size = np.abs(by_body) * _WEIGHTS
-    both = np.stack([size, np.broadcast_to(_WEIGHTS, size.shape)], axis=-2) @ np.abs(waves)
+    scale = load.transform(k) * (half[:, None] * _WEIGHTS)
+    waves = bessels(seen.orders, k[..., None] * r) * scale[..., None]
+    by_body = kernel.reshape(-1, *waves.shape[:3])
+    of_waves = np.abs(waves)
+    sizes = (np.abs(by_body)[..., None, :] @ of_waves)[..., 0, :]
+    covered = np.broadcast_to(of_waves.sum(axis=-2), sizes.shape)
     ends, slope = wavenumbers(panels, panels[:, :2])
     half = np.abs(half)
     phi = half * np.abs(slope).max(axis=1) * span
     powers = phi[:, None] ** _DEGREES / _ODD_FACTORIALS
-    swing = np.einsum("brpj,pj->brp", np.abs(by_body @ _TO_LEGENDRE.T), powers)
+    swing = (np.abs(by_body @ _TO_LEGENDRE.T) * powers).sum(axis=-1)
     swing *= 3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span)
     least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
     at = np.maximum(least, covers) / 2.0
     envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None]
     weight = np.minimum(envelope * bessel_bounds(seen.orders, at[:, None] * r), load.weight)
-    quantities = products(by_body * _WEIGHTS, waves), both[..., 0, :], both[..., 1, :], swing[..., None] * weight
-    parts, sizes, covered, oscillation = (one.reshape(rows, half.size, -1).swapaxes(0, 1) for one in quantities)
+    quantities = products(by_body, waves), sizes, covered, swing[..., None] * weight
+    parts, sizes, covered, oscillation = (
+        one.reshape(len(kernel), len(panels), -1).swapaxes(0, 1) for one in quantities
+    )
     return parts, sizes, covered, oscillation
 
 
@@ -237,4 +239,6 @@ def products(kernel: w.Array, waves: w.Array) -> w.Array:
 
 def _pair(values: w.Array) -> np.ndarray:
     """Return the real and the imaginary part, one more axis before the last."""
-    return np.stack([values.real, values.imag], axis=-2)
+    pair = np.empty((*values.shape[:-1], 2, values.shape[-1]))
+    pair[..., 0, :], pair[..., 1, :] = values.real, values.imag
+    return pair

@@ -32,10 +32,10 @@ class Gain(NamedTuple):
 
     def added(self, u: w.Array, t: w.Array) -> tuple[w.Array, w.Array]:
         """Return the states (u, t) at the top, shape (2, m, n) each, of those at the bottom."""
-        a, b = np.stack([u[0], t[1]]), np.stack([u[1], t[0]])
+        a, b = np.array([u[0], t[1]]), np.array([u[1], t[0]])
         top_a = a + (w.product(self.a_of_a, a) + w.product(self.a_of_b, b))
         top_b = b + (w.product(self.b_of_a, a) + w.product(self.b_of_b, b))
-        return np.stack([top_a[0], top_b[0]]), np.stack([top_b[1], top_a[1]])
+        return np.array([top_a[0], top_b[0]]), np.array([top_b[1], top_a[1]])
 
 
 def gain(material: w.Material, k: w.Array, h: float) -> Gain:
@@ -55,7 +55,7 @@ def gain(material: w.Material, k: w.Array, h: float) -> Gain:
         square = _product(sinh, sinh, trace, determinant)
         sinh = sinh + _product(sinh, cosh, trace, determinant)
         # times 2 h^2 M; and in terms of the doubled layer's h^2 M, which is four times as large
-        cosh = np.stack([trace * square[0] + square[1], -determinant * square[0]]) * 2.0
+        cosh = np.array([trace * square[0] + square[1], -determinant * square[0]]) * 2.0
         cosh[0] /= 4.0
         sinh[0] /= 4.0
         trace, determinant = 4.0 * trace, 16.0 * determinant
@@ -97,7 +97,7 @@ def _series(trace: w.Array, determinant: w.Array) -> tuple[w.Array, w.Array]:
 def _product(one: w.Array, other: w.Array, trace: w.Array, determinant: w.Array) -> w.Array:
     """Return (p, q) of the product of two functions of one matrix: M^2 = trace M - determinant."""
     both = one[0] * other[0]
-    return np.stack([one[0] * other[1] + one[1] * other[0] + trace * both, one[1] * other[1] - determinant * both])
+    return np.array([one[0] * other[1] + one[1] * other[0] + trace * both, one[1] * other[1] - determinant * both])
 
 
 def _function(pq: w.Array, matrix: w.Array) -> w.Array:

@@ -38,10 +38,6 @@ class Waves:
     traction: Array
 
 
-_ADJUGATE = np.array([[[1.0], [-1.0]], [[-1.0], [1.0]]])
-_MIRROR = np.array([[[1.0]], [[-1.0]]])
-
-
 def product(a: Array, b: Array) -> Array:
     """Return the matrix product of two (2, 2, n) blocks (or of a block and an (2, m, n) one)."""
     return a[:, 0, None] * b[None, 0] + a[:, 1, None] * b[None, 1]
@@ -54,12 +50,12 @@ def determinant(a: Array) -> Array:
 
 def adjugate(a: Array) -> Array:
     """Return the adjugate of a (2, 2, n) block: its inverse times its determinant."""
-    return np.swapaxes(a[::-1, ::-1], 0, 1) * _ADJUGATE
+    return np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]])
 
 
 def mirrored(a: Array) -> Array:
     """Return J a with J = diag(1, -1): the block of the waves that go up."""
-    return a * _MIRROR
+    return np.array([a[0], -a[1]])
 
 
 def decaying_root(squared: Array) -> Array:
