@@ -11,6 +11,7 @@ import time
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
@@ -94,6 +95,8 @@ class VariantOutcome:
 
 
 Answer = list[VariantOutcome] | bytes
+_SYNCED_TOGETHER = 8
+"""Results brought to the disk at once: few, to begin early; several, to share the writes of the file system's log."""
 
 
 def work(task: Task) -> Answer:
@@ -183,13 +186,30 @@ def failure(index: int, error: BaseException) -> VariantOutcome:
 
 
 def _into_folders(task: Task, out: Path) -> list[VariantOutcome]:
-    """Make a task's variants into their folders, with the cache on this disk; when they return, all is on the disk."""
-    try:
-        with files.scratch(out) as scratch:
-            done = _each(task.jobs, task, lambda job, known: _locally(job, task, out, scratch))
-    except OSError as error:
-        return [failure(job.index, error) for job in task.jobs]
-    folders.sync(out / outcome.folder for outcome in done if outcome.folder)
+    """Make a task's variants into their folders, with the cache on this disk; when they return, all is on the disk.
+
+    Those that are made go to the disk while the next ones are made: the processor has nothing to do with it.
+    """
+    made: list[Path] = []
+    begun: list[Future[None]] = []
+
+    def make(job: Job, scratch: Path) -> VariantOutcome:
+        outcome = _locally(job, task, out, scratch)
+        made.append(out / outcome.folder)
+        if len(made) == _SYNCED_TOGETHER:
+            begun.append(beside.submit(folders.sync, made.copy()))
+            made.clear()
+        return outcome
+
+    with ThreadPoolExecutor(1) as beside:
+        try:
+            with files.scratch(out) as scratch:
+                done = _each(task.jobs, task, lambda job, known: make(job, scratch))
+        except OSError as error:
+            return [failure(job.index, error) for job in task.jobs]
+        folders.sync(made)
+        for each in begun:
+            each.result()
     return done
 
 
