@@ -37,7 +37,7 @@ FLOORS = [
     {"catalogue"},
     {"files", "arguments"},
     {"errors", "children"},
-    {"text", "geometry", "notebook"},
+    {"text", "json_text", "geometry", "notebook"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 CAD = ("OCP", "build123d", "cadquery")

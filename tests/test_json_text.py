@@ -9,8 +9,8 @@ import pytest
 
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.written import to_json
+from unitcad.json_text import json_bytes
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.json_text import json_bytes
 from unitcad.validation.load import load
 
 DATA: dict[str, Any] = {"none": None, "list": [1, {"deep": [None, 0.5]}], "map": {"a": {"b": 1e-300, "c": None}}}
@@ -49,6 +49,7 @@ def test_a_procedure_with_a_number_that_is_not_finite_is_refused(made: Procedure
     for wrong in (
         replace(made, bench_min=math.nan),
         replace(made, pours=(replace(made.pours[0], part_a_g=math.inf), *made.pours[1:])),
+        replace(made, bill=(replace(made.bill[0], least_ml=math.nan), *made.bill[1:])),
     ):
         with pytest.raises(ValueError, match="not finite"):
             to_json(wrong)

@@ -19,8 +19,8 @@ from unitcad import files
 from unitcad.batch.batch_records import RecordPlace
 from unitcad.cache import Bundle, DiskStore, MissingContent, SharedStore, digest
 from unitcad.errors import UnitcadError
+from unitcad.json_text import json_bytes
 from unitcad.pipeline.folder import replacing, sync
-from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import Manifest
 from unitcad.pipeline.product import Product
 from unitcad.pipeline.subjects import of_data, to_text

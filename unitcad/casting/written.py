@@ -16,12 +16,12 @@ from unitcad.casting.figures import Figure
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.time_line import duration
 from unitcad.export import svg
+from unitcad.json_text import all_finite
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.body import Body
 from unitcad.text import markdown, number, spaced
 
-_TYPED = msgspec.json.Decoder(Procedure)
 _NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=lambda text: float(f"{float(text):.9g}"))
 UNPRINTED = "Nothing of this tooling has been printed yet: every clearance is a choice with a check behind it."
 
@@ -38,12 +38,11 @@ def files(procedure: Procedure) -> dict[str, str]:
 
 def to_json(procedure: Procedure) -> str:
     """Write the procedure as JSON: the same records; numbers to nine significant digits."""
-    exact = msgspec.json.encode(procedure)
-    try:
-        _TYPED.decode(exact)
-    except msgspec.ValidationError as error:  # msgspec writes what is not finite as null
-        raise ValueError(f"a number of the procedure is not finite: {error}") from None
-    return msgspec.json.format(msgspec.json.encode(_NINE_DIGITS.decode(exact)), indent=1).decode() + "\n"
+    data = msgspec.to_builtins(procedure)
+    if not all_finite(data):  # msgspec writes what is not finite as null
+        raise ValueError("a number of the procedure is not finite")
+    rounded = _NINE_DIGITS.decode(msgspec.json.encode(data))
+    return msgspec.json.format(msgspec.json.encode(rounded), indent=1).decode() + "\n"
 
 
 def to_markdown(procedure: Procedure) -> str:

@@ -38,6 +38,7 @@ from unitcad.casting.procedure import Procedure
 from unitcad.casting.procedure import procedure as unit_procedure
 from unitcad.casting.written import files as written
 from unitcad.casting.written import step_section
+from unitcad.json_text import json_bytes
 from unitcad.mould_checks.finding import FindingRecord
 from unitcad.mould_checks.gap import play_missing
 from unitcad.moulds.groove_depths import shallow_grooves
@@ -46,7 +47,6 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import OUTPUTS, geometry_key
 from unitcad.pipeline.bodies import body_key, file_stem, joint_key, patch_glb, record, step_asked, stl_content
 from unitcad.pipeline.geometry import Geometry, geometry, mesh_findings
-from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import ArrayManifest, BodyFile, FileRecord, LeftOut, MeshFinding, PartRecord
 from unitcad.pipeline.product import NO_KERNEL, Product, make, mould_findings, printed_mm3
 from unitcad.pipeline.stages import Stages

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from unitcad.cache import Store, digest
 from unitcad.casting.plates import plates
+from unitcad.json_text import json_bytes
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.bodies import (
     body_key,
@@ -27,7 +28,6 @@ from unitcad.pipeline.bodies import (
     stl_content,
     threemf_content,
 )
-from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, to_toml

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from unitcad import files
 from unitcad.cache import MemoryStore, MissingContent, Store
 from unitcad.errors import UnitcadError
+from unitcad.json_text import json_bytes
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import FORMATS, OUTPUTS
-from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import Manifest, failed_codes
 from unitcad.pipeline.product import Product, checked_outputs, make, possible_outputs
 from unitcad.pipeline.stages import Say, Stages, Take

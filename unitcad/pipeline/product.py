@@ -15,6 +15,7 @@ from unitcad.cache import Store, digest
 from unitcad.designs import design_of, no_estimate
 from unitcad.designs.design import Reason
 from unitcad.errors import WrongArgument, unknown_name
+from unitcad.json_text import json_bytes
 from unitcad.mould_checks.finding import FindingRecord
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
@@ -22,7 +23,6 @@ from unitcad.pipeline import artifacts
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.geometry import Geometry, geometry, mesh_findings, pictures
-from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import EstimateSummary, FileRecord, LeftOut, Manifest, PartRecord
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import kernel_versions

@@ -29,20 +29,19 @@ def json_bytes(data: Mapping[str, Any]) -> bytes:
 
 def _line(value: Any) -> bytes:
     text = _FAST.encode(value)
-    if b"null" in text and not finite(value):  # msgspec writes what is not finite as null
+    if b"null" in text and not all_finite(value):  # msgspec writes what is not finite as null
         raise ValueError(f"a number that is not finite in {value!r:.200}")
     return text
 
 
-def finite(value: Any) -> bool:
+def all_finite(value: Any) -> bool:
     """Tell whether every number in lists and dicts is finite."""
     left = [value]
     while left:
         one = left.pop()
-        kind = type(one)
-        if kind is dict:
+        if isinstance(one, dict):
             left.extend(one.values())
-        elif kind is list or kind is tuple:
+        elif isinstance(one, (list, tuple)):
             left.extend(one)
         elif isinstance(one, float) and one - one != 0.0:
             return False
