@@ -24,16 +24,17 @@ SHARPER = 2
 _INKED = (np.arange(256) * 0.28).astype(np.uint8)
 """What a line leaves of each of the 256 brightnesses under it."""
 _WHITE = 0xFFFFFFFF
+_LANES, _HALF = np.uint32(0x00FF00FF), np.uint32(0x00020002)
+_ROWS = 16
+"""Of the picture at a time: they stay in the processor's cache."""
 _TIE_MM = 1e-4
-_FARTHEST = -1e30
-"""The depth of no body, mm: nearer than a body's minus infinity where it is not."""
 MARGIN_PX = 6
 """White above and below what a picture shows, pixels."""
 LETTER_PX = 2.7
 _APART = 12
 """A fourth of a small letter's height, in pixels of the picture."""
-_EFFORT = 6
-"""Of the compression: half the time of the greatest, files a few per cent larger."""
+_EFFORT = 4
+"""Of the compression: an eighth of the time of the greatest, files a fourteenth larger."""
 
 
 @dataclass(frozen=True)
@@ -69,27 +70,14 @@ def drawn(vertices: np.ndarray, faces: np.ndarray, colour: tuple[float, float, f
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     towards = np.flatnonzero(normal @ of.eye > 0)  # nothing else of a closed mesh is seen
-    pixel, seen, depth = raster.nearest(vertices, faces[towards], of)
-    face = towards[seen]
+    top, left, face, depth = raster.nearest(vertices, faces[towards], of)
     light = of.eye + 0.45 * of.up - 0.35 * of.right
-    bright = 0.45 + 0.55 * np.abs(normal @ (light / np.linalg.norm(light)))
-    tints = np.full((len(faces), 4), 255, np.uint8)
-    tints[:, :3] = np.clip(np.round(bright[:, None] * np.array(colour) * 255), 0, 255)
-    tint = tints.view(np.uint32).reshape(-1)[face]
-    if not len(pixel):
-        return DrawnBody(0, 0, *(np.empty((0, 0), kind) for kind in (np.float32, np.uint32, np.int32)))
-    row, column = np.divmod(pixel, of.size[0])
-    top, left = int(row[0]), int(column.min())
-    size = int(row[-1]) - top + 1, int(column.max()) - left + 1
-    at = (row - top) * size[1] + column - left
-
-    def spread(values: np.ndarray, empty: float, kind: type) -> np.ndarray:
-        field = np.full(size, empty, kind)
-        field.reshape(-1)[at] = values
-        return field
-
-    patch = spread(_patches(faces, normal)[face], 0, np.int32)
-    return DrawnBody(top, left, spread(depth, -np.inf, np.float32), spread(tint, _WHITE, np.uint32), patch)
+    bright = 0.45 + 0.55 * np.abs(normal[towards] @ (light / np.linalg.norm(light)))
+    # The last entries are of the face -1: where the body is not.
+    tints = np.full((len(towards) + 1, 4), 255, np.uint8)
+    tints[:-1, :3] = np.clip(np.round(bright[:, None] * np.array(colour) * 255), 0, 255)
+    patches = np.append(_patches(faces, normal)[towards], 0).astype(np.int32)
+    return DrawnBody(top, left, depth.astype(np.float32), tints.view(np.uint32)[face, 0], patches[face])
 
 
 def _patches(faces: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -134,7 +122,7 @@ def together(bodies: Sequence[DrawnBody], of: Camera, names: Sequence[Name] = ()
     rows = np.flatnonzero((colour != _WHITE).any(axis=1))
     top, bottom = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (0, height)
     top, bottom = max(top // SHARPER - MARGIN_PX, 0), min(-(-bottom // SHARPER) + MARGIN_PX, height // SHARPER)
-    return raster.png(_shrunk(pixels[SHARPER * top : SHARPER * bottom]), _EFFORT)
+    return raster.png(_shrunk(colour[SHARPER * top : SHARPER * bottom]), _EFFORT)
 
 
 def _stacked(bodies: Sequence[DrawnBody], corner: tuple[int, int], colour: np.ndarray) -> np.ndarray:
@@ -142,17 +130,20 @@ def _stacked(bodies: Sequence[DrawnBody], corner: tuple[int, int], colour: np.nd
 
     Patches are numbered through all bodies, from 1; 0 where there is none.
     """
-    depth = np.full(colour.shape, _FARTHEST, np.float32)
+    depth = np.full(colour.shape, -np.inf, np.float32)
     patch = np.zeros(colour.shape, np.int32)
     before = 0
     for body in bodies:
         rows, columns = body.depth.shape
         top, left = body.top - corner[0], body.left - corner[1]
         at = np.s_[top : top + rows, left : left + columns]
-        nearer = body.depth >= depth[at] - _TIE_MM
-        np.copyto(depth[at], body.depth, where=nearer)
-        np.copyto(colour[at], body.colour, where=nearer)
-        np.add(body.patch, before, out=patch[at], where=nearer)
+        if not before:
+            depth[at], colour[at], patch[at] = body.depth, body.colour, body.patch
+        else:
+            nearer = body.depth > depth[at] - _TIE_MM
+            np.copyto(depth[at], body.depth, where=nearer)
+            np.copyto(colour[at], body.colour, where=nearer)
+            np.add(body.patch, before, out=patch[at], where=nearer)
         before += int(body.patch.max())
     return patch
 
@@ -210,10 +201,19 @@ def _disc(window: tuple[slice, slice], middle: tuple[float, float], radius: floa
     return (column + 0.5 - middle[0]) ** 2 + (row + 0.5 - middle[1]) ** 2 <= radius**2
 
 
-def _shrunk(picture: np.ndarray) -> np.ndarray:
-    """Return a picture (h, w, 4) of bytes as (h', w', 3): every pixel is the mean of SHARPER by SHARPER."""
-    rows = sum(picture[i::SHARPER].astype(np.uint16) for i in range(SHARPER))
-    # The four sums of a pixel are added as one number: none is larger than its sixteen bits.
-    whole = np.ascontiguousarray(rows).view(np.uint64)[:, :, 0]
-    total = np.ascontiguousarray(sum(whole[:, j::SHARPER] for j in range(SHARPER))).view(np.uint16)
-    return ((total.reshape(*whole[:, ::SHARPER].shape, 4)[:, :, :3] + SHARPER**2 // 2) // SHARPER**2).astype(np.uint8)
+def _shrunk(colour: np.ndarray) -> np.ndarray:
+    """Return colours (h, w), as of a body, as bytes (h', w', 3): every pixel is the mean of SHARPER by SHARPER."""
+    picture = np.empty((colour.shape[0] // SHARPER, colour.shape[1] // SHARPER, 4), np.uint8)
+    for begin in range(0, len(picture), _ROWS):
+        some = colour[SHARPER * begin : SHARPER * (begin + _ROWS)]
+        lanes = picture[begin : begin + _ROWS].view(np.uint32)[..., 0]
+        # Two of the four bytes at once: the sum of each has sixteen bits, and takes fewer.
+        for shift in (0, 8):
+            bytes_of = (some >> shift) & _LANES
+            rows = bytes_of[::SHARPER] + bytes_of[1::SHARPER]
+            mean = (rows[:, ::SHARPER] + rows[:, 1::SHARPER] + _HALF) >> 2 & _LANES
+            if shift:
+                lanes |= mean << shift
+            else:
+                lanes[...] = mean
+    return picture[..., :3]

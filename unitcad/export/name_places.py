@@ -19,7 +19,7 @@ _WELL_INSIDE = 7.0
 _ASIDE = 0.6
 """A part whose visible middle lies beyond this share of the drawing's width is named beside itself."""
 
-_REACH_PX = 128.0
+_REACH_PX = 48.0
 """How far from what it names a free place is looked for first."""
 
 Box = tuple[float, float, float, float]

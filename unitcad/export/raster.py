@@ -83,29 +83,31 @@ def look(
     Faces that `first` (m,) marks are seen before others of the same depth.
     """
     width, height = view.size
-    seen = Seen(np.full((height, width), -1, np.int64), np.full((height, width), -np.inf))
-    pixel, face, depth = nearest(vertices, faces, view, cut, first)
-    seen.face.reshape(-1)[pixel], seen.depth.reshape(-1)[pixel] = face, depth
+    seen = Seen(np.full((height, width), -1, np.int32), np.full((height, width), -np.inf))
+    top, left, face, depth = nearest(vertices, faces, view, cut, first)
+    at = np.s_[top : top + face.shape[0], left : left + face.shape[1]]
+    seen.face[at], seen.depth[at] = face, depth
     return seen
 
 
 def nearest(
     vertices: np.ndarray, faces: np.ndarray, view: Camera, cut: float = np.inf, first: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pixels (k,) in which a mesh is seen, row by row, with each one's face and depth in mm, as `look`."""
-    width, height = view.size
-    points = view.project(vertices)
+) -> tuple[int, int, np.ndarray, np.ndarray]:
+    """Return what is seen of a mesh, as `look`, in the rectangle of pixels that it reaches.
+
+    That is its first row and column, and of each pixel the face, -1 for none, and the depth in mm.
+    """
     if not len(faces):
-        return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
-    # Only the rectangle that the mesh reaches is kept.
+        return 0, 0, np.empty((0, 0), np.int32), np.empty((0, 0))
+    points = view.project(vertices)
     low, high = np.floor(points[:, :2].min(axis=0)), np.ceil(points[:, :2].max(axis=0)) + 1
     (left, top), (right, bottom) = (np.clip(ends, 0, view.size).astype(int) for ends in (low, high))
-    wide, number = right - left, (right - left) * (bottom - top)
-    least = np.full(number, -np.inf)
-    shown = np.full(number, -1, np.int64)
+    shape = int(bottom - top), int(right - left)
+    points -= (left, top, 0.0)
+    least = np.full(shape[0] * shape[1], -np.inf)
+    shown = np.full(len(least), -1, np.int32)
     plain, begun = first is None and cut == np.inf, False
-    for face, pixel, depth in _fragments(points, faces, width, height, wide):
-        pixel -= top * wide + left
+    for face, pixel, depth in _fragments(points, faces, shape):
         if begun or not plain:  # else all are the first in their pixels
             kept = depth <= cut
             if first is not None:
@@ -116,18 +118,17 @@ def nearest(
         np.maximum.at(least, pixel, depth)
         seen = depth == least[pixel]
         shown[pixel[seen]] = face[seen]
-    pixel = np.flatnonzero(shown >= 0)
-    row, column = np.divmod(pixel, max(wide, 1))
-    return (row + top) * width + column + left, shown[pixel], least[pixel]
+    return int(top), int(left), shown.reshape(shape), least.reshape(shape)
 
 
 def _fragments(
-    points: np.ndarray, faces: np.ndarray, width: int, height: int, stride: int
+    points: np.ndarray, faces: np.ndarray, shape: tuple[int, int]
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield face, pixel and depth of every pixel's middle that lies in a face, in blocks: row by row of each face.
 
-    A pixel's number is its row times `stride` plus its column.
+    A pixel's number is that in a picture of `shape` (height, width), row by row.
     """
+    height, width = shape
     for begin in range(0, len(faces), _FACES):
         corners = points[faces[begin : begin + _FACES]]
         one, two, three = (corners[:, k] for k in range(3))
@@ -145,18 +146,16 @@ def _fragments(
             left = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
             right = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int)
             number = np.maximum(right - left + 1, 0)
-            level, lean, start = one[face, 2], across[face], one[face, 0]
-            sunk, line = down[face] * (row + 0.5 - one[face, 1]), row * stride
+            lean, from_left = across[face], left + 0.5 - one[face, 0]
+            level = one[face, 2] + down[face] * (row + 0.5 - one[face, 1]) + lean * from_left
+            pixel = row * width + left
             for block in _blocks(number):
                 times = number[block]
-                x = _counted(left[block], times)
-                depth = x + 0.5
-                depth -= np.repeat(start[block], times)
-                depth *= np.repeat(lean[block], times)
+                step = _counted(np.zeros_like(times), times)
+                depth = step * np.repeat(lean[block], times)
                 depth += np.repeat(level[block], times)
-                depth += np.repeat(sunk[block], times)
-                x += np.repeat(line[block], times)
-                yield np.repeat(face[block] + begin, times), x, depth
+                step += np.repeat(pixel[block], times)
+                yield np.repeat((face[block] + begin).astype(np.int32), times), step, depth
 
 
 def _blocks(count: np.ndarray) -> list[np.ndarray]:

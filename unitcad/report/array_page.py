@@ -46,11 +46,6 @@ WORDS = {
 }
 
 
-def is_array_folder(folder: Path) -> bool:
-    """Tell whether a folder is the result of an array."""
-    return (folder / ARRAY).is_file() and not (folder / ARRAY).is_symlink()
-
-
 def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
     """Write `folder`/report.html of an array and return its path. Raises UnitcadError for a damaged manifest."""
     manifest = files.read_json(folder / "manifest.json", links=False)

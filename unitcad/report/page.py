@@ -15,7 +15,6 @@ from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.pipeline.folder import BENCH, PAGE
 from unitcad.report import read_results
-from unitcad.report.array_page import is_array_folder, write_array_page
 from unitcad.report.bench_page import write_bench
 from unitcad.report.html_page import asset, html_page
 from unitcad.report.pool import Pool
@@ -38,7 +37,9 @@ def write_report(folder: Path, warn: Callable[[str], None] = lambda line: None) 
 
     `warn` gets lines that say which results are damaged, and why. Raises UnitcadError where the folder holds none.
     """
-    if is_array_folder(folder):
+    if read_results.is_array_folder(folder):
+        from unitcad.report.array_page import write_array_page
+
         for unit in sorted((folder / "units").glob("*")):
             if unit.is_dir() and not unit.is_symlink() and read_results.is_variant(unit):
                 write_report(unit, warn)

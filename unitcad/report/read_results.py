@@ -19,7 +19,7 @@ from unitcad import files
 from unitcad.casting.cast_record import ENDING, read_cast_record
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import TEMPORARY
-from unitcad.pipeline.folder import ADDRESS, PAGE, STORE
+from unitcad.pipeline.folder import ADDRESS, ARRAY, PAGE, STORE
 from unitcad.pipeline.manifest_records import Manifest
 from unitcad.report.records import BatchFile, ResultsTable, VariantRecord, expect
 from unitcad.report.step_pictures import step_pictures
@@ -47,6 +47,11 @@ MOST_FILES = 2000
 def is_variant(folder: Path) -> bool:
     """Check whether a folder is one variant's result, damaged or not."""
     return os.path.lexists(folder / MANIFEST)
+
+
+def is_array_folder(folder: Path) -> bool:
+    """Tell whether a folder is the result of an array."""
+    return (folder / ARRAY).is_file() and not (folder / ARRAY).is_symlink()
 
 
 def variant_folders(folder: Path) -> list[Path]:

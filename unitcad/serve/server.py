@@ -15,9 +15,8 @@ from unitcad.arrays.array_units import expanded
 from unitcad.errors import Missing, Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text
 from unitcad.pipeline.folder import ARRAY
-from unitcad.report.array_page import is_array_folder
 from unitcad.report.page import page_data
-from unitcad.report.read_results import is_variant
+from unitcad.report.read_results import is_array_folder, is_variant
 from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown
 from unitcad.serve.array_answers import array_files
 from unitcad.serve.messages import Source, Trusted
