@@ -1,6 +1,7 @@
 """A 3MF model part read element by element into plain data, against the schema, within the limits.
 
-Vertices and triangles go into arrays in batches; their text is never held as a whole.
+Vertices and triangles go into arrays in batches; their text is never held as a whole. Those that are written alike are
+read at once (`alike`).
 """
 
 from __future__ import annotations
@@ -14,17 +15,18 @@ import numpy as np
 from unitcad.check.findings import Location
 from unitcad.check.geometry.triangle_mesh import LARGEST
 from unitcad.check.readers.threemf import elements
+from unitcad.check.readers.threemf.alike import Alike, without_alike
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
+from unitcad.check.readers.threemf.transform import NOT_FINITE, transform
 from unitcad.check.readers.threemf.xml_stream import forbidden, new_parser, stream
 from unitcad.check.rules.f_file import F004, not_a_number
 from unitcad.check.rules.f_limits import F011, Limits, Unreadable
-from unitcad.check.rules.p_package import P010, P013, P015, P016, P017, P018
+from unitcad.check.rules.p_package import P010, P016, P017, P018
 from unitcad.check.rules.v_values import V001
 from unitcad.geometry.arrays import Floats, Ints
 
 _BATCH = 50_000
 _DEPTH = 60
-_NAMES = {"nan", "inf", "infinity", "-nan", "+nan", "-inf", "+inf", "-infinity", "+infinity"}
 
 
 @dataclass
@@ -58,6 +60,7 @@ class _Reader:
         self.numbers: list[str] = []
         self.lines: list[int] = []
         self.vertices: list[Floats] = []
+        self.beyond = False
         self.triangles: list[tuple[int, ...]] = []
         self.rows: list[Ints] = []
         self.text: dict[str, str] = {}
@@ -68,6 +71,37 @@ class _Reader:
 
     def namespace(self, prefix: str | None, uri: str) -> None:
         self.model.namespaces[prefix or ""] = uri
+
+    def inside(self, fed: int) -> tuple[int, str]:
+        """Return how many elements are open, and the last one's name where it is the core's list of a mesh.
+
+        No name where the parser keeps some of the bytes `fed` to it until it has more.
+        """
+        last = self.stack[-1]
+        whole = self.parser.CurrentByteIndex == fed and not self.skip and last.space == elements.CORE
+        return len(self.stack) + self.skip, last.name if whole else ""
+
+    def take(self, name: str, found: Alike) -> bool:
+        """Keep elements that were read at once, if none needs a finding of its own; return whether they were kept."""
+        if name == "vertices":
+            values = np.stack([found.columns[axis] for axis in _XYZ], axis=1)
+            if not (np.abs(values) <= LARGEST).all():
+                return False
+            self._flush_vertices()
+            self._keep_vertices(values)
+            return True
+        if "pid" in found.columns and not found.columns["pid"].all():
+            return False
+        self._flush_triangles()
+        rows = np.full((len(found.lines), LINE + 1), -1)
+        for i, column in enumerate(_COLUMNS):
+            if column in found.columns:
+                rows[:, i] = found.columns[column]
+        rows[:, LINE] = self.parser.CurrentLineNumber + found.lines
+        self.rows.append(rows)
+        self.rank += len(rows)
+        self._count_faces(len(rows))
+        return True
 
     def start(self, name: str, flat: list[str]) -> None:
         if self.skip:
@@ -239,13 +273,16 @@ class _Reader:
         self._resource(Object("object", int(attributes["id"]), self.rank, attributes, type=kind))
 
     def _take_triangle(self, attributes: dict[str, str]) -> None:
-        row = tuple(int(attributes.get(name, -1)) for name in ("v1", "v2", "v3", "p1", "p2", "p3", "pid"))
+        row = tuple(int(attributes.get(name, -1)) for name in _COLUMNS)
         self.triangles.append((*row, self.parser.CurrentLineNumber))
-        self.faces += 1
-        if self.faces > self.limits.max_faces:
-            raise F011.unreadable(f"more faces than --max-faces {self.limits.max_faces}")
+        self._count_faces(1)
         if len(self.triangles) >= _BATCH:
             self._flush_triangles()
+
+    def _count_faces(self, number: int) -> None:
+        self.faces += number
+        if self.faces > self.limits.max_faces:
+            raise F011.unreadable(f"more faces than --max-faces {self.limits.max_faces}")
 
     def _take_vertex(self, attributes: dict[str, str]) -> None:
         self.numbers += [attributes["x"], attributes["y"], attributes["z"]]
@@ -270,35 +307,10 @@ class _Reader:
         if uuid is not None and not elements.uuid(uuid):
             self.model.add(P017, f"UUID {uuid[:40]!r} is none")
         path = attributes.get(f"{elements.PRODUCTION} path", "")
-        matrix = self._matrix(attributes.get("transform"))
+        matrix = transform(attributes.get("transform"), self.model, self.regular)
         return Use(
             int(attributes["objectid"]), path, matrix, self.rank, uuid is not None, self.parser.CurrentLineNumber
         )
-
-    def _matrix(self, text: str | None) -> Floats:
-        """Return the transform (4, 3); the identity with a finding where it is none."""
-        identity = np.vstack([np.eye(3), np.zeros(3)])
-        if text is None:
-            return identity
-        parts = text.split()
-        if len(parts) == 12 and all(elements.number(part) for part in parts):
-            matrix = np.array([float(part) for part in parts]).reshape(4, 3)
-            if not (np.abs(matrix) <= LARGEST).all():
-                self.model.add(P013, f'transform="{text[:60]}" is not twelve float32 numbers')
-                return identity
-            if (linear := tuple(parts[:9])) not in self.regular:  # most items of a build differ by their shift only
-                det = float(np.linalg.det(matrix[:3]))
-                scale = float(np.prod(np.linalg.norm(matrix[:3], axis=1)))
-                if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
-                    self.model.add(P013, "a transform has determinant zero")
-                elif det < 0:
-                    self.model.add(P015, "a transform mirrors")
-                else:
-                    self.regular.add(linear)
-            return matrix
-        rule = P013 if len(parts) == 12 and any(part.lower() in _NAMES for part in parts) else P017
-        self.model.add(rule, f'transform="{text[:60]}" is not twelve numbers')
-        return identity
 
     def _take_lattice(self, local: str, attributes: dict[str, str]) -> None:
         if not isinstance(self.resource, Object):
@@ -326,10 +338,15 @@ class _Reader:
             values = np.array([self._number(text, self.lines[i // 3]) for i, text in enumerate(self.numbers)])
         bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if len(bad):
-            self.model.add(V001, "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
+            if not self.beyond:
+                self.model.add(V001, "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
+            self.beyond = True
             values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        self.vertices.append(values.reshape(-1, 3))
         self.numbers, self.lines = [], []
+        self._keep_vertices(values.reshape(-1, 3))
+
+    def _keep_vertices(self, values: Floats) -> None:
+        self.vertices.append(values)
         if sum(len(block) for block in self.vertices) > 3 * self.limits.max_faces + 3:
             raise F011.unreadable("more vertices than three times --max-faces")
 
@@ -337,7 +354,7 @@ class _Reader:
         text = text.strip()
         if elements.number(text):
             return float(text)
-        if text.lower() in _NAMES:
+        if text.lower() in NOT_FINITE:
             return math.nan
         self.model.add(F004, not_a_number(text).message, line=line)
         return 0.0
@@ -351,7 +368,7 @@ class _Reader:
         if isinstance(self.resource, Object):
             vertices = np.concatenate([np.empty((0, 3)), *self.vertices])
             self.resource.mesh = Triangles(vertices, np.concatenate([np.empty((0, LINE + 1), np.int64), *self.rows]))
-        self.vertices, self.rows = [], []
+        self.vertices, self.rows, self.beyond = [], [], False
 
     def _close_object(self, resource: Object) -> None:
         if resource.mesh is None and not resource.components and not resource.other_shape:
@@ -363,6 +380,7 @@ class _Reader:
 # Extensions whose elements take the place of an object's mesh.
 _SHAPES = {elements.BOOLEAN, elements.DISPLACEMENT, elements.OLD_DISPLACEMENT, elements.IMPLICIT}
 _XYZ = ["x", "y", "z"]
+_COLUMNS = ("v1", "v2", "v3", "p1", "p2", "p3", "pid")
 _LEAF = _Open(elements.CORE, "vertex", None)
 _VERTEX = f"{elements.CORE} vertex"
 
@@ -374,7 +392,7 @@ def read_model(
     model = Model(part, strict=strict)
     reader = _Reader(model, limits, spent_faces)
     try:
-        stream(chunks, part, reader.start, reader.end, reader.namespace, reader.parser)
+        stream(without_alike(chunks, reader), part, reader.start, reader.end, reader.namespace, reader.parser)
     except Unreadable as stop:
         raise Unreadable(*model.findings, *stop.findings) from stop
     return model

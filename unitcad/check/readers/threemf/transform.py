@@ -1,0 +1,45 @@
+"""The transform of a 3MF item or component."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from unitcad.check.geometry.triangle_mesh import LARGEST
+from unitcad.check.readers.threemf import elements
+from unitcad.check.readers.threemf.model_data import Model
+from unitcad.check.rules.p_package import P013, P015, P017
+from unitcad.geometry.arrays import Floats
+
+NOT_FINITE = {"nan", "inf", "infinity", "-nan", "+nan", "-inf", "+inf", "-infinity", "+infinity"}
+"""What programs write for a number that is none, in lower case."""
+
+
+def transform(text: str | None, model: Model, regular: set[tuple[str, ...]]) -> Floats:
+    """Return the transform (4, 3) of an attribute's text; the identity, with a finding of `model`, where it is none.
+
+    `regular`: linear parts that are known to be sound; this one is added.
+    """
+    identity = np.vstack([np.eye(3), np.zeros(3)])
+    if text is None:
+        return identity
+    parts = text.split()
+    if len(parts) == 12 and all(elements.number(part) for part in parts):
+        matrix = np.array([float(part) for part in parts]).reshape(4, 3)
+        if not (np.abs(matrix) <= LARGEST).all():
+            model.add(P013, f'transform="{text[:60]}" is not twelve float32 numbers')
+            return identity
+        if (linear := tuple(parts[:9])) not in regular:  # most items of a build differ by their shift only
+            det = float(np.linalg.det(matrix[:3]))
+            scale = float(np.prod(np.linalg.norm(matrix[:3], axis=1)))
+            if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
+                model.add(P013, "a transform has determinant zero")
+            elif det < 0:
+                model.add(P015, "a transform mirrors")
+            else:
+                regular.add(linear)
+        return matrix
+    rule = P013 if len(parts) == 12 and any(part.lower() in NOT_FINITE for part in parts) else P017
+    model.add(rule, f'transform="{text[:60]}" is not twelve numbers')
+    return identity
