@@ -2,6 +2,7 @@
 
 import json
 import math
+import struct
 from dataclasses import replace
 from typing import Any
 
@@ -53,3 +54,9 @@ def test_a_procedure_with_a_number_that_is_not_finite_is_refused(made: Procedure
     ):
         with pytest.raises(ValueError, match="not finite"):
             to_json(wrong)
+
+
+def test_what_only_looks_infinite_is_written() -> None:
+    # The bytes by which MessagePack begins an infinite double, within the low bits of another number.
+    number = struct.unpack(">d", bytes([0x3F, 0xF0, 0xCB, 0x7F, 0xF0, 0, 0, 1]))[0]
+    assert json.loads(json_bytes({"x": [None, number]})) == {"x": [None, number]}

