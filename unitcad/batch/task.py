@@ -225,7 +225,7 @@ def _locally(job: Job, task: Task, out: Path, scratch: Path) -> VariantOutcome:
     before = Counter(store.counts)
     maker = partial(product_of, spec, task.only, task.check)
     built = build_into(folder, maker, store, Stages(), placing=partial(folders.placing, scratch=scratch))
-    return _outcome(job, spec, folder.name, built.manifest, _manifest_sha256(folder), store.counts - before)
+    return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
 
 
 def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
