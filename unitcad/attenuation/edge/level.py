@@ -20,7 +20,7 @@ from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 _MOST_CORNERS = 12
 _NOT_FINITE = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
 _WAVES: tuple[cf.Wave, ...] = ("s", "p")
-_OF_WAVES = ("paper", "consistent")
+_OF_WAVES: dict[str, Callable[[Units, cf.Wave], Any]] = {"paper": cf.paper_path, "consistent": cf.consistent_path}
 KINDS = {
     "paper": "the paper's closed form as printed: transmission coefficients and exponentials along the walls, one "
     "constant s from the table (f1 and f2 are not printed)",
@@ -145,8 +145,8 @@ class _AtCorners:
         key = wave, control
         if key not in self._made:
             units = corners(self.variant) if control is None else _control_corners(self.variant, control)
-            path = path_of(self.model, self.constants)
-            self._made[key] = path(units, wave) if self.model in _OF_WAVES else path(units)
+            of_wave = _OF_WAVES.get(self.model)
+            self._made[key] = of_wave(units, wave) if of_wave else path_of(self.model, self.constants)(units)
         return self._made[key]
 
     def ratio(self, control: int, wave: cf.Wave = "s") -> dict[str, Any]:
