@@ -2,6 +2,7 @@
 
 import json
 import math
+import struct
 from dataclasses import replace
 from typing import Any
 
@@ -45,6 +46,14 @@ def test_a_procedure_is_written_as_its_records(made: Procedure) -> None:
     assert [pour["part_a_g"] for pour in data["pours"]] == [float(f"{pour.part_a_g:.9g}") for pour in made.pours]
 
 
+@pytest.mark.parametrize(
+    "text", ["0.12345678", "-1.2345678", "1.234567e9", "12345678.9", "123456.7891", "2.0000000049"]
+)
+def test_numbers_of_a_procedure_have_nine_digits(made: Procedure, text: str) -> None:
+    data = json.loads(to_json(replace(made, bench_min=float(text))))
+    assert repr(data["bench_min"]) == repr(float(f"{float(text):.9g}"))
+
+
 def test_a_procedure_with_a_number_that_is_not_finite_is_refused(made: Procedure) -> None:
     for wrong in (
         replace(made, bench_min=math.nan),
@@ -53,3 +62,9 @@ def test_a_procedure_with_a_number_that_is_not_finite_is_refused(made: Procedure
     ):
         with pytest.raises(ValueError, match="not finite"):
             to_json(wrong)
+
+
+def test_what_only_looks_infinite_is_written() -> None:
+    # The bytes by which MessagePack begins an infinite double, within the low bits of another number.
+    number = struct.unpack(">d", bytes([0x3F, 0xF0, 0xCB, 0x7F, 0xF0, 0, 0, 1]))[0]
+    assert json.loads(json_bytes({"x": [None, number]})) == {"x": [None, number]}

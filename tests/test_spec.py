@@ -6,6 +6,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import tomli_w
+from msgspec import structs
 
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.spec import Spec, from_json, to_data, to_json, to_toml
@@ -34,6 +36,19 @@ def test_an_effective_spec_reads_back_as_itself(name: str) -> None:
     spec = load(name)
     assert from_data(tomllib.loads(to_toml(spec))) == spec
     assert spec.name == name
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_spec_is_the_same_text_whatever_was_written_before(name: str) -> None:
+    for settings in ([], ["diameter_mm=16.5", "casting.vacuum=true"], []):
+        spec = load(name, settings)
+        assert to_toml(spec) == tomli_w.dumps(to_data(spec))
+
+
+def test_values_that_are_equal_and_read_otherwise_are_written_each_as_it_is() -> None:
+    for waste in (1.0, 1, 1.0):
+        spec = structs.replace(load("embedded"), casting=structs.replace(load("embedded").casting, waste=waste))
+        assert to_toml(spec) == tomli_w.dumps(to_data(spec))
 
 
 def test_a_path_and_a_name_find_the_same_template(tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:
 def test_the_summary_has_the_silicone_of_units_and_sheet(folder: Path) -> None:
     array = load_array("forearm-pockets", SMALL)
     manifest = json.loads((folder / "manifest.json").read_text())
-    (line,) = [one for one in array_summary(array, Built(folder, manifest)) if one.startswith("to mix: ")]
+    (line,) = [one for one in array_summary(array, Built(folder, manifest, "")) if one.startswith("to mix: ")]
     mixed = {name: float(mass) for mass, name in re.findall(r"([0-9.]+) g of ([^ ,]+)", line)}
     with (folder / "bom.csv").open() as file:
         bought = [row for row in csv.DictReader(file) if row["unit"] == "g"]

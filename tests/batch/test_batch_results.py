@@ -6,15 +6,20 @@ import csv
 import json
 import re
 import shutil
+from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 import pytest
 from batching import bytes_of, calls, ring_sweep, rows, unitcad
 
 from unitcad.batch import BatchOptions, load_sweep, run
 from unitcad.batch.executors import SerialExecutor
+from unitcad.batch.sweep import Sweep, from_file
+from unitcad.batch.task import VariantOutcome
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.build import build
+from unitcad.pipeline.subjects import Made
 from unitcad.spec import to_toml
 from unitcad.validation import from_data, load, read
 
@@ -306,3 +311,28 @@ def test_init_writes_a_spec_that_names_every_key(tmp_path: Path) -> None:
     assert unitcad("init", "my-unit", cwd=tmp_path).returncode == 2
     assert unitcad("init", "../x", cwd=tmp_path).returncode == 2
     assert unitcad("init", "y", "--template", "nonsense", cwd=tmp_path).returncode == 2
+
+
+def test_workers_begin_before_all_variants_are_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rooms = {"start": 18.0, "stop": 30.0, "num": 150}
+    sweep = from_file({"base": "encapsulating", "sweep": {"casting.room_c": rooms}}, Path(), "rooms")
+    there, asked = [], []
+    spec = Sweep.spec
+
+    def counting(self: Sweep, index: int) -> Made:
+        there.append(index)
+        return spec(self, index)
+
+    class Waiting(SerialExecutor):
+        """Notes how many variants are there when it is given a task, and makes none."""
+
+        def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+            asked.append(len(there))
+            future: Future[Any] = Future()
+            future.set_result([VariantOutcome(job.index, "ok", f"unit-{job.index:012x}") for job in args[0].jobs])
+            return future
+
+    monkeypatch.setattr(Sweep, "spec", counting)
+    assert run(sweep, tmp_path / "o", BatchOptions(("unit",)), Waiting(), workers=1).ok == 150
+    assert asked[0] < 150 <= asked[-1]
+    assert sorted(there) == list(range(150))

@@ -34,8 +34,8 @@ from unitcad.pipeline.product import checked_outputs
 from unitcad.pipeline.subjects import key_of, subject_of, to_text
 from unitcad.pipeline.versions import code_version, kernel_versions
 
-WINDOW = 2048
-"""Variants held in memory: enough to group those that share a geometry."""
+WINDOW, STEP = 2048, 64
+"""Variants held in memory: enough to group those that share a geometry; how many come in between two looks at tasks."""
 FIRST, NEXT = 4, 48
 """Variants in the task that makes a geometry, and in those after it: variants of one task share estimates."""
 COLLECT_EVERY = 500
@@ -169,11 +169,11 @@ class _Batch:
 
     def all(self) -> None:
         while not self.summary.stopped:
-            self._fill()
+            more = self._fill()
             self._submit()
-            if not self.running:
+            if not self.running and not more:
                 break
-            self._collect()
+            self._collect(at_once=more)
         while self.running:  # tasks that were begun are finished and kept
             self._collect()
 
@@ -194,12 +194,18 @@ class _Batch:
         for index in failed:
             yield index, self.journal.entry(index)
 
-    def _fill(self) -> None:
-        """Bring variants into the window; note at once those that are refused, or equal to another one."""
-        while self.waiting < WINDOW and not self.summary.stopped:
+    def _fill(self) -> bool:
+        """Bring variants into the window; note at once those that are refused, or equal to another one.
+
+        Returns whether there may be more for it: the workers begin after the first ones. A shard, which chooses where
+        in the window it begins, is given the whole of it.
+        """
+        for _ in range(WINDOW if self.options.shard else STEP):
+            if self.waiting >= WINDOW or self.summary.stopped:
+                return False
             index, entry = next(self.coming, (None, None))
             if index is None:
-                return
+                return False
             try:
                 spec = self.sweep.spec(index)
             except UnitcadError as error:
@@ -215,6 +221,7 @@ class _Batch:
                 Job(index, to_text(spec), self.destination.damaged(entry) if entry else "")
             )
             self.waiting += 1
+        return self.waiting < WINDOW
 
     def _submit(self) -> None:
         """Submit tasks: one for every worker, and one ahead."""
@@ -242,8 +249,9 @@ class _Batch:
         self.waiting -= len(jobs)
         return key, jobs
 
-    def _collect(self) -> None:
-        for future in wait(list(self.running), return_when="FIRST_COMPLETED").done:
+    def _collect(self, at_once: bool = False) -> None:
+        """Take up what is done; wait for the first, or with `at_once` for none."""
+        for future in wait(list(self.running), 0 if at_once else None, return_when="FIRST_COMPLETED").done:
             task = self.running.pop(future)
             group = self.groups.get(task.geometry)
             try:

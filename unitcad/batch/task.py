@@ -95,7 +95,7 @@ class VariantOutcome:
 
 
 Answer = list[VariantOutcome] | bytes
-_SYNCED_TOGETHER = 8
+_SYNCED_TOGETHER = 12
 """Results brought to the disk at once: few, to begin early; several, to share the writes of the file system's log."""
 
 
@@ -197,17 +197,17 @@ def _into_folders(task: Task, out: Path) -> list[VariantOutcome]:
         outcome = _locally(job, task, out, scratch)
         made.append(out / outcome.folder)
         if len(made) == _SYNCED_TOGETHER:
-            begun.append(beside.submit(folders.sync, made.copy()))
+            begun.append(beside.submit(folders.sync, made.copy(), threads))
             made.clear()
         return outcome
 
-    with ThreadPoolExecutor(1) as beside:
+    with ThreadPoolExecutor(1) as beside, folders.sync_threads() as threads:
         try:
             with files.scratch(out) as scratch:
                 done = _each(task.jobs, task, lambda job, known: make(job, scratch))
         except OSError as error:
             return [failure(job.index, error) for job in task.jobs]
-        folders.sync(made)
+        folders.sync(made, threads)
         for each in begun:
             each.result()
     return done
@@ -225,7 +225,7 @@ def _locally(job: Job, task: Task, out: Path, scratch: Path) -> VariantOutcome:
     before = Counter(store.counts)
     maker = partial(product_of, spec, task.only, task.check)
     built = build_into(folder, maker, store, Stages(), placing=partial(folders.placing, scratch=scratch))
-    return _outcome(job, spec, folder.name, built.manifest, _manifest_sha256(folder), store.counts - before)
+    return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
 
 
 def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:

@@ -30,14 +30,17 @@ GATE = "unitcad-cache.lock"
 """The lock held while a store opens, and while one process collects alone."""
 FOLDERS = ("data", "files", "content", "locks", "tmp")
 _POLL_S = 0.01
+_DECODED = 64
+"""Entries that a store keeps decoded: variants of a geometry read the same few."""
 
 
 class DiskStore:
     """A store in a folder.
 
-    Entries are written under a temporary name and renamed. Each process verifies a content's checksum on first use and
-    watches its size and time of change afterwards; whatever does not match is removed and made again. An entry that
-    can't be written (no space, read-only) is no error: the content is held in memory for this process instead.
+    Entries are written under a temporary name and renamed. Each process verifies the checksum of content and entries on
+    first use and watches size and time of change afterwards; whatever does not match is removed and made again. An
+    entry that can't be written (no space, read-only) is no error: the content is held in memory for this process
+    instead. The data of an entry are shared by all who ask for it: nobody may change them.
     """
 
     def __init__(self, root: Path) -> None:
@@ -46,6 +49,7 @@ class DiskStore:
         self.counts: Counter[str] = Counter()
         self._verified: dict[str, tuple[int, int, int]] = {}
         self._touched: dict[Path, float] = {}
+        self._decoded: dict[Path, tuple[tuple[int, int, int], Any]] = {}
         self._held: dict[str, bytes] = {}
         _claim(self.root)
         # Held while the store lives: see `collect`.
@@ -177,6 +181,10 @@ class DiskStore:
         """Return an entry's data, or None; an entry that is damaged or was written for another key is removed."""
         path = self._path(kind, key)
         try:
+            now = _signature(str(path))
+            there, data = self._decoded.get(path, (None, None))
+            if there == now:
+                return data if intact(data) else None
             checksum, _, payload = read(path).partition(b"\n")
         except OSError:
             return None
@@ -184,6 +192,9 @@ class DiskStore:
             checksum = payload = b""
         if _checksum(kind, key, payload) == checksum:
             data = msgspec.json.decode(payload)
+            if len(self._decoded) >= _DECODED:
+                self._decoded = {}
+            self._decoded[path] = now, data
             return data if intact(data) else None
         remove(path)
         self.counts["damaged"] += 1

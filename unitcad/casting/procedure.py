@@ -127,7 +127,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
     """
     spec, plan = moulds.spec, moulds.plan
     known = catalogue.materials(spec.materials)
-    edges, shown = tuple(off_grid(moulds)), views(moulds)
+    edges, shown = moulds.once_a_geometry("off grid", lambda blank: tuple(off_grid(blank))), views(moulds)
     centred, free = eccentricity(moulds), eccentricity(moulds, with_ribs=False)
     pours, mixes, grams = [], [], []
     for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True):
@@ -170,7 +170,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         printing=printing(moulds, printed_mm3),
         preparation=prepared,
         off_grid=edges,
-        unit_heights=tuple(unit_heights(moulds)),
+        unit_heights=moulds.once_a_geometry("unit heights", lambda blank: tuple(unit_heights(blank))),
         pours=tuple(pours),
         bonds=bond_faces(moulds),
         release=out,

@@ -22,7 +22,13 @@ from unitcad.moulds.plan import Step
 from unitcad.shape.body import Body
 from unitcad.text import markdown, number, spaced
 
-_NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=lambda text: float(f"{float(text):.9g}"))
+
+def _nine_digits(text: str) -> float:
+    """Return a number to nine significant digits; with its point or exponent a short text has no more."""
+    return float(text) if len(text) <= 10 else float(f"{float(text):.9g}")
+
+
+_NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=_nine_digits)
 UNPRINTED = "Nothing of this tooling has been printed yet: every clearance is a choice with a check behind it."
 
 

@@ -85,8 +85,17 @@ def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] |
 
     Raises `Refusal` for an unknown name and for a body of the spec that is not valid.
     """
+    return _tissue(name, own) if own else _shipped_tissue(name)
+
+
+@cache
+def _shipped_tissue(name: str) -> tuple[Tissue, ...]:
+    return _tissue(name, {})
+
+
+def _tissue(name: str, own: Mapping[str, Mapping[str, TissueEntry]]) -> tuple[Tissue, ...]:
     shipped = _raw("tissue.toml")
-    known: dict[str, Mapping[str, Any]] = {**shipped, **(own or {})}
+    known: dict[str, Mapping[str, Any]] = {**shipped, **own}
     if name not in known:
         raise unknown_name("estimate.tissue", name, known)
     layers = [_entry(Tissue, layer, _plain(table), f"tissue.{name}.{layer}") for layer, table in known[name].items()]

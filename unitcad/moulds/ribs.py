@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.rib_leaves import CREST, LEAF_WIDTH, leaf_mm
@@ -74,6 +75,7 @@ def ribs(spec: Spec, lay: Layout) -> tuple[Rib, ...]:
     return placed(lay.plinth, corner, end, moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest, leaf)
 
 
+@lru_cache(maxsize=16)
 def placed(
     half: tuple[float, float],
     corner: float,

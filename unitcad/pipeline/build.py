@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from unitcad import files
-from unitcad.cache import MemoryStore, MissingContent, Store
+from unitcad.cache import MemoryStore, MissingContent, Store, digest
 from unitcad.errors import UnitcadError
 from unitcad.json_text import json_bytes
 from unitcad.pipeline import folder as folders
@@ -34,10 +34,11 @@ TRIES = 5
 
 @dataclass(frozen=True)
 class Built:
-    """A built variant: its folder and its manifest."""
+    """A built variant: its folder, its manifest, and the SHA-256 of manifest.json."""
 
     folder: Path
     manifest: Manifest
+    sha256: str
 
     @property
     def ok(self) -> bool:
@@ -142,7 +143,7 @@ def build_into(
                     raise _Changed
                 product.place(fresh, store)
                 files.write_new(fresh / "timings.json", json_bytes(timings))
-            return Built(folder, product.manifest)
+            return Built(folder, product.manifest, digest(product.own["manifest.json"]))
         except MissingContent:  # the cache is cleared meanwhile
             if not left:
                 raise

@@ -136,14 +136,22 @@ def whole(folder: Path, *, hashes: bool = False) -> Manifest | None:
 _SYNCS = 16
 
 
-def sync(results: Iterable[Path]) -> None:
+def sync(results: Iterable[Path], threads: ThreadPoolExecutor | None = None) -> None:
     """Bring the results' own files to the disk; what they share is there since the cache has it. Raises OSError.
 
-    Many at once: the file system then writes its log a few times and not once a file.
+    Many at once: the file system then writes its log a few times and not once a file. Who syncs often keeps the
+    `threads`, by `sync_threads`: to start them costs more than to sync.
     """
+    if threads is None:
+        with sync_threads() as threads:
+            return sync(results, threads)
     paths = [path for result in results for path in _own_files(result)]
-    with ThreadPoolExecutor(_SYNCS) as pool:
-        list(pool.map(_sync, (paths[i::_SYNCS] for i in range(_SYNCS))))
+    list(threads.map(_sync, (paths[i::_SYNCS] for i in range(_SYNCS))))
+
+
+def sync_threads() -> ThreadPoolExecutor:
+    """Return the threads that `sync` works with."""
+    return ThreadPoolExecutor(_SYNCS)
 
 
 def _own_files(folder: str | os.PathLike[str]) -> Iterator[str]:

@@ -43,12 +43,13 @@ class Product:
 
     def place(self, folder: Path, store: Store) -> None:
         """Write it into an empty folder. Raises OSError, or MissingContent where the store has lost something."""
-        for parent in sorted({os.path.dirname(path) for path in (*self.own, *self.shared)}):
-            (folder / parent).mkdir(parents=True, exist_ok=True)
-        for path, sha256 in self.shared.items():  # names as text: a Path costs as much as the link
-            store.place(sha256, os.path.join(folder, path))
+        inside = f"{folder}{os.sep}"  # names as text: a Path costs as much as the link
+        for parent in sorted({os.path.dirname(path) for path in (*self.own, *self.shared)} - {""}):
+            os.makedirs(inside + parent, exist_ok=True)
+        for path, sha256 in self.shared.items():
+            store.place(sha256, inside + path)
         for path, content in self.own.items():
-            files.write_new(os.path.join(folder, path), content)
+            files.write_new(inside + path, content)
 
 
 def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:

@@ -64,7 +64,29 @@ def spec_hash(spec: Spec) -> str:
 
 def to_toml(spec: Spec) -> str:
     """Return the spec as TOML: the same spec when read again."""
-    return text_of(to_data(spec))
+    literals, tables = [], []
+    for key, value in to_data(spec).items():
+        text = _key_text(key, value)
+        (tables if text.startswith("[") else literals).append(text)
+    return "\n".join(["".join(literals), *tables])
+
+
+_TEXTS: dict[tuple[str, str], str] = {}
+"""Keys of specs as TOML, by their values: a variant differs from the one before in few of them."""
+_MOST_TEXTS, _LONGEST = 256, 2000
+
+
+def _key_text(key: str, value: Any) -> str:
+    """Return one key of a spec as TOML, as it stands in the whole."""
+    named = key, repr(value)
+    if named in _TEXTS:
+        return _TEXTS[named]
+    text = tomli_w.dumps({key: value})
+    if len(named[1]) <= _LONGEST:
+        if len(_TEXTS) >= _MOST_TEXTS:
+            _TEXTS.clear()
+        _TEXTS[named] = text
+    return text
 
 
 def text_of(data: Mapping[str, Any]) -> str:

@@ -54,6 +54,7 @@ def ends(variant: EstimateInput, step: float) -> tuple[EstimateInput, ...]:
     return tuple(change(variant, factor) for change in changed(variant).values() for factor in np.exp([-step, step]))
 
 
+@lru_cache(maxsize=4)
 def changed(variant: EstimateInput) -> dict[str, Scaled]:
     """Return every input of a variant by its name: a function from the variant and a factor to the changed variant."""
     by_name: dict[str, Scaled] = {}

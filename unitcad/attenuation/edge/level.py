@@ -20,6 +20,7 @@ from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 _MOST_CORNERS = 12
 _NOT_FINITE = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
 _WAVES: tuple[cf.Wave, ...] = ("s", "p")
+_OF_WAVES: dict[str, Callable[[Units, cf.Wave], Any]] = {"paper": cf.paper_path, "consistent": cf.consistent_path}
 KINDS = {
     "paper": "the paper's closed form as printed: transmission coefficients and exponentials along the walls, one "
     "constant s from the table (f1 and f2 are not printed)",
@@ -130,15 +131,38 @@ def ranged(variant: EstimateInput) -> tuple[str, ...]:
     )
 
 
-def spread(variant: EstimateInput, predict: Callable[[Units], Any]) -> dict[str, Any]:
-    """Return {value, low, high} of `predict`, and a `reason` for what is null.
+class _AtCorners:
+    """A model's path at the corners of a variant and of its controls, each worked out once: level, amplitude and ratios
+    read the same.
+    """
+
+    def __init__(self, variant: EstimateInput, model: str, constants: Mapping[str, float]) -> None:
+        self.variant, self.model, self.constants = variant, model, constants
+        self._made: dict[tuple[cf.Wave, int | None], Any] = {}
+
+    def path(self, wave: cf.Wave = "s", control: int | None = None) -> Any:
+        """Return the path of the variant, or of the control of a layer; `wave` for the models that have waves."""
+        key = wave, control
+        if key not in self._made:
+            units = corners(self.variant) if control is None else _control_corners(self.variant, control)
+            of_wave = _OF_WAVES.get(self.model)
+            self._made[key] = of_wave(units, wave) if of_wave else path_of(self.model, self.constants)(units)
+        return self._made[key]
+
+    def ratio(self, control: int, wave: cf.Wave = "s") -> dict[str, Any]:
+        """Return the spread of the path over that of the control of a layer."""
+        return spread(self.variant, lambda: self.path(wave) / self.path(wave, control))
+
+
+def spread(variant: EstimateInput, predict: Callable[[], Any]) -> dict[str, Any]:
+    """Return {value, low, high} of `predict`, a number for each corner, and a `reason` for what is null.
 
     The value is null where an input has a range only; all three where an input is not known.
     """
     reason = unknown(variant)
     if reason:
         return {"value": None, "low": None, "high": None, "reason": reason}
-    values = np.atleast_1d(predict(corners(variant)))
+    values = np.atleast_1d(predict())
     if not np.all(np.isfinite(values)):
         reason = _NOT_FINITE
         middle = float(values[0]) if np.isfinite(values[0]) else None
@@ -156,11 +180,11 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
     With a lab's `fit` the constants are its own, and the level has a predictive range.
     """
     constants = fit.constants(model) if fit else stored(variant.moduli)[model]
-    path, scale = path_of(model, constants), constants["s"]
+    at, scale = _AtCorners(variant, model, constants), constants["s"]
     block: dict[str, Any] = {
         "kind": KINDS[model],
         "edge_level": {
-            **spread(variant, lambda units: scale * path(units)),
+            **spread(variant, lambda: scale * at.path()),
             "unit": "of the motor's amplitude",
         },
     }
@@ -168,13 +192,13 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
         block["predictive"] = predictive_block(fit, model, variant)
     if variant.amplitude is not None:
         factor = scale * variant.amplitude * 1e6
-        block["edge_amplitude_um"] = spread(variant, lambda units: factor * path(units))
+        block["edge_amplitude_um"] = spread(variant, lambda: factor * at.path())
     by_squares = "least squares of the log of nine measured levels"
     by_mean = "geometric mean of measured level over path, nine levels"
     by_fit = fit and f"{fit.name}: {fit.units} units of the lab's own, shrunk towards the stored constants"
     block["constants"] = {**constants, "made_by": by_fit or (by_squares if model == "fitted" else by_mean)}
     controls = _controls(variant)
-    block["hierarchical_over_control"] = [_ratio(variant, model, index, constants) for index in controls] or None
+    block["hierarchical_over_control"] = [_ratio(at, index) for index in controls] or None
     if not controls:
         block["hierarchical_over_control_reason"] = "a single layer is its own control"
     if model == "paper":
@@ -200,18 +224,12 @@ def _controls(variant: EstimateInput) -> list[int]:
     return [names.index(name) for name in dict.fromkeys(names)]
 
 
-def _ratio(variant: EstimateInput, model: str, index: int, constants: Mapping[str, float]) -> dict[str, Any]:
+def _ratio(at: _AtCorners, index: int) -> dict[str, Any]:
     """Return the level over that of the control of layer `index`, by wave where the model has waves."""
-    name = variant.layers[index].material
-    if model in ("fitted", "bush"):
-        path = path_of(model, constants)
-        return {"control": name, **spread(variant, lambda u: path(u) / path(_control_corners(variant, index)))}
-    along = cf.paper_path if model == "paper" else cf.consistent_path
-    by_wave = {
-        wave: spread(variant, lambda u, wave=wave: along(u, wave) / along(_control_corners(variant, index), wave))
-        for wave in _WAVES
-    }
-    return {"control": name, **by_wave["s"], "wave": "s", "p": by_wave["p"]}
+    name = at.variant.layers[index].material
+    if at.model not in _OF_WAVES:
+        return {"control": name, **at.ratio(index)}
+    return {"control": name, **at.ratio(index, "s"), "wave": "s", "p": at.ratio(index, "p")}
 
 
 def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any]:
@@ -219,7 +237,8 @@ def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any
         return {"wave_of_the_level": "s", "reading_of_eta": "loss_modulus", "constraints": None, "readings": None}
     units = corners(variant) if ranged(variant) else nominal(variant)
     paths = _paths(units)
-    own = {i: _paths(units.control(i)) for i in controls}
+    alone = {i: units.control(i) for i in controls}
+    own = {i: _paths(control) for i, control in alone.items()}
     coefficients = {}
     for wave in _WAVES:
         z = cf.with_air(cf.impedances(units, wave), wave)
@@ -234,17 +253,18 @@ def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any
         "interfaces": [f"Layer {i + 1} to {i + 2}" for i in range(len(variant.layers) - 1)] + ["last layer to air"],
         "coefficients": coefficients,
         "readings": [_reading(variant, units, reading, paths, own) for reading in cf.READINGS],
-        "constraints": _constraints(variant, units, controls),
+        "constraints": _constraints(variant, units, alone),
     }
 
 
-def _constraints(variant: EstimateInput, units: Units, controls: list[int]) -> list[dict[str, Any]]:
+def _constraints(variant: EstimateInput, units: Units, controls: Mapping[int, Units]) -> list[dict[str, Any]]:
     """Return 6a and 6b for each control; 6c and 6d, which need no control, once."""
+    first = next(iter(controls), None)
     return [
         _constraint(constraint, variant.layers[index].material if constraint.name in ("6a", "6b") else None, variant)
-        for index in controls
-        for constraint in cf.constraints(units, units.control(index))
-        if index == controls[0] or constraint.name in ("6a", "6b")
+        for index, control in controls.items()
+        for constraint in cf.constraints(units, control)
+        if index == first or constraint.name in ("6a", "6b")
     ]
 
 

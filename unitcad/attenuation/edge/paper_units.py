@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Section
 from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
-from unitcad.attenuation.inputs import EstimateInput
+from unitcad.attenuation.inputs import EstimateInput, Geometry
 from unitcad.catalogue import measurements, motors
 
 _SAME = 1e-6
@@ -61,24 +62,37 @@ def unlike_measured(variant: EstimateInput) -> list[str]:
         "design": bool(alike) and not own,
         "silicones": any(layer.material not in measured for layer in variant.layers),
     }
-    shape = sections([variant.geometry])
-    lengths = min((_other_lengths(shape, table.inputs[i].section) for i in own or alike), key=len, default=[])
+    lengths = _nearest(variant.geometry, tuple(own or alike))
     return [*(name for name, other in kinds.items() if other), *_differs_from_all(variant), *lengths]
 
 
-def _differs_from_all(variant: EstimateInput) -> list[str]:
+@lru_cache(maxsize=64)
+def _nearest(geometry: Geometry, rows: tuple[int, ...]) -> tuple[str, ...]:
+    """Return which lengths of a unit are not as in the nearest of some rows of the table."""
+    shape, table = sections([geometry]), measured_table()
+    return tuple(min((_other_lengths(shape, table.inputs[i].section) for i in rows), key=len, default=[]))
+
+
+def _differs_from_all(variant: EstimateInput) -> tuple[str, ...]:
     """Return what of a unit is not as in the measured ones, of what these share."""
+    geometry, frequency = variant.geometry, variant.frequency.middle
+    lengths = geometry.motor_height, geometry.motor_radius, variant.diameter
+    return _differs(*lengths, variant.drive, variant.tissue_name, frequency)
+
+
+@lru_cache(maxsize=64)
+def _differs(height: float, radius: float, diameter: float, drive: str, body: str, frequency: float) -> tuple[str, ...]:
     shared = measurements().unit
     motor = motors()[shared.motor]
     of_all = {
-        "motor": not np.isclose(variant.geometry.motor_height, 1e-3 * float(motor.thickness_mm), atol=_SAME)
-        or not np.isclose(variant.geometry.motor_radius, 5e-4 * float(motor.diameter_mm), atol=_SAME),
-        "diameter": not np.isclose(variant.diameter, 1e-3 * shared.diameter_mm, atol=_SAME),
-        "drive": motor.drive is not None and variant.drive != motor.drive.value,
-        "body": variant.tissue_name != shared.tissue,
-        "frequency": not np.isclose(variant.frequency.middle, shared.frequency_hz),
+        "motor": not np.isclose(height, 1e-3 * float(motor.thickness_mm), atol=_SAME)
+        or not np.isclose(radius, 5e-4 * float(motor.diameter_mm), atol=_SAME),
+        "diameter": not np.isclose(diameter, 1e-3 * shared.diameter_mm, atol=_SAME),
+        "drive": motor.drive is not None and drive != motor.drive.value,
+        "body": body != shared.tissue,
+        "frequency": not np.isclose(frequency, shared.frequency_hz),
     }
-    return [name for name, other in of_all.items() if other]
+    return tuple(name for name, other in of_all.items() if other)
 
 
 def _other_lengths(own: Section, shapes: Section | None) -> list[str]:
