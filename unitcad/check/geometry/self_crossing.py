@@ -13,18 +13,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from unitcad.check.geometry import coverings, triangles
-from unitcad.check.geometry.contact import Contacts, FaceBoxes, face_boxes
+from unitcad.check.geometry.contact import MOST_RANK, Contacts, FaceBoxes, RankedBoxes, face_boxes, ranked_boxes
 from unitcad.check.geometry.edges import balanced
 from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.stars import height_fields
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import same_place
-from unitcad.geometry.arrays import Bools, Floats, Ints
-from unitcad.geometry.boxes import box_order, boxes_of, frame_of, meeting_pairs, slabs_of
+from unitcad.geometry.arrays import Bools, Floats, Ints, distinct
+from unitcad.geometry.boxes import box_order, boxes_of, frame_of, meeting_pairs, ranks_of, slabs_of
 from unitcad.geometry.ticks import Interrupted, Tick
 
 _BLOCK = 1 << 17
 _PAIRS = 1 << 15  # pairs looked at together: enough to outweigh the calls, few enough for the cache
+_RARE = 16  # of so many faces less than one has such a corner: most pairs need no look for one in common
 _OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothing but perhaps touching
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
@@ -33,15 +34,17 @@ _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself every
 class Faces:
     """Faces in the order of a space-filling curve and what the sieves need of them.
 
-    `normal` (3, m) is twice their area vectors; the vertices of `planes` are the first in each place.
+    `normal` (3, m) is twice their area vectors; the vertices of `planes` are the first in each place. `safe` are the
+    corners whose stars are height fields, others -1; `some_safe` says which faces have one, where few do.
     """
 
     vertices: Floats
     corners: Ints
     normal: Floats
     safe: Ints
+    some_safe: Bools | None
     planes: Planes
-    boxes: FaceBoxes
+    boxes: FaceBoxes | RankedBoxes
     shell: Ints
     original: Ints
     several: bool
@@ -70,7 +73,8 @@ class Crossings:
 
     def touching(self) -> Ints:
         """Return pairs of shells (k, 2) whose faces meet, the smaller number first."""
-        return self.contact.shells_of(np.unique(self.contact.pairs()[0]))
+        keys = self.contact.pairs()[0]
+        return self.contact.shells_of(keys[distinct(keys)])
 
 
 def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Crossings:
@@ -87,7 +91,7 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
     if len(order) < 2:
         return Crossings()
     tick()
-    faces = _prepared(topology, order, normal)
+    faces = _prepared(topology, order, normal, ranks_of(steps, mesh.vertices, MOST_RANK))
     boxes, slabs = boxes.take(order, axis=0), slabs_of(steps, *faces.corners)
     del normal, steps
     crossings = Crossings(faces, Contacts(topology.n_shells, every=every))
@@ -110,18 +114,21 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
     return crossings
 
 
-def _prepared(topology: Topology, order: Ints, normal: Floats) -> Faces:
+def _prepared(topology: Topology, order: Ints, normal: Floats, ranks: list[Ints] | None) -> Faces:
     vertices, several = topology.mesh.vertices, topology.n_shells > 1
     columns, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(topology.mesh.faces.take(order, axis=0).T)
     smooth = height_fields(columns, corners, normal, _surrounded(topology))
+    safe = smooth.take(corners)
+    has_safe = np.asarray(safe.any(axis=0))
     places = same_place(vertices).take(corners) if several else corners
     return Faces(
         vertices,
         corners,
         normal,
-        np.where(smooth.take(corners), corners, np.int32(-1)),
+        np.where(safe, corners, np.int32(-1)),
+        has_safe if np.count_nonzero(has_safe) * _RARE < len(order) else None,
         planes_of(columns, places, normal),
-        face_boxes(columns, corners),
+        face_boxes(columns, corners) if ranks is None else ranked_boxes(ranks, corners),
         topology.shells[order],
         topology.kept[order],
         several,
@@ -141,6 +148,15 @@ def _surrounded(topology: Topology) -> Bools:
 
 def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     """Drop pairs that share a vertex whose star is a height field."""
+    if faces.some_safe is not None:
+        some = np.flatnonzero(faces.some_safe.take(i, mode="clip"))
+        drop = some[_share_safe(faces, i[some], j[some])]
+        return (np.delete(i, drop), np.delete(j, drop)) if len(drop) else (i, j)
+    keep = np.flatnonzero(~_share_safe(faces, i, j))
+    return i[keep], j[keep]
+
+
+def _share_safe(faces: Faces, i: Ints, j: Ints) -> Bools:
     mine = [safe.take(i, mode="clip") for safe in faces.safe]
     theirs = [corner.take(j, mode="clip") for corner in faces.corners]
     shared = mine[0] == theirs[0]
@@ -149,8 +165,7 @@ def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
         for b in range(3):
             if a or b:
                 shared |= np.equal(mine[a], theirs[b], out=part)
-    keep = np.flatnonzero(~shared)
-    return i[keep], j[keep]
+    return shared
 
 
 def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings) -> None:
@@ -208,18 +223,31 @@ def _common(a: Ints, b: Ints) -> Ints:
 
 def _contacts(faces: Faces, i: Ints, j: Ints, crossings: Crossings) -> None:
     """Note the shells that meet, of pairs of faces that can do no more than touch; those that share a corner do."""
-    one, other = faces.shell[i], faces.shell[j]
-    keys = crossings.contact.keys(one, other)
-    asked = crossings.contact.open(keys)
-    asked = asked[one[asked] != other[asked]]
-    i, j, keys = i[asked], j[asked], keys[asked]
-    pair, sharing = np.stack([i, j], axis=1), _common(faces.planes.vertices(i), faces.planes.vertices(j)) > 0
-    crossings.contact.add(keys[sharing], pair[sharing])
-    asked = np.flatnonzero(~sharing)
-    asked = asked[crossings.contact.open(keys[asked])]
-    a, b = (faces.vertices[faces.corners[:, f[asked]].T] for f in (i, j))
-    asked = asked[triangles.meet(a, b).touches]
-    crossings.contact.add(keys[asked], pair[asked])
+    contact = crossings.contact
+    one, other = faces.shell.take(i), faces.shell.take(j)
+    apart = np.flatnonzero(one != other)
+    keys = contact.keys(one.take(apart), other.take(apart))
+    asked = contact.open(keys)
+    i, j, keys = i[apart[asked]], j[apart[asked]], keys[asked]
+    asked = np.arange(len(keys))
+    if not contact.every:  # mostly the first pair of two shells shares a corner, and the others need no look
+        first = contact.foremost(keys)
+        first = first[_sharing(faces, i[first], j[first])]
+        contact.add(keys[first], np.stack([i[first], j[first]], axis=1))
+        asked = contact.open(keys)
+    sharing = _sharing(faces, i[asked], j[asked])
+    some = asked[sharing]
+    contact.add(keys[some], np.stack([i[some], j[some]], axis=1))
+    some = asked[~sharing]
+    some = some[contact.open(keys[some])]
+    a, b = (faces.vertices[faces.corners[:, f[some]].T] for f in (i, j))
+    some = some[triangles.meet(a, b).touches]
+    contact.add(keys[some], np.stack([i[some], j[some]], axis=1))
+
+
+def _sharing(faces: Faces, i: Ints, j: Ints) -> Bools:
+    """Return which pairs of faces have a corner in one place."""
+    return _common(faces.planes.vertices(i), faces.planes.vertices(j)) > 0
 
 
 def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Crossings) -> None:
