@@ -14,7 +14,6 @@ import numpy as np
 
 from unitcad.check.geometry import coverings, triangles
 from unitcad.check.geometry.contact import MOST_RANK, Contacts, FaceBoxes, RankedBoxes, face_boxes, ranked_boxes
-from unitcad.check.geometry.edges import balanced
 from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.stars import height_fields
 from unitcad.check.geometry.topology import Topology
@@ -140,7 +139,7 @@ def _surrounded(topology: Topology) -> Bools:
     """Return vertices all of whose edges have two faces, wound alike."""
     edges, whole = topology.edges, np.ones(len(topology.mesh.vertices), bool)
     if not edges.closed:
-        wrong = (edges.size != 2) | ~balanced(topology.mesh.faces, edges)
+        wrong = (edges.size != 2) | ~edges.balanced
         whole[edges.low[wrong]] = False
         whole[edges.high[wrong]] = False
     return whole

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from unitcad.check.geometry.edges import Edges, balanced
+from unitcad.check.geometry.edges import Edges
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _BLOCK = 500_000
 
 
-def closed(faces: Ints, edges: Edges, shells: Ints, n: int) -> Bools:
+def closed(edges: Edges, shells: Ints, n: int) -> Bools:
     """Return whether each of `n` shells has an inside: at all its edges as many faces run one way as the other."""
     inside = np.ones(n, bool)
     if not edges.closed:
-        wrong = np.repeat(~balanced(faces, edges), edges.size)
+        wrong = np.repeat(~edges.balanced, edges.size)
         inside[shells[edges.order[wrong] // 3]] = False
     return inside
 
