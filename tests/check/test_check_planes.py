@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from unitcad.check.geometry import self_crossing
 from unitcad.check.geometry.contact import MOST_RANK, Contacts, face_boxes, ranked_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
-from unitcad.check.geometry.triangle_mesh import area_vectors
+from unitcad.check.geometry.topology import topology_of
+from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
 from unitcad.check.geometry.triangles import meet
+from unitcad.check.rules.f_limits import Deadline
 from unitcad.geometry.boxes import frame_of, ranks_of, slabs_of
 
 N = 4000
@@ -160,3 +163,23 @@ def test_contacts_keep_the_first_pair_of_two_shells(shells: int, every: bool) ->
         assert list(zip(keys.tolist(), map(tuple, pairs.tolist()), strict=True)) == wanted
     low, high = contacts.shells_of(keys).T
     assert (contacts.keys(high, low) == keys).all()
+
+
+def test_few_pairs_and_many_are_sieved_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sieve of the faces in some pairs says what that of all faces does."""
+    rng = np.random.default_rng(4)
+    points = np.concatenate([rng.normal(size=(900, 3)), rng.integers(-2, 3, (900, 3)) + 0.1])
+    faces = np.arange(1800, dtype=np.int32).reshape(-1, 3)
+    found = []
+    for sparse in (0, 10**9):
+        monkeypatch.setattr(self_crossing, "_SPARSE", sparse)
+        top = topology_of(Mesh(points, faces), Deadline(60).tick)
+        crossings = self_crossing.crossings_of(top, Deadline(60).tick, every=True)
+        assert crossings.faces is not None
+        assert len(crossings.faces.sieves) == (sparse > 0)
+        found.append(
+            (joined := self_crossing.joined)(crossings.crossing).tolist() + joined(crossings.covering).tolist()
+        )
+        found[-1] += crossings.contact.pairs()[1].tolist()
+    assert len(found[0]) > 100
+    assert found[0] == found[1]
