@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from unitcad.check.geometry.contact import face_boxes
+from unitcad.check.geometry import self_crossing
+from unitcad.check.geometry.contact import MOST_RANK, Contacts, face_boxes, ranked_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
-from unitcad.check.geometry.triangle_mesh import area_vectors
+from unitcad.check.geometry.topology import topology_of
+from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
 from unitcad.check.geometry.triangles import meet
-from unitcad.geometry.boxes import frame_of, slabs_of
+from unitcad.check.rules.f_limits import Deadline
+from unitcad.geometry.boxes import frame_of, ranks_of, slabs_of
 
 N = 4000
 
@@ -117,3 +120,66 @@ def test_boxes_that_touch_hold_faces_that_do_no_more() -> None:
         held = (one == plane[:, None]).sum(axis=1) + (other == plane[:, None]).sum(axis=1)
         touch |= ((plane == other.min(axis=1)) & (held < 5)).any(axis=1)
     assert (flush == (touch & ~apart)).all()
+    ranks = ranks_of(frame_of(points.T).steps(points.T), points.T, MOST_RANK)
+    assert ranks is not None
+    apart_by_rank, flush_by_rank = ranked_boxes(ranks, faces).relation(np.arange(N), np.arange(N, 2 * N))
+    assert not apart_by_rank.any()  # of pairs whose boxes meet, which alone are asked for
+    assert (flush_by_rank == flush)[~apart].all()
+
+
+def test_ranks_tell_all_coordinates_apart_or_are_none() -> None:
+    rng = np.random.default_rng(2)
+    points = rng.integers(0, 200, (3000, 3)) * [0.1, 3.0, 1000.0] - 7
+    steps = frame_of(points).steps(points)
+    ranks = ranks_of(steps, points, 199)
+    assert ranks is not None
+    for axis in range(3):
+        assert (np.unique(points[:, axis])[ranks[axis]] == points[:, axis]).all()
+    assert ranks_of(steps, points, 198) is None
+    points[5, 1] += 1e-9
+    assert ranks_of(frame_of(points).steps(points), points, MOST_RANK) is None
+
+
+@pytest.mark.parametrize("every", [False, True])
+@pytest.mark.parametrize("shells", [3, 40, 1_000_000])
+def test_contacts_keep_the_first_pair_of_two_shells(shells: int, every: bool) -> None:
+    """Also of shells that share a slot, in one block and over several."""
+    rng = np.random.default_rng(shells)
+    contacts = Contacts(shells, every)
+    expected: dict[int, list[tuple[int, int]]] = {}
+    for block in range(5):
+        one, other = (
+            rng.integers(0, shells, (2, 3000)) // 1000 * 1000 if shells > 40 else rng.integers(0, shells, (2, 90))
+        )
+        keys = contacts.keys(one, other)
+        pairs = np.stack([np.arange(len(keys)) + block * 5000, rng.integers(0, 99, len(keys))], axis=1)
+        for key, pair in zip(keys.tolist(), pairs.tolist(), strict=True):
+            expected.setdefault(key, []).append(tuple(pair))
+        open_ = contacts.open(keys)
+        contacts.add(keys[open_], pairs[open_])
+    for _ in range(2):
+        keys, pairs = contacts.pairs()
+        wanted = [(key, pair) for key in sorted(expected) for pair in expected[key][: None if every else 1]]
+        assert list(zip(keys.tolist(), map(tuple, pairs.tolist()), strict=True)) == wanted
+    low, high = contacts.shells_of(keys).T
+    assert (contacts.keys(high, low) == keys).all()
+
+
+def test_few_pairs_and_many_are_sieved_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sieve of the faces in some pairs says what that of all faces does."""
+    rng = np.random.default_rng(4)
+    points = np.concatenate([rng.normal(size=(900, 3)), rng.integers(-2, 3, (900, 3)) + 0.1])
+    faces = np.arange(1800, dtype=np.int32).reshape(-1, 3)
+    found = []
+    for sparse in (0, 10**9):
+        monkeypatch.setattr(self_crossing, "_SPARSE", sparse)
+        top = topology_of(Mesh(points, faces), Deadline(60).tick)
+        crossings = self_crossing.crossings_of(top, Deadline(60).tick, every=True)
+        assert crossings.faces is not None
+        assert len(crossings.faces.sieves) == (sparse > 0)
+        found.append(
+            (joined := self_crossing.joined)(crossings.crossing).tolist() + joined(crossings.covering).tolist()
+        )
+        found[-1] += crossings.contact.pairs()[1].tolist()
+    assert sum(map(len, found[0])) > 100
+    assert found[0] == found[1]

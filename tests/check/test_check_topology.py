@@ -11,6 +11,7 @@ from shapes import CUBE_CORNERS, CUBE_FACES, box, stl
 
 from unitcad.check import check_mesh
 from unitcad.check.geometry import edges as mesh_edges
+from unitcad.check.geometry.edges import _order_within
 from unitcad.check.geometry.triangle_mesh import weld_exact
 from unitcad.check.geometry.volumes import winding_number
 from unitcad.geometry.components import components
@@ -247,3 +248,12 @@ def test_closed_shells_side_by_side_share_no_duplicates(parts: list[np.ndarray],
     report = judge(stl(np.concatenate(parts)))
     assert sum(found.count for found in report.findings if found.code == "T009") == duplicates
     assert report.has("G003") or duplicates
+
+
+def test_values_are_put_in_order_within_groups_as_one_sort_of_all_would() -> None:
+    """Groups of few and of many, with equal values, which keep their order."""
+    rng = np.random.default_rng(3)
+    size = rng.choice([4, 6, 8, 10, 30], 400)
+    starts, group = np.cumsum(size) - size, np.repeat(np.arange(400), size)
+    values = rng.integers(0, 5, len(group)).astype(float)
+    assert (_order_within(size, starts, values) == np.lexsort((values, group))).all()

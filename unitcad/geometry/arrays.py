@@ -32,6 +32,20 @@ def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDAr
     return packed, order
 
 
+def distinct(ordered: Ints) -> Bools:
+    """Return where in sorted numbers another one begins."""
+    fresh = np.ones(len(ordered), bool)
+    np.not_equal(ordered[1:], ordered[:-1], out=fresh[1:])
+    return fresh
+
+
+def among(numbers: Ints, known: Ints) -> Bools:
+    """Return which numbers are among the `known` ones, which are sorted."""
+    if not len(known):
+        return np.zeros(len(numbers), bool)
+    return np.asarray(known.take(np.searchsorted(known, numbers), mode="clip") == numbers)
+
+
 def extent(points: Floats) -> tuple[Floats, Floats]:
     """Return low and high corner of the box round (n, 3) points.
 

@@ -48,6 +48,22 @@ def frame_of(points: Floats) -> Frame:
     return Frame(low, (_TOP - 1) / np.maximum(high - low, 1e-300))
 
 
+def ranks_of(steps: list[Ints], points: Floats, most: int) -> list[Ints] | None:
+    """Return the ranks of the coordinates of (n, 3) points along each axis, uint16 from 0 to `most`.
+
+    None where two of them have one step, or where there are more.
+    """
+    ranks = []
+    for axis, step in enumerate(steps):
+        column, holder, there = points[:, axis], np.zeros(_TOP + 1), np.zeros(_TOP + 1, bool)
+        holder[step] = column
+        there[step] = True
+        if np.count_nonzero(there) > most + 1 or not np.array_equal(holder.take(step), column):
+            return None
+        ranks.append((np.cumsum(there) - 1).astype(np.uint16).take(step))
+    return ranks
+
+
 def morton_order(steps: list[Ints], corner: Ints | None = None) -> Ints:
     """Return the order of points along a space-filling curve.
 

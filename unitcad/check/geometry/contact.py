@@ -10,11 +10,55 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, sorted_with_order
 
 _FACES = 1 << 14  # faces whose corners stay in the processor's cache
 _LATELY = 1 << 16  # pairs of shells remembered: those found again are near each other in the order of the faces
 _FIVE = np.uint16(0x333)  # added to sums of corners, four bits an axis: the fourth bit says five or more
+
+
+@dataclass(frozen=True)
+class RankedBoxes:
+    """Boxes of faces by the ranks of their sides, words of three axes: what can only touch is told by one comparison.
+
+    `high` are 8 times the ranks and how many corners lie there; `low` are 8 times the ranks less that number, plus 4.
+    Where the boxes of two faces touch, the former is at most the latter if four corners or fewer lie in the plane.
+    """
+
+    low: Ints
+    high: Ints
+
+    def relation(self, i: Ints, j: Ints) -> tuple[Bools, Bools]:
+        """Return what `FaceBoxes.relation` does for pairs of faces whose steps meet: no boxes are apart."""
+        touch = self._below(i, j)
+        touch |= self._below(j, i)
+        return np.zeros(len(i), bool), np.asarray(touch.view(np.uint32) != 0)
+
+    def _below(self, i: Ints, j: Ints) -> Bools:
+        return self.high.take(i, mode="clip").view(np.uint16) <= self.low.take(j, mode="clip").view(np.uint16)
+
+
+MOST_RANK = 8191
+"""The largest rank that `RankedBoxes` has room for."""
+
+
+def ranked_boxes(ranks: list[Ints], ids: Ints) -> RankedBoxes:
+    """Return the boxes of faces from the ranks of the vertices along each axis, and the faces' ids (3, m)."""
+    low, high = np.zeros(ids.shape[1], np.uint64), np.full(ids.shape[1], 0xFFFF, np.uint64)
+    lows, highs = (words.view(np.uint16).reshape(-1, 4) for words in (low, high))
+    highs[:, 3], lows[:, 3] = 0xFFFF, 0  # never touch along the axis that is not there
+    for start in range(0, ids.shape[1], _FACES):
+        block = slice(start, start + _FACES)
+        for axis, rank in enumerate(ranks):
+            one, two, three = (rank.take(corner[block], mode="clip") for corner in ids)
+            least, most = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
+            on_low, on_high = np.zeros((2, len(one)), np.uint16)
+            for corner in (one, two, three):
+                on_low += corner == least
+                on_high += corner == most
+            highs[block, axis] = most * np.uint16(8) + on_high
+            lows[block, axis] = least * np.uint16(8) + np.uint16(4) - on_low
+    return RankedBoxes(low, high)
 
 
 @dataclass(frozen=True)
@@ -69,13 +113,14 @@ class Contacts:
     """Pairs of shells that meet, each with the first pair of faces found, or with `every` one.
 
     `noted` are pairs of faces in blocks, some of shells that were noted before; `lately` has the keys of some shells
-    that were, each at its own place.
+    that were, each at its own place, and `holder` is room to find the first of several in.
     """
 
     shells: int
     every: bool = False
     noted: list[tuple[Ints, Ints]] = field(default_factory=list)
     lately: Ints = field(default_factory=lambda: np.full(_LATELY, -1))
+    holder: Ints = field(default_factory=lambda: np.empty(_LATELY, np.int32))
 
     def keys(self, one: Ints, other: Ints) -> Ints:
         """Return a number for each pair of shells, in either order."""
@@ -85,14 +130,24 @@ class Contacts:
         """Return which keys (k,) may not be known yet: all that are not, and some others."""
         if self.every:
             return np.arange(len(keys))
-        return np.flatnonzero(self.lately.take(keys % _LATELY) != keys)
+        return np.flatnonzero(self.lately.take(keys & (_LATELY - 1)) != keys)
+
+    def foremost(self, keys: Ints) -> Ints:
+        """Return the first place of each key in `keys` (k,), and all places of some; with `every` one, all places."""
+        places = np.arange(len(keys), dtype=np.int32)
+        if self.every:
+            return places
+        slots = keys & (_LATELY - 1)
+        self.holder[slots[::-1]] = places[::-1]  # of keys that share a slot, the first one stays
+        first = self.holder.take(slots)
+        return np.flatnonzero((first == places) | (keys.take(first) != keys))
 
     def add(self, keys: Ints, pairs: Ints) -> None:
         """Note pairs of faces that meet (k, 2), one for each pair of shells or `every` one."""
         if not self.every and len(keys):
-            keys, first = np.unique(keys, return_index=True)
-            pairs = pairs[first]
-            self.lately[keys % _LATELY] = keys
+            first = self.foremost(keys)
+            keys, pairs = keys[first], pairs[first]
+            self.lately[keys & (_LATELY - 1)] = keys
         self.noted.append((keys, pairs))
 
     def pairs(self) -> tuple[Ints, Ints]:
@@ -100,12 +155,11 @@ class Contacts:
         if not self.noted:
             return np.empty(0, np.int64), np.empty((0, 2), np.int32)
         keys, pairs = (np.concatenate(part) for part in zip(*self.noted, strict=True))
-        if self.every:
-            order = np.argsort(keys, kind="stable")
-            keys, pairs = keys[order], pairs[order]
-        else:
-            keys, first = np.unique(keys, return_index=True)
-            pairs = pairs[first]
+        ordered, order = sorted_with_order(keys.astype(np.uint64), max(self.shells**2 - 1, 1).bit_length())
+        if not self.every:
+            fresh = distinct(ordered)
+            ordered, order = ordered[fresh], order[fresh]
+        keys, pairs = ordered.astype(np.int64), pairs[order]
         self.noted = [(keys, pairs)]  # sorted, the next time takes less
         return keys, pairs
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from unitcad.check.geometry import edges as mesh_edges
 from unitcad.check.geometry.edges import Edges, Turns
 from unitcad.check.geometry.predicates import orient3d
 from unitcad.check.geometry.topology import Topology, max_side_squared
 from unitcad.check.geometry.triangle_mesh import area_vectors, float32_steps
 from unitcad.check.geometry.volumes import side_by_side
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints, sorted_with_order
 
 _FLAT = 2.0  # float32 steps: a fold thinner than that has no thickness
 _WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding
@@ -57,7 +56,9 @@ def through_edges(turns: Turns | None, shells: Ints) -> Ints:
         return np.empty(0, np.int64)
     group, ends, turn = turns.group, turns.ends, turns.turn
     shell = shells[turns.half // 3]
-    order = np.lexsort((turn, shell, group))
+    n = int(shell.max()) + 1  # the half-edges are in the order of turns already
+    bits = (len(turns.many) * n).bit_length()
+    order = sorted_with_order(group.astype(np.uint64) * np.uint64(n) + shell.astype(np.uint64), bits)[1]
     group, ends, turn, shell = group[order], ends[order], turn[order], shell[order]
     own = np.append(True, (group[1:] != group[:-1]) | (shell[1:] != shell[:-1]))
     start = np.flatnonzero(own)
@@ -78,7 +79,7 @@ def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> 
     """Return edges of two faces that look opposite ways and are in one plane as float32 has it, though not exactly."""
     two = edges.size == 2
     if not edges.closed:  # two faces that run alike are turned over, not folded
-        two &= mesh_edges.balanced(faces, edges)
+        two &= edges.balanced
     pair = edges.first[two]
     left, right = edges.order[pair] // 3, edges.order[pair + 1] // 3
     facing = np.zeros(len(pair))

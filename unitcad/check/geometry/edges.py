@@ -6,10 +6,11 @@ A half-edge is 3 * face + side; side k runs from corner k to corner k + 1. Every
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, cross, sorted_with_order
+from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, sorted_with_order
 from unitcad.geometry.components import components, scipy_pays
 
 _SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
@@ -17,17 +18,25 @@ _SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
 
 @dataclass(frozen=True)
 class Edges:
-    """Half-edges sorted by their undirected edge. `first` and `size` describe the groups in `order`.
+    """Half-edges of `faces` sorted by their undirected edge. `first` and `size` describe the groups in `order`.
 
     `closed` is true where every edge has exactly two faces that run along it in opposite directions.
     """
 
+    faces: Ints
     order: Ints
     first: Ints
     size: Ints
     low: Ints
     high: Ints
     closed: bool
+
+    @cached_property
+    def balanced(self) -> Bools:
+        """Whether at each edge as many faces run one way as the other, as they do round a solid."""
+        last = self.first + self.size - 1
+        count = np.cumsum(self.faces.reshape(-1)[self.order] == np.repeat(self.low, self.size), dtype=np.int32)[last]
+        return 2 * np.diff(count, prepend=np.int32(0)) == self.size
 
 
 @dataclass(frozen=True)
@@ -65,7 +74,7 @@ def edges_of(faces: Ints, n_vertices: int) -> Edges:
     first = np.flatnonzero(fresh).astype(np.int32)
     size = np.diff(np.append(first, np.int32(n)))
     closed = n > 0 and bool((size == 2).all()) and not (start[order[0::2]] == start[order[1::2]]).any()
-    return Edges(order, first, size, low[first], high[first], bool(closed))
+    return Edges(faces, order, first, size, low[first], high[first], bool(closed))
 
 
 def _sorted_edges(low: Ints, high: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:
@@ -154,17 +163,11 @@ def shells_of(faces: Ints, edges: Edges, turns: Turns | None) -> Ints:
     return components(len(faces), left // 3, right // 3)
 
 
-def balanced(faces: Ints, edges: Edges) -> Bools:
-    """Return for each edge whether as many faces run along it one way as the other, as they do round a solid."""
-    along = faces.reshape(-1)[edges.order] == np.repeat(edges.low, edges.size)
-    return 2 * np.add.reduceat(along.astype(np.int32), edges.first) == edges.size if len(along) else along
-
-
 def turns_of(vertices: Floats, faces: Ints, edges: Edges) -> Turns | None:
     """Return the turns at the edges of four, six and so on faces that are balanced; None where there are none."""
     if edges.closed:
         return None
-    many = np.flatnonzero((edges.size > 2) & balanced(faces, edges))
+    many = np.flatnonzero((edges.size > 2) & edges.balanced)
     return _around(vertices, faces, edges, many) if len(many) else None
 
 
@@ -186,11 +189,20 @@ def _around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> Turns:
     angle = np.arctan2(np.einsum("ij,ij->i", cross(zero, out), axis), np.einsum("ij,ij->i", zero, out))
     angle[angle < -_SAME_ANGLE] += 2 * np.pi
     angle[angle > 2 * np.pi - _SAME_ANGLE] -= 2 * np.pi
-    order = np.lexsort((angle, group))
+    order = _order_within(size, starts, angle)
     angle, half, ends = angle[order], half[order], ends[order]
     fresh = np.diff(angle, prepend=-np.inf) > _SAME_ANGLE
     fresh[starts] = True
     return Turns(many, half, group, ends, np.cumsum(fresh, dtype=np.int32) - np.int32(1))
+
+
+def _order_within(size: Ints, starts: Ints, values: Floats) -> Ints:
+    """Return the order of values by size within each of some groups that follow each other; equal ones stay."""
+    order = np.arange(len(values))
+    for n in np.unique(size).tolist():
+        places = starts[size == n][:, None] + np.arange(n)
+        order[places] = np.take_along_axis(places, np.argsort(values[places], axis=1, kind="stable"), axis=1)
+    return order
 
 
 def _paired(edges: Edges, turns: Turns) -> tuple[Ints, Ints]:
@@ -203,12 +215,16 @@ def _paired(edges: Edges, turns: Turns) -> tuple[Ints, Ints]:
     size = edges.size[turns.many]
     starts = np.cumsum(size) - size
     place = np.arange(len(group)) - starts[group]
-    order = np.lexsort((half, ~ends, turn, group))
-    half, ends = half[order], ends[order]
+    bits = int(half.max()).bit_length()
+    key = (turn.astype(np.uint64) * np.uint64(2) + ~ends) << np.uint64(bits)  # an edge has no turn of another
+    key |= half.astype(np.uint64)
+    key.sort()
+    half, ends = (key & np.uint64((1 << bits) - 1)).astype(half.dtype), (key >> np.uint64(bits)) % 2 == 0
     inside = np.cumsum(np.where(ends, -1, 1))  # solids that have begun and not ended; zero at each edge's last face
     outermost = np.flatnonzero(inside == np.minimum.reduceat(inside, starts)[group])
-    outermost = outermost[np.unique(group[outermost], return_index=True)[1]]
+    outermost = outermost[distinct(group[outermost])]
     rank = (place + starts[group] - outermost[group] - 1) % size[group]
-    order = np.lexsort((rank, group))
+    order = np.empty(len(group), np.int64)
+    order[starts[group] + rank] = np.arange(len(group))
     half, ends = half[order], ends[order]
     return half[~ends], half[ends]

@@ -13,18 +13,20 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from unitcad.check.geometry import coverings, triangles
-from unitcad.check.geometry.contact import Contacts, FaceBoxes, face_boxes
-from unitcad.check.geometry.edges import balanced
+from unitcad.check.geometry.arranged import Arranged, arranged
+from unitcad.check.geometry.contact import Contacts, FaceBoxes, RankedBoxes, face_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.stars import height_fields
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import same_place
-from unitcad.geometry.arrays import Bools, Floats, Ints
-from unitcad.geometry.boxes import box_order, boxes_of, frame_of, meeting_pairs, slabs_of
+from unitcad.geometry.arrays import Bools, Floats, Ints, distinct
+from unitcad.geometry.boxes import meeting_pairs
 from unitcad.geometry.ticks import Interrupted, Tick
 
 _BLOCK = 1 << 17
 _PAIRS = 1 << 15  # pairs looked at together: enough to outweigh the calls, few enough for the cache
+_RARE = 16  # of so many faces less than one has such a corner: most pairs need no look for one in common
+_SPARSE = 4  # of so many faces less than one is in a pair: a sieve of those few is the cheaper one
 _OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothing but perhaps touching
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
@@ -33,19 +35,41 @@ _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself every
 class Faces:
     """Faces in the order of a space-filling curve and what the sieves need of them.
 
-    `normal` (3, m) is twice their area vectors; the vertices of `planes` are the first in each place.
+    `normal` (3, m) is twice their area vectors; `columns` (3, n) are the vertices by axis, and `places` (3, m) the
+    first vertices in the places of the corners. `safe` are the corners whose stars are height fields, others -1;
+    `some_safe` says which faces have one, where few do. `sieves` has that of all faces, once it pays.
     """
 
     vertices: Floats
     corners: Ints
     normal: Floats
     safe: Ints
-    planes: Planes
-    boxes: FaceBoxes
+    some_safe: Bools | None
+    columns: Floats
+    places: Ints
+    ranked: RankedBoxes | None
+    sieves: list[Sieve]
     shell: Ints
     original: Ints
     several: bool
     doubled: bool
+
+
+@dataclass(frozen=True)
+class Sieve:
+    """Planes and boxes of faces, all or some."""
+
+    planes: Planes
+    boxes: FaceBoxes | RankedBoxes
+
+
+def _sieve(faces: Faces, some: Ints | None = None) -> Sieve:
+    """Return the sieve of all faces or, by their own numbers, of `some`."""
+    corners, places, normal = (
+        rows if some is None else rows.take(some, axis=1) for rows in (faces.corners, faces.places, faces.normal)
+    )
+    boxes = faces.ranked if faces.ranked is not None and some is None else face_boxes(faces.columns, corners)
+    return Sieve(planes_of(faces.columns, places, normal), boxes)
 
 
 @dataclass
@@ -61,6 +85,7 @@ class Crossings:
     covering: list[Ints] = field(default_factory=list)
     leaning: list[Ints] = field(default_factory=list)
     kept: int = 0
+    looked_at: int = 0
     stopped: Interrupted | None = None
 
     @property
@@ -70,26 +95,19 @@ class Crossings:
 
     def touching(self) -> Ints:
         """Return pairs of shells (k, 2) whose faces meet, the smaller number first."""
-        return self.contact.shells_of(np.unique(self.contact.pairs()[0]))
+        keys = self.contact.pairs()[0]
+        return self.contact.shells_of(keys[distinct(keys)])
 
 
 def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Crossings:
     """Find the pairs of faces that meet; `every`: all of those that touch, else one for each pair of shells."""
-    mesh = topology.mesh
-    frame = frame_of(mesh.vertices)
-    steps = frame.steps(mesh.vertices)
-    boxes = boxes_of(steps, *mesh.faces.T)
-    order = box_order(boxes, frame)
-    normal = np.stack([topology.areas[:, axis].take(order) for axis in range(3)])
-    solid = (normal != 0).any(axis=0)
-    if not solid.all():
-        order, normal = order[solid], normal.compress(solid, axis=1)  # keeps each axis in one piece
-    if len(order) < 2:
+    ready = arranged(topology.mesh.vertices, topology.mesh.faces, topology.areas)
+    if len(ready.order) < 2:
         return Crossings()
     tick()
-    faces = _prepared(topology, order, normal)
-    boxes, slabs = boxes.take(order, axis=0), slabs_of(steps, *faces.corners)
-    del normal, steps
+    faces = _prepared(topology, ready)
+    boxes, slabs = ready.steps, ready.slabs
+    del ready
     crossings = Crossings(faces, Contacts(topology.n_shells, every=every))
     waiting: list[tuple[Ints, Ints]] = []
     count = 0
@@ -110,18 +128,23 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
     return crossings
 
 
-def _prepared(topology: Topology, order: Ints, normal: Floats) -> Faces:
+def _prepared(topology: Topology, ready: Arranged) -> Faces:
     vertices, several = topology.mesh.vertices, topology.n_shells > 1
-    columns, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(topology.mesh.faces.take(order, axis=0).T)
+    order, columns, corners, normal = ready.order, ready.columns, ready.corners, ready.normal
     smooth = height_fields(columns, corners, normal, _surrounded(topology))
+    safe = smooth.take(corners)
+    has_safe = np.asarray(safe.any(axis=0))
     places = same_place(vertices).take(corners) if several else corners
     return Faces(
         vertices,
         corners,
         normal,
-        np.where(smooth.take(corners), corners, np.int32(-1)),
-        planes_of(columns, places, normal),
-        face_boxes(columns, corners),
+        np.where(safe, corners, np.int32(-1)),
+        has_safe if np.count_nonzero(has_safe) * _RARE < len(order) else None,
+        columns,
+        places,
+        ready.ranked,
+        [],
         topology.shells[order],
         topology.kept[order],
         several,
@@ -133,7 +156,7 @@ def _surrounded(topology: Topology) -> Bools:
     """Return vertices all of whose edges have two faces, wound alike."""
     edges, whole = topology.edges, np.ones(len(topology.mesh.vertices), bool)
     if not edges.closed:
-        wrong = (edges.size != 2) | ~balanced(topology.mesh.faces, edges)
+        wrong = (edges.size != 2) | ~edges.balanced
         whole[edges.low[wrong]] = False
         whole[edges.high[wrong]] = False
     return whole
@@ -141,6 +164,15 @@ def _surrounded(topology: Topology) -> Bools:
 
 def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     """Drop pairs that share a vertex whose star is a height field."""
+    if faces.some_safe is not None:
+        some = np.flatnonzero(faces.some_safe.take(i, mode="clip"))
+        drop = some[_share_safe(faces, i[some], j[some])]
+        return (np.delete(i, drop), np.delete(j, drop)) if len(drop) else (i, j)
+    keep = np.flatnonzero(~_share_safe(faces, i, j))
+    return i[keep], j[keep]
+
+
+def _share_safe(faces: Faces, i: Ints, j: Ints) -> Bools:
     mine = [safe.take(i, mode="clip") for safe in faces.safe]
     theirs = [corner.take(j, mode="clip") for corner in faces.corners]
     shared = mine[0] == theirs[0]
@@ -149,8 +181,7 @@ def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
         for b in range(3):
             if a or b:
                 shared |= np.equal(mine[a], theirs[b], out=part)
-    keep = np.flatnonzero(~shared)
-    return i[keep], j[keep]
+    return shared
 
 
 def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings) -> None:
@@ -160,9 +191,17 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings
     i = np.concatenate([pair[0] for pair in waiting])
     j = np.concatenate([pair[1] for pair in waiting])
     state, shared = np.empty((2, len(i)), np.int8)
+    crossings.looked_at += len(i)
+    if not faces.sieves and crossings.looked_at * _SPARSE < faces.corners.shape[1]:
+        some, at = np.unique(np.concatenate([i, j]), return_inverse=True)
+        sieve, at = _sieve(faces, some), at.reshape(2, -1)
+    else:
+        if not faces.sieves:
+            faces.sieves.append(_sieve(faces))
+        sieve, at = faces.sieves[0], (i, j)
     for start in range(0, len(i), _PAIRS):
         rows = slice(start, start + _PAIRS)
-        state[rows], shared[rows] = _sieved(faces, i[rows], j[rows])
+        state[rows], shared[rows] = _sieved(faces, sieve, (i[rows], j[rows]), at[0][rows], at[1][rows])
     if faces.several:
         some = np.flatnonzero((state == _FLUSH) | ((state == _APART) & (shared > 0)))
         _contacts(faces, i[some], j[some], crossings)
@@ -170,14 +209,17 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings
     _decide_exactly(faces, i[left], j[left], shared[left], crossings)
 
 
-def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
-    """Return the state of pairs by boxes and planes, and how many corners the faces share of those boxes leave open."""
+def _sieved(faces: Faces, sieve: Sieve, pair: tuple[Ints, Ints], i: Ints, j: Ints) -> tuple[Ints, Ints]:
+    """Return the state of pairs by boxes and planes, and how many corners the faces share of those boxes leave open.
+
+    i, j are what the `sieve` calls the faces of the pairs.
+    """
     state, shared = np.zeros((2, len(i)), np.int8)
-    apart, flush = faces.boxes.relation(i, j)
+    apart, flush = sieve.boxes.relation(i, j)
     state[apart] = _APART
     state[flush] = _FLUSH
     rows = np.flatnonzero(state == _OPEN)
-    i, j, planes = i[rows], j[rows], faces.planes
+    i, j, planes = i[rows], j[rows], sieve.planes
     ids_a, ids_b = (planes.vertices(f) for f in (i, j))
     shared[rows] = common = _common(ids_a, ids_b)
     clear = planes.one_side(i, ids_b, common)
@@ -186,7 +228,7 @@ def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
     edge = np.flatnonzero((common >= 2) & ~clear)
     if len(edge):
-        open_ = facing(faces, i[edge], j[edge]) > 0
+        open_ = facing(faces, *(f[rows[edge]] for f in pair)) > 0
         if faces.doubled:
             open_ &= ~coverings.run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
         clear[edge] = open_
@@ -208,18 +250,31 @@ def _common(a: Ints, b: Ints) -> Ints:
 
 def _contacts(faces: Faces, i: Ints, j: Ints, crossings: Crossings) -> None:
     """Note the shells that meet, of pairs of faces that can do no more than touch; those that share a corner do."""
-    one, other = faces.shell[i], faces.shell[j]
-    keys = crossings.contact.keys(one, other)
-    asked = crossings.contact.open(keys)
-    asked = asked[one[asked] != other[asked]]
-    i, j, keys = i[asked], j[asked], keys[asked]
-    pair, sharing = np.stack([i, j], axis=1), _common(faces.planes.vertices(i), faces.planes.vertices(j)) > 0
-    crossings.contact.add(keys[sharing], pair[sharing])
-    asked = np.flatnonzero(~sharing)
-    asked = asked[crossings.contact.open(keys[asked])]
-    a, b = (faces.vertices[faces.corners[:, f[asked]].T] for f in (i, j))
-    asked = asked[triangles.meet(a, b).touches]
-    crossings.contact.add(keys[asked], pair[asked])
+    contact = crossings.contact
+    one, other = faces.shell.take(i), faces.shell.take(j)
+    apart = np.flatnonzero(one != other)
+    keys = contact.keys(one.take(apart), other.take(apart))
+    asked = contact.open(keys)
+    i, j, keys = i[apart[asked]], j[apart[asked]], keys[asked]
+    asked = np.arange(len(keys))
+    if not contact.every:  # mostly the first pair of two shells shares a corner, and the others need no look
+        first = contact.foremost(keys)
+        first = first[_sharing(faces, i[first], j[first])]
+        contact.add(keys[first], np.stack([i[first], j[first]], axis=1))
+        asked = contact.open(keys)
+    sharing = _sharing(faces, i[asked], j[asked])
+    some = asked[sharing]
+    contact.add(keys[some], np.stack([i[some], j[some]], axis=1))
+    some = asked[~sharing]
+    some = some[contact.open(keys[some])]
+    a, b = (faces.vertices[faces.corners[:, f[some]].T] for f in (i, j))
+    some = some[triangles.meet(a, b).touches]
+    contact.add(keys[some], np.stack([i[some], j[some]], axis=1))
+
+
+def _sharing(faces: Faces, i: Ints, j: Ints) -> Bools:
+    """Return which pairs of faces have a corner in one place."""
+    return _common(faces.places.take(i, axis=1), faces.places.take(j, axis=1)) > 0
 
 
 def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Crossings) -> None:

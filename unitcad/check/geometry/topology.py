@@ -12,7 +12,7 @@ from unitcad.check.geometry import volumes
 from unitcad.check.geometry.edges import Edges, Turns
 from unitcad.check.geometry.seams import connected, join, t_junctions
 from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
-from unitcad.geometry.arrays import Bools, Floats, Ints, extent, extents
+from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, extent, sorted_with_order
 from unitcad.geometry.ticks import Tick
 
 
@@ -107,24 +107,26 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     areas = area_vectors(vertices, faces)
     tick()
     across = mesh_edges.opposite(edges, 3 * len(faces)) if edges.closed else None
+    same = None
     if across is not None:
         pinched = mesh_edges.pinched_closed(faces, across, len(vertices))
         twice = np.flatnonzero(across[0::3] // 3 == across[1::3] // 3)
     else:
         pinched = mesh_edges.pinched_open(faces, edges, len(vertices))
-        twice = _duplicates(faces)
+        same = _same_vertices(faces)
+        twice = np.sort(same[0][same[1]])
     tick()
     turns = mesh_edges.turns_of(vertices, faces, edges)
     shells = mesh_edges.shells_of(faces, edges, turns)
     low, high = _boxes(vertices, faces, shells)
     volume = volumes.signed(vertices, faces, areas, shells, len(low))
-    closed = volumes.closed(faces, edges, shells, len(low))
-    if across is None and len(twice):
-        twice = np.setdiff1d(twice, _facing(faces, areas, shells, volume * closed))
+    closed = volumes.closed(edges, shells, len(low))
+    if same is not None and len(twice):
+        twice = np.setdiff1d(twice, _facing(*same, areas, shells, volume * closed))
     tick()
     unbalanced = np.empty(0, int)
     if not edges.closed:
-        unbalanced = np.flatnonzero((edges.size % 2 == 0) & ~mesh_edges.balanced(faces, edges))
+        unbalanced = np.flatnonzero((edges.size % 2 == 0) & ~edges.balanced)
     return Topology(
         replace(mesh, faces=faces, normals=None),
         kept,
@@ -186,7 +188,13 @@ def _boxes(vertices: Floats, faces: Ints, shells: Ints) -> tuple[Floats, Floats]
     if n == 1:
         low, high = extent(vertices)
         return low[None], high[None]
-    return extents(vertices[faces.reshape(-1)], np.repeat(shells, 3), n)
+    low, high, label = np.full((3, n), np.inf), np.full((3, n), -np.inf), shells.astype(np.intp)
+    for axis in range(3):
+        column = np.ascontiguousarray(vertices[:, axis])
+        one, two, three = (column.take(faces[:, k]) for k in range(3))
+        np.minimum.at(low[axis], label, np.minimum(np.minimum(one, two), three))
+        np.maximum.at(high[axis], label, np.maximum(np.maximum(one, two), three))
+    return low.T, high.T
 
 
 def diagonals(low: Floats, high: Floats) -> Floats:
@@ -197,31 +205,30 @@ def diagonals(low: Floats, high: Floats) -> Floats:
 
 def _same_vertices(faces: Ints) -> tuple[Ints, Bools]:
     """Return an order of the faces that may have others' vertices, and where in it one has those of the one before."""
-    ordered = np.sort(faces, axis=1)
-    low, middle, high = ordered.T.astype(np.uint64)
-    # Equal for equal faces; products that leave 64 bits make others equal now and then.
-    key = (low * np.uint64(0x9E3779B97F4A7C15) + middle) * np.uint64(0xC2B2AE3D27D4EB4F) + high
-    known = np.sort(key)
-    several = known[1:][known[1:] == known[:-1]]
-    if not len(several):
-        return np.empty(0, np.int64), np.empty(0, bool)
-    some = np.flatnonzero(several[np.searchsorted(several, key).clip(max=len(several) - 1)] == key)
-    some = some[np.lexsort(ordered[some].T)]
-    same = (ordered[some[1:]] == ordered[some[:-1]]).all(axis=1)
+    a, b, c = np.ascontiguousarray(faces.T)
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    ordered = np.stack([low, a ^ b ^ c ^ low ^ high, high])
+    # Equal for equal faces, and for others now and then.
+    key = (ordered[0].astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + ordered[1].astype(np.uint64)) * np.uint64(
+        0xC2B2AE3D27D4EB4F
+    )
+    key += high.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    kept = 64 - max(len(key) - 1, 1).bit_length()
+    key, order = sorted_with_order(key >> np.uint64(64 - kept), kept)
+    again = ~distinct(key)
+    some = np.sort(order[again | np.append(again[1:], False)[: len(again)]]).astype(np.int64)
+    ordered = ordered[:, some]
+    by_vertices = np.lexsort(ordered)
+    some, ordered = some[by_vertices], ordered[:, by_vertices]
+    same = (ordered[:, 1:] == ordered[:, :-1]).all(axis=0)
     return some, np.append(False, same)[: len(some)]
 
 
-def _duplicates(faces: Ints) -> Ints:
-    order, same = _same_vertices(faces)
-    return np.sort(order[same])
-
-
-def _facing(faces: Ints, areas: Floats, shells: Ints, volume: Floats) -> Ints:
+def _facing(order: Ints, same: Bools, areas: Floats, shells: Ints, volume: Floats) -> Ints:
     """Return duplicates that are none: two faces back to back, of two closed shells that lie on either side of them.
 
-    Where a cavity reaches the wall's outer face, the wall has no thickness.
+    Where a cavity reaches the wall's outer face, the wall has no thickness. `order` and `same` are of `_same_vertices`.
     """
-    order, same = _same_vertices(faces)
     first = np.flatnonzero(same) - 1
     alone = ~same[first] & ~np.append(same, False)[first + 2]  # no third face there
     one, other = order[first[alone]], order[first[alone] + 1]

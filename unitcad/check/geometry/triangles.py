@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.geometry.predicates import orient2d, orient3d, sides
+from unitcad.check.geometry.predicates import orient2d, orient3d, sides, turns
 from unitcad.geometry.arrays import Bools, Floats, Ints, cross
 
 _BLOCK = 1 << 13  # pairs whose corners stay in the processor's cache
@@ -114,11 +114,17 @@ def _compared(a: Floats, b: Floats, side_a: Ints, side_b: Ints) -> tuple[Ints, I
 
 def flattened(a: Floats, *others: Floats) -> list[Floats]:
     """Return the corners without the axis along which the triangles `a` (n, 3, 3) face most: (n, k, 2) each."""
-    normal = np.abs(np.cross(a[:, 1] - a[:, 0], a[:, 2] - a[:, 0]))
-    drop = np.argmax(normal, axis=1)
-    keep = np.array([[1, 2], [2, 0], [0, 1]])[drop]
-    rows = np.arange(len(a))[:, None, None]
-    return [points[rows, np.arange(points.shape[1])[None, :, None], keep[:, None, :]] for points in (a, *others)]
+    x, y, z = a.transpose(2, 1, 0)
+    one, two = ([axis[k] - axis[0] for axis in (x, y, z)] for k in (1, 2))
+    normal = [one[k - 2] * two[k - 1] - one[k - 1] * two[k - 2] for k in range(3)]
+    drop = np.argmax(np.abs(normal), axis=0)
+    first, second = drop == 0, drop == 1
+    flat = []
+    for points in (a, *others):
+        x, y, z = points.transpose(2, 1, 0)
+        plan = np.where(first, y, np.where(second, z, x)), np.where(first, z, np.where(second, x, y))
+        flat.append(np.stack(plan, axis=1).transpose(2, 0, 1))
+    return flat
 
 
 def coplanar(a: Floats, b: Floats) -> tuple[Bools, Bools]:
@@ -135,13 +141,15 @@ def _off_sides(corners: Floats, points: Floats) -> Ints:
     Triangles are (n, 3, 2), points (n, k, 2).
     """
     n, count = len(corners), points.shape[1]
-    whole = [corners[:, k] for k in range(3)]
-    start = [corner for corner in whole for _ in range(count)]
-    end = [corner for corner in (*whole[1:], whole[0]) for _ in range(count)]
-    there = [points[:, k] for k in range(count)] * 3
-    rows = ([*start, whole[0]], [*end, whole[1]], [*there, whole[2]])
-    sign = orient2d(*(np.concatenate(part) for part in rows)).reshape(-1, n)
-    return sign[:-1].reshape(3, count, n) * sign[-1]
+    sign = np.empty((3, count, n), np.int8)
+    for start in range(0, n, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        at, there = (np.ascontiguousarray(of[block].transpose(1, 2, 0)) for of in (corners, points))
+        turn = turns(*at)
+        for k in range(3):
+            for p in range(count):
+                np.multiply(turns(at[k], at[(k + 1) % 3], there[p]), turn, out=sign[k, p, block])
+    return sign
 
 
 def segment_inside(u: Floats, v: Floats, b: Floats) -> Bools:

@@ -17,7 +17,7 @@ from unitcad.check.geometry.triangles import common_point
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_edges
 from unitcad.check.rules.rule import Rule
-from unitcad.geometry.arrays import Ints
+from unitcad.geometry.arrays import Ints, among, distinct
 
 G001 = Rule("""
     G001 error: self-crossing
@@ -96,8 +96,8 @@ def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterato
     """Return pairs of shells whose faces meet and do not cross."""
     contact = crossings.contact
     keys, touching = contact.pairs()
-    first = np.flatnonzero(np.append(True, keys[1:] != keys[:-1])) if len(keys) else keys
-    first = first[~np.isin(keys[first], contact.keys(*faces.shell[joined(crossings.crossing)].T))]
+    first = np.flatnonzero(distinct(keys))
+    first = first[~among(keys[first], np.sort(contact.keys(*faces.shell[joined(crossings.crossing)].T)))]
     n = len(first)
     if not n:
         return

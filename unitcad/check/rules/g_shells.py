@@ -14,7 +14,7 @@ from unitcad.check.geometry.volumes import winding_number
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints, among
 from unitcad.geometry.boxes import box_pairs
 from unitcad.geometry.ticks import Interrupted, Tick
 
@@ -149,7 +149,7 @@ def _relate(
     pairs = box_pairs(low, high, tick)
     pairs = pairs[sound[pairs].all(axis=1)]
     one, other = pairs.T
-    touch = np.isin(one * n + other, np.sort(touching.astype(np.int64), axis=1) @ np.array([n, 1]))
+    touch = among(one * n + other, touching[:, 0].astype(np.int64) * n + touching[:, 1])
     faces_of = _faces_by_shell(topology.shells, n)
     sides = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
     least = np.minimum(np.abs(volumes[one]), np.abs(volumes[other]))
