@@ -35,8 +35,11 @@ def json_bytes(data: Mapping[str, Any]) -> bytes:
 
 def all_finite(value: Any) -> bool:
     """Tell whether every number in lists and dicts is finite."""
-    if not _MAY_BE_INFINITE.search(_PACKED.encode(value)):  # a tenth of the time of the walk
-        return True
+    try:
+        if not _MAY_BE_INFINITE.search(_PACKED.encode(value)):  # a tenth of the time of the walk
+            return True
+    except OverflowError:  # MessagePack has no whole numbers beyond 64 bits
+        pass
     left = [value]
     while left:
         one = left.pop()

@@ -11,7 +11,7 @@ from exact_pairs import cross, dot, minus, point, reference
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.check import check_mesh
-from unitcad.check.geometry.predicates import integers, orient2d, orient3d, turns
+from unitcad.check.geometry.predicates import integers, orient2d, orient2d_columns, orient3d
 from unitcad.check.geometry.triangles import common_point, coplanar, meet
 from unitcad.check.rules.f_limits import Deadline
 from unitcad.check.rules.registry import explain
@@ -57,7 +57,7 @@ def test_orientation_is_never_wrong(scale: str) -> None:
         p = p.astype(np.float32).astype(float)
     found = orient3d(*p)
     flat = orient2d(p[0, :, :2], p[1, :, :2], p[3, :, :2])
-    assert (turns(p[0, :, :2].T, p[1, :, :2].T, p[3, :, :2].T) == flat).all()
+    assert (orient2d_columns(p[0, :, :2].T, p[1, :, :2].T, p[3, :, :2].T) == flat).all()
     for i in range(400):
         a, b, c, d = (point(p[k, i]) for k in range(4))
         u, v, w = minus(a, d), minus(b, d), minus(c, d)

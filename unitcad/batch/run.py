@@ -34,8 +34,10 @@ from unitcad.pipeline.product import checked_outputs
 from unitcad.pipeline.subjects import key_of, subject_of, to_text
 from unitcad.pipeline.versions import code_version, kernel_versions
 
-WINDOW, STEP = 2048, 64
-"""Variants held in memory: enough to group those that share a geometry; how many come in between two looks at tasks."""
+WINDOW = 2048
+"""Variants held in memory: enough to group those that share a geometry."""
+STEP = 64
+"""Variants read between two looks at the tasks."""
 FIRST, NEXT = 4, 48
 """Variants in the task that makes a geometry, and in those after it: variants of one task share estimates."""
 COLLECT_EVERY = 500
@@ -195,10 +197,10 @@ class _Batch:
             yield index, self.journal.entry(index)
 
     def _fill(self) -> bool:
-        """Bring variants into the window; note at once those that are refused, or equal to another one.
+        """Bring up to STEP variants into the window; return whether more may follow.
 
-        Returns whether there may be more for it: the workers begin after the first ones. A shard, which chooses where
-        in the window it begins, is given the whole of it.
+        Those that are refused or equal to another one are noted at once. A shard fills the whole window, since it
+        chooses where in it to begin.
         """
         for _ in range(WINDOW if self.options.shard else STEP):
             if self.waiting >= WINDOW or self.summary.stopped:

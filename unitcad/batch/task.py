@@ -201,7 +201,7 @@ def _into_folders(task: Task, out: Path) -> list[VariantOutcome]:
             made.clear()
         return outcome
 
-    with ThreadPoolExecutor(1) as beside, folders.sync_threads() as threads:
+    with folders.sync_threads() as threads, ThreadPoolExecutor(1) as beside:  # `beside` uses the threads to its end
         try:
             with files.scratch(out) as scratch:
                 done = _each(task.jobs, task, lambda job, known: make(job, scratch))

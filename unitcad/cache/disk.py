@@ -40,7 +40,7 @@ class DiskStore:
     Entries are written under a temporary name and renamed. Each process verifies the checksum of content and entries on
     first use and watches size and time of change afterwards; whatever does not match is removed and made again. An
     entry that can't be written (no space, read-only) is no error: the content is held in memory for this process
-    instead. The data of an entry are shared by all who ask for it: nobody may change them.
+    instead. The data of an entry are shared by all callers and must not be changed.
     """
 
     def __init__(self, root: Path) -> None:

@@ -139,14 +139,12 @@ _SYNCS = 16
 def sync(results: Iterable[Path], threads: ThreadPoolExecutor | None = None) -> None:
     """Bring the results' own files to the disk; what they share is there since the cache has it. Raises OSError.
 
-    Many at once: the file system then writes its log a few times and not once a file. Who syncs often keeps the
-    `threads`, by `sync_threads`: to start them costs more than to sync.
+    Many at once: the file system then writes its log a few times and not once a file. A caller that syncs often passes
+    `threads` from `sync_threads`, since starting them takes longer than the sync.
     """
-    if threads is None:
-        with sync_threads() as threads:
-            return sync(results, threads)
     paths = [path for result in results for path in _own_files(result)]
-    list(threads.map(_sync, (paths[i::_SYNCS] for i in range(_SYNCS))))
+    with contextlib.nullcontext(threads) if threads else sync_threads() as pool:
+        list(pool.map(_sync, (paths[i::_SYNCS] for i in range(_SYNCS))))
 
 
 def sync_threads() -> ThreadPoolExecutor:

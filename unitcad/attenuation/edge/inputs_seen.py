@@ -6,8 +6,9 @@ the diameter; a higher motor lifts caps and circuit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,7 @@ def ends(variant: EstimateInput, step: float) -> tuple[EstimateInput, ...]:
 
 
 @lru_cache(maxsize=4)
-def changed(variant: EstimateInput) -> dict[str, Scaled]:
+def changed(variant: EstimateInput) -> Mapping[str, Scaled]:
     """Return every input of a variant by its name: a function from the variant and a factor to the changed variant."""
     by_name: dict[str, Scaled] = {}
     geometry = variant.geometry
@@ -75,7 +76,7 @@ def changed(variant: EstimateInput) -> dict[str, Scaled]:
     by_name["estimate.frequency_hz"] = lambda v, f: replace(v, frequency=_times(v.frequency, f))
     for field in _TISSUE:
         by_name[f"tissue {field.replace('_', ' ')}"] = partial(_tissue, field)
-    return by_name
+    return MappingProxyType(by_name)
 
 
 def _times(quantity: Any, factor: float) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -131,27 +131,21 @@ def ranged(variant: EstimateInput) -> tuple[str, ...]:
     )
 
 
-class _AtCorners:
-    """A model's path at the corners of a variant and of its controls, each worked out once: level, amplitude and ratios
-    read the same.
+def _path_at_corners(
+    variant: EstimateInput, model: str, constants: Mapping[str, float]
+) -> Callable[[cf.Wave, int | None], Any]:
+    """Return a function that gives a model's path at the corners of the variant, or of the control of a layer.
+
+    It keeps what it has worked out: level, amplitude and ratios read the same. The wave is for models that have waves.
     """
 
-    def __init__(self, variant: EstimateInput, model: str, constants: Mapping[str, float]) -> None:
-        self.variant, self.model, self.constants = variant, model, constants
-        self._made: dict[tuple[cf.Wave, int | None], Any] = {}
+    @cache
+    def path(wave: cf.Wave, control: int | None) -> Any:
+        units = corners(variant) if control is None else _control_corners(variant, control)
+        of_wave = _OF_WAVES.get(model)
+        return of_wave(units, wave) if of_wave else path_of(model, constants)(units)
 
-    def path(self, wave: cf.Wave = "s", control: int | None = None) -> Any:
-        """Return the path of the variant, or of the control of a layer; `wave` for the models that have waves."""
-        key = wave, control
-        if key not in self._made:
-            units = corners(self.variant) if control is None else _control_corners(self.variant, control)
-            of_wave = _OF_WAVES.get(self.model)
-            self._made[key] = of_wave(units, wave) if of_wave else path_of(self.model, self.constants)(units)
-        return self._made[key]
-
-    def ratio(self, control: int, wave: cf.Wave = "s") -> dict[str, Any]:
-        """Return the spread of the path over that of the control of a layer."""
-        return spread(self.variant, lambda: self.path(wave) / self.path(wave, control))
+    return path
 
 
 def spread(variant: EstimateInput, predict: Callable[[], Any]) -> dict[str, Any]:
@@ -180,11 +174,11 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
     With a lab's `fit` the constants are its own, and the level has a predictive range.
     """
     constants = fit.constants(model) if fit else stored(variant.moduli)[model]
-    at, scale = _AtCorners(variant, model, constants), constants["s"]
+    path, scale = _path_at_corners(variant, model, constants), constants["s"]
     block: dict[str, Any] = {
         "kind": KINDS[model],
         "edge_level": {
-            **spread(variant, lambda: scale * at.path()),
+            **spread(variant, lambda: scale * path("s", None)),
             "unit": "of the motor's amplitude",
         },
     }
@@ -192,13 +186,13 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
         block["predictive"] = predictive_block(fit, model, variant)
     if variant.amplitude is not None:
         factor = scale * variant.amplitude * 1e6
-        block["edge_amplitude_um"] = spread(variant, lambda: factor * at.path())
+        block["edge_amplitude_um"] = spread(variant, lambda: factor * path("s", None))
     by_squares = "least squares of the log of nine measured levels"
     by_mean = "geometric mean of measured level over path, nine levels"
     by_fit = fit and f"{fit.name}: {fit.units} units of the lab's own, shrunk towards the stored constants"
     block["constants"] = {**constants, "made_by": by_fit or (by_squares if model == "fitted" else by_mean)}
     controls = _controls(variant)
-    block["hierarchical_over_control"] = [_ratio(at, index) for index in controls] or None
+    block["hierarchical_over_control"] = [_ratio(variant, model, path, index) for index in controls] or None
     if not controls:
         block["hierarchical_over_control_reason"] = "a single layer is its own control"
     if model == "paper":
@@ -224,12 +218,18 @@ def _controls(variant: EstimateInput) -> list[int]:
     return [names.index(name) for name in dict.fromkeys(names)]
 
 
-def _ratio(at: _AtCorners, index: int) -> dict[str, Any]:
+def _ratio(
+    variant: EstimateInput, model: str, path: Callable[[cf.Wave, int | None], Any], index: int
+) -> dict[str, Any]:
     """Return the level over that of the control of layer `index`, by wave where the model has waves."""
-    name = at.variant.layers[index].material
-    if at.model not in _OF_WAVES:
-        return {"control": name, **at.ratio(index)}
-    return {"control": name, **at.ratio(index, "s"), "wave": "s", "p": at.ratio(index, "p")}
+
+    def of(wave: cf.Wave) -> dict[str, Any]:
+        return spread(variant, lambda: path(wave, None) / path(wave, index))
+
+    name = variant.layers[index].material
+    if model not in _OF_WAVES:
+        return {"control": name, **of("s")}
+    return {"control": name, **of("s"), "wave": "s", "p": of("p")}
 
 
 def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any]:

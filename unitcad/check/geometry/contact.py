@@ -13,7 +13,7 @@ import numpy as np
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, sorted_with_order
 
 _FACES = 1 << 14  # faces whose corners stay in the processor's cache
-_LATELY = 1 << 16  # pairs of shells remembered: those found again are near each other in the order of the faces
+_RECENT = 1 << 16  # pairs of shells remembered: those found again are near each other in the order of the faces
 _FIVE = np.uint16(0x333)  # added to sums of corners, four bits an axis: the fourth bit says five or more
 
 
@@ -112,15 +112,15 @@ def face_boxes(columns: Floats, ids: Ints) -> FaceBoxes:
 class Contacts:
     """Pairs of shells that meet, each with the first pair of faces found, or with `every` one.
 
-    `noted` are pairs of faces in blocks, some of shells that were noted before; `lately` has the keys of some shells
-    that were, each at its own place, and `holder` is room to find the first of several in.
+    `noted` are pairs of faces in blocks, some of shells that were noted before. `recent_keys` has the keys of some
+    shells that were, each at its own place, and `first_place` is room to find the first of several in.
     """
 
     shells: int
     every: bool = False
     noted: list[tuple[Ints, Ints]] = field(default_factory=list)
-    lately: Ints = field(default_factory=lambda: np.full(_LATELY, -1))
-    holder: Ints = field(default_factory=lambda: np.empty(_LATELY, np.int32))
+    recent_keys: Ints = field(default_factory=lambda: np.full(_RECENT, -1))
+    first_place: Ints = field(default_factory=lambda: np.empty(_RECENT, np.int32))
 
     def keys(self, one: Ints, other: Ints) -> Ints:
         """Return a number for each pair of shells, in either order."""
@@ -130,16 +130,19 @@ class Contacts:
         """Return which keys (k,) may not be known yet: all that are not, and some others."""
         if self.every:
             return np.arange(len(keys))
-        return np.flatnonzero(self.lately.take(keys & (_LATELY - 1)) != keys)
+        return np.flatnonzero(self.recent_keys.take(keys & (_RECENT - 1)) != keys)
 
     def foremost(self, keys: Ints) -> Ints:
-        """Return the first place of each key in `keys` (k,), and all places of some; with `every` one, all places."""
+        """Return the first place of each key in `keys` (k,). With `every`, return all places.
+
+        Keys that share a slot with another key keep all their places.
+        """
         places = np.arange(len(keys), dtype=np.int32)
         if self.every:
             return places
-        slots = keys & (_LATELY - 1)
-        self.holder[slots[::-1]] = places[::-1]  # of keys that share a slot, the first one stays
-        first = self.holder.take(slots)
+        slots = keys & (_RECENT - 1)
+        self.first_place[slots[::-1]] = places[::-1]  # of keys that share a slot, the first one stays
+        first = self.first_place.take(slots)
         return np.flatnonzero((first == places) | (keys.take(first) != keys))
 
     def add(self, keys: Ints, pairs: Ints) -> None:
@@ -147,7 +150,7 @@ class Contacts:
         if not self.every and len(keys):
             first = self.foremost(keys)
             keys, pairs = keys[first], pairs[first]
-            self.lately[keys & (_LATELY - 1)] = keys
+            self.recent_keys[keys & (_RECENT - 1)] = keys
         self.noted.append((keys, pairs))
 
     def pairs(self) -> tuple[Ints, Ints]:

@@ -36,8 +36,8 @@ def orient2d(a: Floats, b: Floats, c: Floats) -> Ints:
     return _signs(a, b, c)
 
 
-def turns(a: Floats, b: Floats, c: Floats) -> Ints:
-    """Return what `orient2d` does for points by axis, (2, n) arrays that stay in the processor's cache."""
+def orient2d_columns(a: Floats, b: Floats, c: Floats) -> Ints:
+    """Return what `orient2d` does, for points by axis: (2, n) arrays."""
     (ax, ay), (bx, by) = a - c, b - c
     left, right = ax * by, ay * bx
     value = left - right

@@ -9,6 +9,7 @@ A crossing is one of: two faces pass through each other; an edge lies in a face 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Faces:
 
     `normal` (3, m) is twice their area vectors; `columns` (3, n) are the vertices by axis, and `places` (3, m) the
     first vertices in the places of the corners. `safe` are the corners whose stars are height fields, others -1;
-    `some_safe` says which faces have one, where few do. `sieves` has that of all faces, once it pays.
+    `some_safe` says which faces have one, where few do.
     """
 
     vertices: Floats
@@ -48,11 +49,15 @@ class Faces:
     columns: Floats
     places: Ints
     ranked: RankedBoxes | None
-    sieves: list[Sieve]
     shell: Ints
     original: Ints
     several: bool
     doubled: bool
+
+    @cached_property
+    def sieve(self) -> Sieve:
+        """The sieve of all faces."""
+        return _sieve(self)
 
 
 @dataclass(frozen=True)
@@ -144,7 +149,6 @@ def _prepared(topology: Topology, ready: Arranged) -> Faces:
         columns,
         places,
         ready.ranked,
-        [],
         topology.shells[order],
         topology.kept[order],
         several,
@@ -192,13 +196,11 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings
     j = np.concatenate([pair[1] for pair in waiting])
     state, shared = np.empty((2, len(i)), np.int8)
     crossings.looked_at += len(i)
-    if not faces.sieves and crossings.looked_at * _SPARSE < faces.corners.shape[1]:
+    if crossings.looked_at * _SPARSE < faces.corners.shape[1]:
         some, at = np.unique(np.concatenate([i, j]), return_inverse=True)
         sieve, at = _sieve(faces, some), at.reshape(2, -1)
     else:
-        if not faces.sieves:
-            faces.sieves.append(_sieve(faces))
-        sieve, at = faces.sieves[0], (i, j)
+        sieve, at = faces.sieve, (i, j)
     for start in range(0, len(i), _PAIRS):
         rows = slice(start, start + _PAIRS)
         state[rows], shared[rows] = _sieved(faces, sieve, (i[rows], j[rows]), at[0][rows], at[1][rows])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.geometry.predicates import orient2d, orient3d, sides, turns
+from unitcad.check.geometry.predicates import orient2d, orient2d_columns, orient3d, sides
 from unitcad.geometry.arrays import Bools, Floats, Ints, cross
 
 _BLOCK = 1 << 13  # pairs whose corners stay in the processor's cache
@@ -145,10 +145,10 @@ def _off_sides(corners: Floats, points: Floats) -> Ints:
     for start in range(0, n, _BLOCK):
         block = slice(start, start + _BLOCK)
         at, there = (np.ascontiguousarray(of[block].transpose(1, 2, 0)) for of in (corners, points))
-        turn = turns(*at)
+        turn = orient2d_columns(*at)
         for k in range(3):
             for p in range(count):
-                np.multiply(turns(at[k], at[(k + 1) % 3], there[p]), turn, out=sign[k, p, block])
+                np.multiply(orient2d_columns(at[k], at[(k + 1) % 3], there[p]), turn, out=sign[k, p, block])
     return sign
 
 

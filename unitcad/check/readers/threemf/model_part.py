@@ -1,7 +1,7 @@
 """A 3MF model part read element by element into plain data, against the schema, within the limits.
 
-Vertices and triangles go into arrays in batches; their text is never held as a whole. Those that are written alike are
-read at once (`alike`).
+Vertices and triangles go into arrays in batches; their text is never held as a whole. Uniform blocks
+of them are read at once (`uniform_blocks`).
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from unitcad.check.findings import Location
 from unitcad.check.geometry.triangle_mesh import LARGEST
 from unitcad.check.readers.threemf import elements
-from unitcad.check.readers.threemf.alike import Alike, without_alike
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.check.readers.threemf.transform import NOT_FINITE, transform
+from unitcad.check.readers.threemf.uniform_blocks import UniformBlock, rest_for_parser
 from unitcad.check.readers.threemf.xml_stream import forbidden, new_parser, stream
 from unitcad.check.rules.f_file import F004, not_a_number
 from unitcad.check.rules.f_limits import F011, Limits, Unreadable
@@ -60,6 +60,7 @@ class _Reader:
         self.numbers: list[str] = []
         self.lines: list[int] = []
         self.vertices: list[Floats] = []
+        self.n_vertices = 0
         self.beyond = False
         self.triangles: list[tuple[int, ...]] = []
         self.rows: list[Ints] = []
@@ -73,16 +74,16 @@ class _Reader:
         self.model.namespaces[prefix or ""] = uri
 
     def inside(self, fed: int) -> tuple[int, str]:
-        """Return how many elements are open, and the last one's name where it is the core's list of a mesh.
+        """Return the number of open elements and the name of the innermost one if it belongs to the core.
 
-        No name where the parser keeps some of the bytes `fed` to it until it has more.
+        The name is empty while the parser holds back some of the `fed` bytes.
         """
         last = self.stack[-1]
         whole = self.parser.CurrentByteIndex == fed and not self.skip and last.space == elements.CORE
         return len(self.stack) + self.skip, last.name if whole else ""
 
-    def take(self, name: str, found: Alike) -> bool:
-        """Keep elements that were read at once, if none needs a finding of its own; return whether they were kept."""
+    def take(self, name: str, found: UniformBlock) -> bool:
+        """Keep the elements of a uniform block; return False where one of them needs a finding."""
         if name == "vertices":
             values = np.stack([found.columns[axis] for axis in _XYZ], axis=1)
             if not (np.abs(values) <= LARGEST).all():
@@ -347,7 +348,8 @@ class _Reader:
 
     def _keep_vertices(self, values: Floats) -> None:
         self.vertices.append(values)
-        if sum(len(block) for block in self.vertices) > 3 * self.limits.max_faces + 3:
+        self.n_vertices += len(values)
+        if self.n_vertices > 3 * self.limits.max_faces + 3:
             raise F011.unreadable("more vertices than three times --max-faces")
 
     def _number(self, text: str, line: int) -> float:
@@ -368,7 +370,7 @@ class _Reader:
         if isinstance(self.resource, Object):
             vertices = np.concatenate([np.empty((0, 3)), *self.vertices])
             self.resource.mesh = Triangles(vertices, np.concatenate([np.empty((0, LINE + 1), np.int64), *self.rows]))
-        self.vertices, self.rows, self.beyond = [], [], False
+        self.vertices, self.n_vertices, self.rows, self.beyond = [], 0, [], False
 
     def _close_object(self, resource: Object) -> None:
         if resource.mesh is None and not resource.components and not resource.other_shape:
@@ -392,7 +394,7 @@ def read_model(
     model = Model(part, strict=strict)
     reader = _Reader(model, limits, spent_faces)
     try:
-        stream(without_alike(chunks, reader), part, reader.start, reader.end, reader.namespace, reader.parser)
+        stream(rest_for_parser(chunks, reader), part, reader.start, reader.end, reader.namespace, reader.parser)
     except Unreadable as stop:
         raise Unreadable(*model.findings, *stop.findings) from stop
     return model

@@ -1,7 +1,7 @@
-"""Vertices and triangles of a 3MF model part that are written alike, one after the other, read as numbers at once.
+"""Fast reading of the vertices and triangles of a 3MF model part.
 
-They are nearly all that a large part holds. Where a block of them has the same text but for the digits, it is read in
-numpy and the parser gets its line ends alone; any other block goes through the parser, element by element.
+They are nearly all of a large part. A block whose elements differ only in their numbers is read by numpy, and the
+parser gets only its line ends. Every other block goes through the parser.
 """
 
 from __future__ import annotations
@@ -19,14 +19,16 @@ from unitcad.geometry.arrays import Bools, Floats, Ints
 _BLOCK = 1 << 18
 _OPEN = re.compile(rb"<(vertices|triangles)>")
 _LONGEST_TAG = len(b"<triangles>")
-_HEAD = {name: re.compile(rb"\s*<" + name + rb'\s+(\w+)="') for name in (b"vertex", b"triangle")}
-_WITHIN = re.compile(rb'"\s+(\w+)="')
-_BEHIND = re.compile(rb'"\s*/>\s*')
+_HEAD = {name: re.compile(rb"[ \t\r\n]*<" + name + rb'[ \t\r\n]+(\w+)="') for name in (b"vertex", b"triangle")}
+_WITHIN = re.compile(rb'"[ \t\r\n]+(\w+)="')
+_AFTER = re.compile(rb'"[ \t\r\n]*/>[ \t\r\n]*')
 _ELEMENTS = {b"vertices": b"vertex", b"triangles": b"triangle"}
 _NAMES = {b"vertex": (b"x", b"y", b"z"), b"triangle": (b"v1", b"v2", b"v3", b"p1", b"p2", b"p3", b"pid")}
 """Attributes, of which each element needs the first three."""
+_SHORTEST = 1500  # bytes; a shorter block costs the parser less
+_LONGEST_GAP = 200  # bytes between two numbers
 _MOST_DIGITS = 9  # an index goes to 2^31 - 1; longer ones are left to the parser
-_QUOTE, _NEWLINE, _LESS = b'"\n<'
+_QUOTE, _NEWLINE = b'"\n'
 
 
 def _table(characters: bytes) -> Bools:
@@ -40,11 +42,11 @@ _IN_NUMBERS = _table(b"0123456789+-.eE")
 
 
 @dataclass(frozen=True)
-class Alike:
-    """Elements of one block.
+class UniformBlock:
+    """The elements of a uniform block.
 
-    columns: the numbers (n,) of each attribute by its name; lines: of each element, counted from that on which the
-    block begins.
+    columns: the numbers (n,) of each attribute by its name; lines: the line (n,) of each element, 0 for the one on
+    which the block begins; line_ends: how many there are in the block.
     """
 
     columns: dict[str, Floats | Ints]
@@ -53,59 +55,60 @@ class Alike:
 
 
 class Reader(Protocol):
-    """What reads the elements that the parser has."""
+    """A reader of the elements that the parser reports."""
 
     def inside(self, fed: int) -> tuple[int, str]:
-        """Return how many elements are open, and which list of the core's was opened last.
+        """Return the number of open elements and the name of the innermost one if it belongs to the core.
 
-        The name is empty for any other, or where the parser has more to come of what it was given, `fed` bytes.
+        The name is empty while the parser holds back some of the `fed` bytes.
         """
         ...
 
-    def take(self, name: str, found: Alike) -> bool:
-        """Keep the elements of a list. Return whether they were kept: others are to be read one by one."""
+    def take(self, name: str, found: UniformBlock) -> bool:
+        """Keep the elements of a list; return False where they have to be read one by one."""
         ...
 
 
-def without_alike(chunks: Iterable[bytes], reader: Reader) -> Iterator[bytes]:
-    """Yield what of a part is left for the parser; it must have had each piece before the next one is asked for."""
-    left, held, fed, open_list = iter(chunks), b"", 0, b""
+def rest_for_parser(chunks: Iterable[bytes], reader: Reader) -> Iterator[bytes]:
+    """Yield what the parser has to read of a part. It must have parsed each piece before it asks for the next one."""
+    left, held, at, fed, open_list = iter(chunks), b"", 0, 0, b""  # `at` bytes of `held` are done
     while True:
         if not open_list:
-            found = _OPEN.search(held)
+            found = _OPEN.search(held, at)
             if found is None:
-                last = held.rfind(b"<", max(len(held) - _LONGEST_TAG, 0))  # of a tag that may go on in the next chunk
+                last = held.rfind(b"<", max(len(held) - _LONGEST_TAG, at))  # of a tag that may go on in the next chunk
                 cut = len(held) if last < 0 else last
-                piece, held = held[:cut], held[cut:]
             else:
-                piece, held = held[: found.start()], held[found.start() :]
-            if piece:
-                yield piece
-                fed += len(piece)
+                cut = found.start()
+            if cut > at:
+                yield held[at:cut]
+                fed, at = fed + cut - at, cut
             if found is None:
                 chunk = next(left, b"")
                 if not chunk:
                     break
-                held += chunk
+                held, at = held[at:] + chunk, 0
                 continue
             depth, _ = reader.inside(fed)
-            tag = found.group()
-            yield tag
-            fed, held = fed + len(tag), held[len(tag) :]
+            yield found.group()
+            fed, at = fed + len(found.group()), found.end()
             if reader.inside(fed) == (depth + 1, found.group(1).decode()):
                 open_list = found.group(1)
+            elif at < len(held):  # in a comment, for example: one full of tags would take long, tag by tag
+                yield held[at:]
+                fed, held, at = fed + len(held) - at, b"", 0
             continue
-        while len(held) < _BLOCK and b"</" not in held and (chunk := next(left, b"")):
-            held += chunk
-        end = held.find(b"</", 0, _BLOCK)
-        cut = held.rfind(b"/>", 0, end if end >= 0 else _BLOCK) + 2
+        while len(held) - at < _BLOCK and held.find(b"</", at) < 0 and (chunk := next(left, b"")):
+            held, at = held[at:] + chunk, 0
+        end = held.find(b"</", at, at + _BLOCK)
+        cut = held.rfind(b"/>", at, end if end >= 0 else at + _BLOCK) + 2
         if cut < 2:
             open_list = b""
             continue
-        block, held = held[:cut], held[cut:]
-        alike = read(block, _ELEMENTS[open_list])
-        if alike is not None and reader.take(open_list.decode(), alike):
-            block = b"\n" * alike.line_ends
+        block, at = held[at:cut], cut
+        uniform = read_uniform(block, _ELEMENTS[open_list]) if len(block) >= _SHORTEST else None
+        if uniform is not None and reader.take(open_list.decode(), uniform):
+            block = b"\n" * uniform.line_ends
             if block:
                 yield block
             fed += len(block)
@@ -115,14 +118,14 @@ def without_alike(chunks: Iterable[bytes], reader: Reader) -> Iterator[bytes]:
         # A comment or a section of characters may hold what looks like elements.
         if b"<!" in block or b"<?" in block or reader.inside(fed)[1] != open_list.decode():
             open_list = b""
-    if held:
-        yield held
+    if at < len(held):
+        yield held[at:]
 
 
-def read(block: bytes, element: bytes) -> Alike | None:
-    """Return the elements of a block, `vertex` or `triangle`, up to its end; None where they are not alike.
+def read_uniform(block: bytes, element: bytes) -> UniformBlock | None:
+    """Return the elements of a block, `vertex` or `triangle`, or None where the block is not uniform.
 
-    Alike: between the numbers all have the same text, without another attribute than the core's own.
+    In a uniform block all text between the numbers repeats, and each attribute is one of the core's.
     """
     if b"\r" in block and block.count(b"\r") != block.count(b"\r\n"):
         return None
@@ -140,7 +143,7 @@ def read(block: bytes, element: bytes) -> Alike | None:
     text = np.frombuffer(block, np.uint8)
     quotes = np.flatnonzero(text == _QUOTE)
     each = 2 * len(names)
-    if len(quotes) % each or _BEHIND.fullmatch(block, int(quotes[-1])) is None:
+    if len(quotes) % each or _AFTER.fullmatch(block, int(quotes[-1])) is None:
         return None
     quotes = quotes.reshape(-1, each)
     begin, end = quotes[:, ::2] + 1, quotes[:, 1::2]
@@ -153,11 +156,11 @@ def read(block: bytes, element: bytes) -> Alike | None:
     first = block.index(b"<")
     starts = np.append(first, quotes[1:, 0] - (int(quotes[0, 0]) - first))
     lines = np.searchsorted(line_ends, starts)
-    return Alike({name.decode(): numbers[:, i] for i, name in enumerate(names)}, lines, len(line_ends))
+    return UniformBlock({name.decode(): numbers[:, i] for i, name in enumerate(names)}, lines, len(line_ends))
 
 
 def _same_between(text: Ints, quotes: Ints, block: bytes, head: bytes) -> bool:
-    """Tell whether all elements have the text of the first between their numbers, and between two of them."""
+    """Tell whether the text between the numbers of the first element, and after it, repeats in the others."""
     opened, closed = quotes.ravel()[::2], quotes.ravel()[1::2]
     width = opened[1:] - closed[:-1]
     each = quotes.shape[1] // 2
@@ -165,12 +168,12 @@ def _same_between(text: Ints, quotes: Ints, block: bytes, head: bytes) -> bool:
         some, gap = closed[:-1][k::each], width[k::each]
         if not len(some):
             continue
-        if not (gap == gap[0]).all():
+        if gap[0] > _LONGEST_GAP or not (gap == gap[0]).all():
             return False
         pattern = text[some[0] : some[0] + gap[0] + 1]
         if k == each - 1:
-            behind = _BEHIND.match(pattern.tobytes())
-            if behind is None or pattern.tobytes()[behind.end() :] != head.lstrip():
+            after = _AFTER.match(pattern.tobytes())
+            if after is None or pattern.tobytes()[after.end() :] != head.lstrip():
                 return False
         for i, character in enumerate(pattern.tolist()):
             if not (text[some + i] == character).all():

@@ -1,4 +1,4 @@
-"""Vertices and triangles that are read at once: the same model, line by line, as the parser alone gives."""
+"""Uniform blocks of vertices and triangles: the same model, line by line, as the parser alone gives."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from unitcad.check.findings import Unreadable
-from unitcad.check.readers.threemf import alike, elements, model_part
+from unitcad.check.readers.threemf import elements, model_part, uniform_blocks
 from unitcad.check.rules.f_limits import Limits
 
 VERTICES = [
@@ -117,32 +117,57 @@ def _read(text: bytes, chunk: int) -> Any:
     return found, [(mesh.vertices.tolist(), mesh.rows.tolist()) for mesh in meshes], sorted(model.resources)
 
 
-def _confirm_alike(text: bytes, chunk: int, block: int) -> None:
+def _confirm_equal(text: bytes, chunk: int, block: int) -> None:
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(alike, "_BLOCK", block)
+        patched.setattr(uniform_blocks, "_BLOCK", block)
+        patched.setattr(uniform_blocks, "_SHORTEST", 1)
         at_once = _read(text, chunk)
-        patched.setattr(model_part, "without_alike", lambda chunks, _: chunks)
+        patched.setattr(model_part, "rest_for_parser", lambda chunks, _: chunks)
         assert at_once == _read(text, chunk)
 
 
 @settings(max_examples=300, deadline=None)
 @given(_models(), st.sampled_from([7, 60, 10_000]), st.sampled_from([60, 200, 10_000]))
 def test_reading_at_once_changes_nothing(text: bytes, chunk: int, block: int) -> None:
-    _confirm_alike(text, chunk, block)
+    _confirm_equal(text, chunk, block)
 
 
 @pytest.mark.parametrize("element", [*VERTICES, *TRIANGLES])
 def test_reading_elements_of_one_text_at_once_changes_nothing(element: str) -> None:
     for behind in ("", element.replace("1", "3"), VERTICES[0]):
         text = 5 * element + behind
-        _confirm_alike(_model(text) if "vertex" in element else _model(2 * VERTICES[0], text), 10_000, 10_000)
+        _confirm_equal(_model(text) if "vertex" in element else _model(2 * VERTICES[0], text), 10_000, 10_000)
 
 
 @pytest.mark.parametrize("around", [*WRAPPED, *CUT])
 @pytest.mark.parametrize("block", [60, 10_000])
 def test_what_only_looks_like_elements_is_left_to_the_parser(around: str, block: int) -> None:
-    _confirm_alike(_model(around.format(6 * VERTICES[0]) + VERTICES[0]), 10_000, block)
-    _confirm_alike(_model(2 * VERTICES[0], around.format(6 * TRIANGLES[0]) + TRIANGLES[0]), 10_000, block)
+    _confirm_equal(_model(around.format(6 * VERTICES[0]) + VERTICES[0]), 10_000, block)
+    _confirm_equal(_model(2 * VERTICES[0], around.format(6 * TRIANGLES[0]) + TRIANGLES[0]), 10_000, block)
+
+
+@pytest.mark.parametrize("blank", ["\x0b", "\x0c", "\xa0"])
+def test_a_blank_that_xml_forbids_is_refused(blank: str) -> None:
+    for vertex in (VERTICES[0].replace(" ", blank), VERTICES[0].replace("/>", f"{blank}/>"), VERTICES[0] + blank):
+        text = _model(100 * vertex)
+        assert isinstance(_read(text, 10_000), str) or blank == "\xa0"
+        _confirm_equal(text, 10_000, 10_000)
+
+
+def test_a_comment_full_of_tags_goes_to_the_parser_in_one_piece() -> None:
+    """The parser looks through an unfinished comment again with every piece."""
+    text = _model(f"<!--{20_000 * '<vertices>'}-->")
+    reader = model_part._Reader(model_part.Model("a"), Limits(), 0)
+    pieces = []
+
+    def watched(chunks: Any) -> Any:
+        for piece in uniform_blocks.rest_for_parser(chunks, reader):
+            pieces.append(piece)
+            yield piece
+
+    model_part.stream(watched([text]), "a", reader.start, reader.end, reader.namespace, reader.parser)
+    assert len(pieces) < 10
+    assert b"".join(pieces) == text
 
 
 @pytest.mark.parametrize("line_end", ["", "\n", "\r\n"])
@@ -162,7 +187,7 @@ def test_most_of_a_part_is_read_at_once(line_end: str) -> None:
     reader = Parsed(model, Limits(), 0)
 
     def watched(chunks: Any) -> Any:
-        for piece in alike.without_alike(chunks, reader):
+        for piece in uniform_blocks.rest_for_parser(chunks, reader):
             left.extend(piece)
             yield piece
 
