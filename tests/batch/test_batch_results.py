@@ -131,10 +131,10 @@ def test_the_last_line_s_sums_and_plurals(tmp_path: Path) -> None:
     done = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0, "--keep-going")
     assert done.returncode == 1
     made = done.stdout.splitlines()[0].rpartition("; ")[0]
-    assert made == "2 of 4 variants made; 2 failed; 1 geometry new, 1 variant from known ones"
+    assert made == "2 of 4 variants made; 2 failed; 1 geometry, 1 variant of known parts alone"
     again = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0, "--limit", 1)
     made = again.stdout.splitlines()[0].rpartition("; ")[0]
-    assert made == "1 of 1 variant made (1 from before); 0 failed; 0 geometries new, 0 variants from known ones"
+    assert made == "1 of 1 variant made (1 from before); 0 failed; 0 geometries, 0 variants of known parts alone"
 
 
 def test_variants_that_are_equal_share_a_folder(tmp_path: Path) -> None:

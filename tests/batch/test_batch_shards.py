@@ -133,7 +133,7 @@ def test_the_command_line_refuses_what_is_no_shard(tmp_path: Path) -> None:
     for words, message in (
         (
             ("batch", sweep, "--shard", "17/16"),
-            "--shard = 17/16: of 16 shards the first one is 1; nearest accepted: 16/16",
+            "--shard = 17/16: the shards of 16 are numbered 1 to 16; nearest accepted: 16/16",
         ),
         (("batch", "merge", tmp_path / "nothing"), "is not a shard of a batch"),
     ):

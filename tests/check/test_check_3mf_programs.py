@@ -118,3 +118,25 @@ def test_findings_name_part_object_and_line(judge: Judge) -> None:
     assert (at["P011"].line, at["P011"].object) == (first, "7")
     assert at["F004"].line == word[: word.index("ten")].count("\n") + 1
     assert str(at["P011"]) == f"3D/3dmodel.model object '7' line {first}"
+
+
+@pytest.mark.parametrize("text", ["hello", "<![CDATA[<vertex x='1' y='2' z='3'/>]]>", "&#160;"])
+@pytest.mark.parametrize("behind", ["<vertices>", "<mesh>", '<object id="1">', "<build>"])
+def test_text_between_elements_is_a_finding(text: str, behind: str, judge: Judge) -> None:
+    model = model_xml(f'<object id="1">{mesh_xml()}</object>')
+    wrong = model.replace(behind, behind + text, 1)
+    assert wrong != model
+    for strict, severity in ((False, "warning"), (True, "error")):
+        report = judge(package(wrong), "a.3mf", strict_3mf=strict)
+        found = [found for found in report.findings if "text inside" in found.message]
+        assert [(one.code, one.severity) for one in found] == [("P017", severity)]
+
+
+@pytest.mark.parametrize("blank", ["\u00a0", "\u2003", "\u0085", "\u3000"])
+def test_blanks_that_xml_does_not_know_are_no_part_of_a_number(blank: str, judge: Judge) -> None:
+    model = model_xml(f'<object id="1">{mesh_xml()}</object>')
+    report = judge(package(model.replace('x="0', f'x="{blank}0', 1)), "a.3mf")
+    assert [found.code for found in report.findings if found.severity == "error"] == ["F004"]
+    moved = f'<build><item objectid="1" transform="1 0 0 0 1 0 0 0 1 0 0{blank}5"/></build>'
+    report = judge(package(model_xml(f'<object id="1">{mesh_xml()}</object>', moved)), "a.3mf")
+    assert [found.code for found in report.findings if found.severity == "error"] == ["P017"]

@@ -75,6 +75,10 @@ def make(
 
     Raises Refusal or UnitcadError where nothing can be run.
     """
+    if options.store == "":
+        raise WrongArgument("store", "", "needs a folder or an address", "store")
+    if options.store and options.store.startswith("memory://") and workers.jobs != 0:
+        raise WrongArgument("store", options.store, "is in the memory of one process: leave it out, or use jobs = 0")
     if options.shard:
         if options.only == ("estimate",):
             raise WrongArgument("shard", str(options.shard), "estimates alone are one table: leave it out")

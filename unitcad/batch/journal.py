@@ -9,6 +9,7 @@ another batch, is left out, and its variant is checked again.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import zlib
@@ -48,6 +49,7 @@ class Journal:
         self._seed = zlib.crc32(_text(self.head))
         self._lines = array("q")
         self.damaged = 0
+        self._begun = [path for path in (out / JOURNAL, out / LOCK, out) if not os.path.lexists(path)]
         self._lock = _lock(out, head, beside)
         try:
             self._file = self._open(out / JOURNAL)
@@ -81,6 +83,13 @@ class Journal:
         """Let go of the folder."""
         self._file.close()
         self._lock.release()
+
+    def abandon(self) -> None:
+        """Let go of the folder, and remove what was begun in it: nothing was made."""
+        self.close()
+        with contextlib.suppress(OSError):
+            for path in self._begun:
+                path.rmdir() if path == self.out else path.unlink(missing_ok=True)
 
     def __enter__(self) -> Journal:
         return self

@@ -111,9 +111,10 @@ def _store_of(batch: Path, address: str | None = None) -> SharedStore:
 
 
 def _entry_of(batch: Path, wanted: str) -> JournalEntry:
-    if not re.fullmatch(r"[0-9a-f]{4,12}", wanted):
+    digits = wanted.rpartition("-")[2].lower()  # the whole name of a folder will do
+    if not re.fullmatch(r"[0-9a-f]{4,12}", digits):
         raise WrongArgument("hash", wanted, "needs 4 to 12 of the digits 0-9 and a-f at the end of a variant's folder")
-    begins, found = re.compile(rb'"folder": "[^"]*-' + wanted.encode()), {}
+    begins, found = re.compile(rb'"folder": "[^"]*-' + digits.encode()), {}
     try:
         with open(batch / JOURNAL, "rb") as journal:
             for line in journal:

@@ -73,7 +73,7 @@ def run(
     try:
         destination = destination_of(out, options, summary.variants, cache, remote)
     except BaseException:
-        journal.close()
+        journal.abandon()
         raise
     batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, destination, summary, indices)
     if journal.damaged:

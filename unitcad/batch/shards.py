@@ -51,7 +51,9 @@ def shard_of(text: str) -> Shard:
     if not 1 <= of <= MOST_SHARDS:
         raise WrongArgument("shard", text, f"needs 1 to {MOST_SHARDS} shards", f"1/{min(max(of, 1), MOST_SHARDS)}")
     if not 1 <= number <= of:
-        raise WrongArgument("shard", text, f"of {of} shards the first one is 1", f"{min(max(number, 1), of)}/{of}")
+        raise WrongArgument(
+            "shard", text, f"the shards of {of} are numbered 1 to {of}", f"{min(max(number, 1), of)}/{of}"
+        )
     return Shard(number, of)
 
 
@@ -104,7 +106,10 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
             ) from None
         first_folder, first = next(iter(records.values()), (folder, record))
         if (record.head.batch, record.of, record.variants) != (first.head.batch, first.of, first.variants):
-            raise UnitcadError(f"{folder}: is a shard of another batch than {first_folder} (sweep, options or number)")
+            raise UnitcadError(
+                f"{folder}: is a shard of another batch than {first_folder} (sweep, options or number of shards); "
+                "delete one of them, or name the folders of the shards to merge"
+            )
         if record.code != first.code:
             raise UnitcadError(f"{folder}: was made by unitcad {record.code}, {first_folder} by {first.code}")
         if record.number in records:

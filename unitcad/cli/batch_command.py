@@ -189,8 +189,8 @@ def _print_summary(summary: Summary, folder: Path) -> None:
         f"{summary.ok} of {counted(summary.variants, 'variant')} made{before}",
         f"{summary.failed} failed",
         *([f"{left} not tried"] if left else []),
-        f"{counted(summary.geometries, 'geometry', 'geometries')} new, "
-        f"{counted(summary.reused, 'variant')} from known ones",
+        f"{counted(summary.geometries, 'geometry', 'geometries')}, "
+        f"{counted(summary.reused, 'variant')} of known parts alone",
         f"{summary.seconds:.1f} s",
     ]
     typer.echo("; ".join(parts))

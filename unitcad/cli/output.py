@@ -48,8 +48,10 @@ def say_error(error: UnitcadError, as_json: bool) -> None:
         print_json({"error": error.as_dict()})
 
 
-_ARGUMENTS = {"spec": "SPEC", "sweep": "SWEEP", "phantom": "PHANTOM", "target": "TARGET"}
-"""What the help calls parameters that are no options."""
+_ARGUMENTS = {
+    "spec": "SPEC", "sweep": "SWEEP", "phantom": "PHANTOM", "target": "TARGET", "hash": "HASH", "tables": "--table",
+}  # fmt: skip
+"""What the command line calls parameters that are no options, or options of another name."""
 
 
 def warn(line: str) -> None:

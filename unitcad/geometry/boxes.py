@@ -19,6 +19,7 @@ _FAN = 4
 _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at
 _STEP_BITS = 12
 _STEP = 1 << _STEP_BITS  # pairs of nodes looked at together
+_FEW = 4096  # points, which are sorted in less time than all steps are gone through
 _TOP = 65_534  # largest step; 65,535 is an empty box's low corner
 _FACES = 1 << 14  # faces whose corners stay in the processor's cache
 _BITS = 14  # of each axis in a Morton key
@@ -51,10 +52,13 @@ def frame_of(points: Floats) -> Frame:
 def ranks_of(steps: list[Ints], points: Floats, most: int) -> list[Ints] | None:
     """Return the ranks of the coordinates of (n, 3) points along each axis, uint16 from 0 to `most`.
 
-    None where two of them have one step, or where there are more.
+    None where there are more, or where two of many points' coordinates have one step.
     """
     ranks = []
     for axis, step in enumerate(steps):
+        if len(points) <= min(_FEW, most):
+            ranks.append(np.unique(points[:, axis], return_inverse=True)[1].reshape(-1).astype(np.uint16))
+            continue
         column, holder, there = points[:, axis], np.zeros(_TOP + 1), np.zeros(_TOP + 1, bool)
         holder[step] = column
         there[step] = True

@@ -108,7 +108,7 @@
     // Says how the folder of a variant is made that the page was opened for and has none.
     const ask = (folder) => {
       const there = folder && table.rows.some((row) => row[0] === folder);
-      clear(lacking, there && [`${folder} has no folder here. Make it, and then this page again, with `,
+      clear(lacking, there && [`${folder} has no folder here. To make it, and then this page again, run in the folder that holds ${data.stored_in}: `,
         el("code", {}, `unitcad cache export ${folder.split("-").pop()} --batch ${data.stored_in} && unitcad report ${data.stored_in}`)]);
     };
     const sections = [section("variants", "Variants", lacking, made.node), pins.node, section("plot", "Two columns against each other", controls, notRead, plotHost)];

@@ -37,13 +37,19 @@ def _pattern(pattern: str) -> Test:
     return re.compile(pattern, re.ASCII).fullmatch
 
 
-number = _pattern(r"\s*[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?\s*")
-boolean = _pattern(r"\s*(?:true|false|0|1)\s*")
-uuid = _pattern(r"\s*[0-9a-fA-F]{8}(?:-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}\s*")
+_WORD = re.compile(r"[^ \t\r\n]+")
+number = _pattern(r"[ \t\r\n]*[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?[ \t\r\n]*")
+boolean = _pattern(r"[ \t\r\n]*(?:true|false|0|1)[ \t\r\n]*")
+uuid = _pattern(r"[ \t\r\n]*[0-9a-fA-F]{8}(?:-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}[ \t\r\n]*")
 color = _pattern(r"#(?:[0-9A-Fa-f]{6}|[0-9A-Fa-f]{8})")
 part_name = _pattern(r"(?s:/.*)")
 text = _pattern(r"(?s:.*)")
-_integer = _pattern(r"\s*\+?\d{1,12}\s*")
+_integer = _pattern(r"[ \t\r\n]*\+?\d{1,12}[ \t\r\n]*")
+
+
+def words(text: str) -> list[str]:
+    """Return the words of a text between the blanks that XML knows."""
+    return _WORD.findall(text)
 
 
 def positive(text: str) -> bool:
@@ -68,7 +74,7 @@ def one_of(*values: str) -> Test:
 
 def many(test: Test) -> Test:
     """Return the test of a space-separated list, at least one."""
-    return lambda text: bool(text.split()) and all(test(part) for part in text.split())
+    return lambda text: bool(words(text)) and all(test(part) for part in words(text))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ of them are read at once (`uniform_blocks`).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -16,10 +15,9 @@ from unitcad.check.findings import Location
 from unitcad.check.geometry.triangle_mesh import LARGEST
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
-from unitcad.check.readers.threemf.transform import NOT_FINITE, transform
+from unitcad.check.readers.threemf.numeric_text import coordinate, transform
 from unitcad.check.readers.threemf.uniform_blocks import UniformBlock, rest_for_parser
 from unitcad.check.readers.threemf.xml_stream import forbidden, new_parser, stream
-from unitcad.check.rules.f_file import F004, not_a_number
 from unitcad.check.rules.f_limits import F011, Limits, Unreadable
 from unitcad.check.rules.p_package import P010, P016, P017, P018
 from unitcad.check.rules.v_values import V001
@@ -38,6 +36,7 @@ class _Open:
     rules: elements.ElementSchema | None
     counts: dict[str, int] = field(default_factory=dict)
     last: int = -1
+    told: bool = False
 
 
 # What programs write where a name is missing. Other unprefixed names pass: consumers ignore them (core, 3.4.1).
@@ -50,6 +49,8 @@ class _Reader:
     def __init__(self, model: Model, limits: Limits, spent_faces: int) -> None:
         self.model, self.limits, self.faces = model, limits, spent_faces
         self.parser = new_parser()
+        self.parser.buffer_text = False  # the line of a text is that of its event
+        self.parser.CharacterDataHandler = self.text_inside
         model.where = self._where
         self.stack: list[_Open] = [_Open("", "", None)]
         self.skip = 0
@@ -64,7 +65,6 @@ class _Reader:
         self.beyond = False
         self.triangles: list[tuple[int, ...]] = []
         self.rows: list[Ints] = []
-        self.text: dict[str, str] = {}
 
     def _where(self) -> Location:
         inside = self.resource.id if isinstance(self.resource, Object) else None
@@ -140,6 +140,13 @@ class _Reader:
         self.rank += 1
         if good:
             self._take(space, local, attributes)
+
+    def text_inside(self, text: str) -> None:
+        """Find fault with text in an element that holds none."""
+        above = self.stack[-2] if self.stack[-1] is _LEAF else self.stack[-1]
+        if not self.skip and not above.told and above.name not in ("", "metadata") and text.strip(" \t\r\n"):
+            above.told = True
+            self.model.add_lenient(P017, f"text inside <{above.name}>")
 
     def end(self, _: str) -> None:
         if self.skip:
@@ -336,7 +343,7 @@ class _Reader:
                 raise ValueError(text[:40])
             values = np.array(self.numbers, dtype=np.float64)
         except ValueError:
-            values = np.array([self._number(text, self.lines[i // 3]) for i, text in enumerate(self.numbers)])
+            values = np.array([coordinate(text, self.model, self.lines[i // 3]) for i, text in enumerate(self.numbers)])
         bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if len(bad):
             if not self.beyond:
@@ -351,15 +358,6 @@ class _Reader:
         self.n_vertices += len(values)
         if self.n_vertices > 3 * self.limits.max_faces + 3:
             raise F011.unreadable("more vertices than three times --max-faces")
-
-    def _number(self, text: str, line: int) -> float:
-        text = text.strip()
-        if elements.number(text):
-            return float(text)
-        if text.lower() in NOT_FINITE:
-            return math.nan
-        self.model.add(F004, not_a_number(text).message, line=line)
-        return 0.0
 
     def _flush_triangles(self) -> None:
         if self.triangles:

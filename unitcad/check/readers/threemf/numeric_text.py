@@ -1,4 +1,4 @@
-"""The transform of a 3MF item or component."""
+"""The numbers of a 3MF model part that are read one by one: coordinates, and the transform of an item or component."""
 
 from __future__ import annotations
 
@@ -9,11 +9,23 @@ import numpy as np
 from unitcad.check.geometry.triangle_mesh import LARGEST
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import Model
+from unitcad.check.rules.f_file import F004, not_a_number
 from unitcad.check.rules.p_package import P013, P015, P017
 from unitcad.geometry.arrays import Floats
 
 NOT_FINITE = {"nan", "inf", "infinity", "-nan", "+nan", "-inf", "+inf", "-infinity", "+infinity"}
 """What programs write for a number that is none, in lower case."""
+
+
+def coordinate(text: str, model: Model, line: int) -> float:
+    """Return the number of an attribute's text; NaN for one that is not finite, 0 with a finding for no number."""
+    text = text.strip(" \t\r\n")
+    if elements.number(text):
+        return float(text)
+    if text.lower() in NOT_FINITE:
+        return math.nan
+    model.add(F004, not_a_number(text).message, line=line)
+    return 0.0
 
 
 def transform(text: str | None, model: Model, regular: set[tuple[str, ...]]) -> Floats:
@@ -24,7 +36,7 @@ def transform(text: str | None, model: Model, regular: set[tuple[str, ...]]) -> 
     identity = np.vstack([np.eye(3), np.zeros(3)])
     if text is None:
         return identity
-    parts = text.split()
+    parts = elements.words(text)
     if len(parts) == 12 and all(elements.number(part) for part in parts):
         matrix = np.array([float(part) for part in parts]).reshape(4, 3)
         if not (np.abs(matrix) <= LARGEST).all():
