@@ -13,6 +13,7 @@ import pytest
 from batching import bytes_of, calls, ring_sweep, rows
 from object_store import BUCKET, Faulty, s3_server
 
+import unitcad
 from unitcad.batch import BatchOptions, Summary, load_sweep, record_packs, run
 from unitcad.batch.executors import SerialExecutor, WorkerDied
 from unitcad.batch.sweep import from_file
@@ -240,6 +241,48 @@ def test_a_record_names_no_file_outside_its_folder(path: str, tmp_path: Path) ->
     (place,) = record_packs.pack(store, [Product(manifest, {"manifest.json": b"{}", path: b""}, {})])
     with pytest.raises(UnitcadError, match="names a file outside its folder"):
         record_packs.read_record(store, place)
+
+
+def test_a_batch_whose_store_is_refused_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("text")
+    for out in ("new", "there"):
+        (tmp_path / "there").mkdir(exist_ok=True)
+        with pytest.raises(UnitcadError, match="is a file, not a folder"):
+            made(ring_sweep(tmp_path), tmp_path / out, store=str(tmp_path / "file"))
+    assert not (tmp_path / "new").exists()
+    assert not list((tmp_path / "there").iterdir())
+    made(ring_sweep(tmp_path), tmp_path / "there", store=str(tmp_path / "store"))
+    before = sorted((tmp_path / "there").iterdir())
+    with pytest.raises(UnitcadError, match="is a file, not a folder"):
+        made(ring_sweep(tmp_path), tmp_path / "there", store=str(tmp_path / "file"))
+    assert sorted((tmp_path / "there").iterdir()) == before
+
+
+@pytest.mark.parametrize(("store", "limit"), [("", "needs a folder"), ("memory://x", "in the memory of one process")])
+def test_a_store_that_workers_can_not_share_is_refused(store: str, limit: str, tmp_path: Path) -> None:
+    with pytest.raises(UnitcadError, match=limit):
+        unitcad.batch(ring_sweep(tmp_path), tmp_path / "out", only="unit", jobs=2, store=store)
+    assert not (tmp_path / "out").exists()
+
+
+def test_content_that_stays_damaged_is_waited_for_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store, pauses = SharedStore(str(tmp_path / "store")), []
+    store.claim()
+    sha256 = store.keep(b"content")
+    (path,) = (tmp_path / "store" / "content").rglob(sha256)
+    path.chmod(0o644)
+    path.write_bytes(b"damaged")
+    monkeypatch.setattr(shared_store.time, "sleep", pauses.append)
+    for _ in range(3):
+        with pytest.raises(MissingContent):
+            store.content(sha256)
+    assert len(pauses) == TRIES - 1
+    store.keep(b"content", anew=True)
+    assert store.content(sha256) == b"content"
+    path.write_bytes(b"damaged")
+    with pytest.raises(MissingContent):
+        store.content(sha256)
+    assert len(pauses) == 2 * (TRIES - 1)
 
 
 def test_an_address_that_can_not_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.casting.bench_extras import ARROW, BAND, CARD, GREASE, TAPE
-from unitcad.casting.bench_pictures import SIZE, BenchPictures, _Kind, _piece_names, pictures
+from unitcad.casting.bench_pictures import SIZE, BenchPictures, _Kind, _piece_names, _seen_from_above, pictures
 from unitcad.casting.bench_view import OVER
 from unitcad.casting.bench_views import View, picture_path, views
 from unitcad.casting.procedure import Procedure, procedure
@@ -386,3 +386,14 @@ def test_a_cut_tongue_is_drawn_as_the_strip_that_its_step_describes() -> None:
     assert steps["Cut the tongues"] == picture_path("cut-tongue")
     printed = planned("encapsulating")[0].solids["tongue"].bounding_box()
     assert printed[4] - printed[1] == pytest.approx(10.0, abs=0.01)
+
+
+def test_a_name_points_at_its_piece() -> None:
+    """An L lies round the place that is named: the middle of its nearest face is taken."""
+    ell = Manifold.cube((10, 2, 3)) + Manifold.cube((2, 10, 1))
+    mesh = ell.to_mesh()
+    solid = np.asarray(mesh.vert_properties, float), np.asarray(mesh.tri_verts, np.int64), (1.0, 1.0, 1.0)
+    assert _seen_from_above([solid], 5, 1) == pytest.approx((5, 1, 3))
+    assert _seen_from_above([solid], 1, 9) == pytest.approx((1, 9, 1))
+    x, y, z = _seen_from_above([solid], 6, 6)
+    assert (0 <= x <= 10 and 0 <= y <= 2 and z == 3) or (0 <= x <= 2 and 0 <= y <= 10 and z == 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -122,7 +122,7 @@ def _piece_names(moulds: MouldSet, placed: dict[object, list[_Solid]]) -> list[N
     """
     plan = moulds.plan
     split = {piece.name: (each.tool, str(i)) for each in plan.splits for i, piece in enumerate(each.pieces, 1)}
-    runs: dict[str, list[np.ndarray]] = {}
+    runs: dict[str, list[list[_Solid]]] = {}
     numbers: list[Name] = []
     for key, solids in placed.items():
         if isinstance(key, tuple) and isinstance(key[1], Placed):
@@ -135,18 +135,38 @@ def _piece_names(moulds: MouldSet, placed: dict[object, list[_Solid]]) -> list[N
                 numbers.append(Name(numeral, (x, y, float(high[2])), on=True))
             filament = "straight filament" if tool.step else "filament"
             name = {"tongue": "tongue", "stub": filament}.get(tool.kind, plan.called(of))
-            runs.setdefault(name, []).append(points)
+            runs.setdefault(name, []).append(solids)
     names = []
     split_tools = {plan.called(tool) for tool, _ in split.values()}
-    for name, points in runs.items():
-        low, high = points[0].min(axis=0), points[0].max(axis=0)
-        # At the nearer edge of the upper face, where most pieces are solid.
-        at = float(low[0] + high[0]) / 2, float(low[1] + 0.1 * (high[1] - low[1])), float(high[2])
+    for name, pieces in runs.items():
+        points = np.concatenate([vertices for vertices, _, _ in pieces[0]])
+        low, high = points.min(axis=0), points.max(axis=0)
         if name in split_tools:  # at the left edge of its first piece
             at = float(low[0]), float(low[1] + high[1]) / 2, float(high[2])
-        many = len(points) > 1 and name not in split_tools
+        else:  # near the front edge
+            at = _seen_from_above(pieces[0], float(low[0] + high[0]) / 2, float(low[1] + 0.1 * (high[1] - low[1])))
+        many = len(pieces) > 1 and name not in split_tools
         names.append(Name(f"{len(points)} {name}s" if many else name, at))
     return [*numbers, *names]
+
+
+def _seen_from_above(solids: Sequence[_Solid], x: float, y: float) -> tuple[float, float, float]:
+    """Return the highest point of solids at (x, y) mm; where they have none there, the middle of the nearest face."""
+    corners = np.concatenate([vertices[faces] for vertices, faces, _ in solids])
+    ax, ay, _ = (corners[:, 1] - corners[:, 0]).T
+    bx, by, _ = (corners[:, 2] - corners[:, 0]).T
+    upwards = ax * by - ay * bx > 1e-9
+    corners, ax, ay, bx, by = corners[upwards], ax[upwards], ay[upwards], bx[upwards], by[upwards]
+    dx, dy = x - corners[:, 0, 0], y - corners[:, 0, 1]
+    area = ax * by - ay * bx
+    two, three = (dx * by - dy * bx) / area, (ax * dy - ay * dx) / area
+    shares = np.stack([1 - two - three, two, three], axis=1)
+    inside = (shares >= 0).all(axis=1)
+    if inside.any():
+        return x, y, float((shares * corners[:, :, 2]).sum(axis=1)[inside].max())
+    middles = corners.mean(axis=1)
+    nearest = middles[np.argmin(np.hypot(middles[:, 0] - x, middles[:, 1] - y))]
+    return float(nearest[0]), float(nearest[1]), float(nearest[2])
 
 
 def _keys(view: View) -> Iterable[object]:
