@@ -21,7 +21,7 @@ from unitcad.batch.parquet_table import read_parquet
 from unitcad.batch.result_folders import export_variant
 from unitcad.batch.results import write_results
 from unitcad.batch.shards import Shard, shard_folders, shard_of
-from unitcad.cache import DiskStore
+from unitcad.cache import DiskStore, shared_store
 from unitcad.errors import UnitcadError, WrongArgument
 
 
@@ -161,6 +161,23 @@ def test_without_folders_one_is_made_when_asked_for(tmp_path: Path, monkeypatch:
         export_variant(tmp_path / "plain", wanted[-12:], tmp_path / "some", cache)
     with pytest.raises(UnitcadError, match="is it a batch"):
         export_variant(tmp_path, wanted[-12:], tmp_path / "some", cache)
+
+
+def test_what_makes_lost_content_again_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_store, "PAUSE_S", 0.0)
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=1), tmp_path / "out"
+    for number in (1, 2):
+        made(sweep, out, shard=Shard(number, 2))
+    for path in (out / "store" / "content").rglob("*"):
+        if path.is_file():
+            path.unlink()
+    record_packs.store_at.cache_clear()
+    with pytest.raises(UnitcadError, match=r"variant 0: .*; the sweep with --shard 1/2 and --verify makes again"):
+        merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=True))
+    merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=False))
+    folder = rows(out)[0]["folder"]
+    with pytest.raises(UnitcadError, match="the same batch with --verify makes again what is missing"):
+        export_variant(out, folder, tmp_path / "one", DiskStore(tmp_path / "fresh"))
 
 
 def test_parquet_has_the_rows_of_the_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

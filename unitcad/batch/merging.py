@@ -48,7 +48,8 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
             try:
                 for _, record in shards:
                     entries = filter(None, map(journal.entry, record.indices))
-                    make_folders(out, entries, SharedStore(record.store), cache)
+                    maker = f"the sweep with --shard {record.number}/{record.of} and"
+                    make_folders(out, entries, SharedStore(record.store), cache, maker)
             finally:
                 cache.close()
         found = swept_estimate(first.sweep, first.variants) if "estimate" in first.head.outputs else None

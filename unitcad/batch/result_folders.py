@@ -51,10 +51,15 @@ def folders_wanted(options: BatchOptions, variants: int) -> bool:
     return variants < FOLDERS_BELOW if options.folders is None else options.folders
 
 
-def make_folders(out: Path, entries: Iterable[JournalEntry], store: SharedStore, cache: DiskStore) -> None:
+_BATCH = "the same batch with"
+
+
+def make_folders(
+    out: Path, entries: Iterable[JournalEntry], store: SharedStore, cache: DiskStore, maker: str = _BATCH
+) -> None:
     """Make the folders in `out` that are not there, or not whole, of variants that are in a store.
 
-    Raises UnitcadError for what the store has lost, OSError.
+    Raises UnitcadError for what the store has lost, which the `maker` makes again, OSError.
     """
     done: set[str] = set()
     with files.scratch(out) as scratch:
@@ -67,9 +72,11 @@ def make_folders(out: Path, entries: Iterable[JournalEntry], store: SharedStore,
             try:
                 export(store, entry.record, out / entry.folder, cache, partial(placing, scratch=scratch))
             except MissingContent as error:
-                raise UnitcadError(
-                    f"variant {entry.index}: {error}; the same batch with --verify makes again what is missing"
-                ) from None
+                raise _lost(entry, error, maker) from None
+
+
+def _lost(entry: JournalEntry, error: MissingContent, maker: str) -> UnitcadError:
+    return UnitcadError(f"variant {entry.index}: {error}; {maker} --verify makes again what is missing")
 
 
 def export_variant(batch: Path, wanted: str, out: Path, cache: DiskStore, address: str | None = None) -> Path:
@@ -80,7 +87,10 @@ def export_variant(batch: Path, wanted: str, out: Path, cache: DiskStore, addres
     """
     entry, place = _stored(batch, wanted)
     out.mkdir(parents=True, exist_ok=True)
-    export(_store_of(batch, address), place, out / entry.folder, cache)
+    try:
+        export(_store_of(batch, address), place, out / entry.folder, cache)
+    except MissingContent as error:
+        raise _lost(entry, error, _BATCH) from None
     return out / entry.folder
 
 

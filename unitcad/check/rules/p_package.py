@@ -131,8 +131,7 @@ P017 = Rule("""
     P017 error: against the schema
     An element or attribute is missing, unknown, repeated, out of order, of the wrong type, or forbidden (xml:space, xsi
     attributes), or text stands between elements. Such text, an unknown attribute without a prefix, metadata of one
-    name and a missing UUID are warnings, unless
-    --3mf-strict is given, since common programs write such files.
+    name and a missing UUID are warnings, unless --3mf-strict is given, since common programs write such files.
     Example: A `<triangle>` has v1 and v2, and no v3.
     Fix: Write what the 3MF schema of that element asks.
 """)
