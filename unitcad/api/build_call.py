@@ -109,7 +109,7 @@ def build(
 
         with held(built.folder):
             write_report(built.folder)
-    return BuildResult(built.folder, built.manifest, spec, array)
+    return BuildResult(built.folder, built.manifest, built.sha256, spec, array)
 
 
 def _silent(step: str) -> None:
