@@ -26,8 +26,8 @@ LEAST_GAIN = 1.25
 
 It is above 1 where neither rtol is met: the panels are then spent differently, or rounding next to the poles enters at
 other wavenumbers. And where a detour that the looser one takes leaves out more than the tighter one may: the panels in
-its place may then be off by 1.2 times as much. Of 2,000 random media one
-was 2.5 times worse for neither reason.
+its place may then be off by 1.2 times as much. Of 2,000 random media one was
+2.5 times worse for neither reason.
 """
 _LEAST = 1e-15
 """Where a true error of 0 is drawn."""

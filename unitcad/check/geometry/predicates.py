@@ -11,6 +11,7 @@ Python's integers decide the rest: coordinates of very different size.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -43,11 +44,7 @@ def orient2d_columns(a: Floats, b: Floats, c: Floats) -> Ints:
     value = left - right
     size = np.abs(left, out=left)
     size += np.abs(right, out=right)
-    sign = np.sign(value).astype(np.int8)
-    unsure = np.flatnonzero(np.abs(value) <= _BOUND[2] * size + _TINY)
-    if len(unsure):
-        sign[unsure] = _exact(np.stack([point.take(unsure, axis=1) for point in (a, b, c)]), size[unsure])
-    return sign
+    return _sure((a, b, c), value, size)
 
 
 def sides(a: Floats, b: Floats) -> Ints:
@@ -68,26 +65,36 @@ def sides(a: Floats, b: Floats) -> Ints:
         value = offset[0] * normal[0] + offset[1] * normal[1] + offset[2] * normal[2]
         np.abs(offset, out=offset)
         terms = offset[0] * size[0] + offset[1] * size[1] + offset[2] * size[2]
-        sign[k] = np.sign(value)
-        unsure = np.flatnonzero(np.abs(value) <= _BOUND[3] * terms + _TINY)
-        if len(unsure):
-            points = np.stack([corner.take(unsure, axis=1) for corner in (b[k], a[1], a[2], a[0])])
-            sign[k, unsure] = _exact(points, terms[unsure])
+        sign[k] = _sure((b[k], a[1], a[2], a[0]), value, terms)
+    return sign
+
+
+def _orient3d_columns(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
+    """Return what `orient3d` does, for points by axis: (3, n) arrays."""
+    rows = np.stack([a - d, b - d, c - d])
+    value = _determinant(rows)
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = np.abs(rows, out=rows)
+    size = az * (bx * cy + cx * by) + bz * (cx * ay + ax * cy) + cz * (ax * by + bx * ay)
+    return _sure((a, b, c, d), value, size)
+
+
+def _sure(points: Sequence[Floats], value: Floats, size: Floats) -> Ints:
+    """Return the signs of determinants: of their values (n,), or exact where these are too small beside `size`.
+
+    `size`: the sum of the sizes of a determinant's terms; points: (axes, n) arrays.
+    """
+    sign = np.sign(value).astype(np.int8)
+    unsure = np.flatnonzero(np.abs(value) <= _BOUND[len(points) - 1] * size + _TINY)
+    if len(unsure):
+        sign[unsure] = _exact(np.stack([point.take(unsure, axis=1) for point in points]), size[unsure])
     return sign
 
 
 def _signs(*points: Floats) -> Ints:
-    axes = len(points) - 1
+    of = orient2d_columns if len(points) == 3 else _orient3d_columns
     sign = np.empty(len(points[0]), np.int8)
     for start in range(0, len(sign), _BLOCK):
-        corners = np.stack([point[start : start + _BLOCK].T for point in points])
-        value, size = _determinant(corners[:-1] - corners[-1]), _size(corners)
-        bound = _BOUND[axes] * size + _TINY
-        here = np.sign(value).astype(np.int8)
-        unsure = np.flatnonzero(np.abs(value) <= bound)
-        if len(unsure):
-            here[unsure] = _exact(corners.take(unsure, axis=2), size[unsure])
-        sign[start : start + _BLOCK] = here
+        sign[start : start + _BLOCK] = of(*(np.ascontiguousarray(point[start : start + _BLOCK].T) for point in points))
     return sign
 
 
@@ -100,18 +107,8 @@ def _determinant(rows: Any) -> Any:
     return az * (bx * cy - cx * by) + bz * (cx * ay - ax * cy) + cz * (ax * by - bx * ay)
 
 
-def _size(points: Floats) -> Floats:
-    """Return the sum of the sizes of the determinant's terms."""
-    rows = np.abs(points[:-1] - points[-1])
-    if len(rows) == 2:
-        (ax, ay), (bx, by) = rows
-        return ax * by + ay * bx
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = rows
-    return az * (bx * cy + cx * by) + bz * (cx * ay + ax * cy) + cz * (ax * by + bx * ay)
-
-
 def _exact(points: Floats, size: Floats) -> Ints:
-    """Return signs of the determinants of points (axes + 1, axes, n) that the filter leaves; `size` as by `_size`."""
+    """Return signs of the determinants of points (axes + 1, axes, n) that the filter leaves; `size` as in `_sure`."""
     sign = np.zeros(len(size), np.int8)
     same = points == points[-1]
     left = np.flatnonzero(

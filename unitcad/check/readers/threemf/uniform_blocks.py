@@ -7,14 +7,14 @@ parser gets only its line ends. Every other block goes through the parser.
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.check.readers.rows import NEWLINE, SPACE, numbers_of, table_of
+from unitcad.geometry.arrays import Floats, Ints
 
 _BLOCK = 1 << 18
 _OPEN = re.compile(rb"<(vertices|triangles)>")
@@ -28,17 +28,11 @@ _NAMES = {b"vertex": (b"x", b"y", b"z"), b"triangle": (b"v1", b"v2", b"v3", b"p1
 _SHORTEST = 1500  # bytes; a shorter block costs the parser less
 _LONGEST_GAP = 200  # bytes between two numbers
 _MOST_DIGITS = 9  # an index goes to 2^31 - 1; longer ones are left to the parser
-_QUOTE, _NEWLINE = b'"\n'
+_QUOTE = ord('"')
 
 
-def _table(characters: bytes) -> Bools:
-    table = np.zeros(256, bool)
-    table[list(characters)] = True
-    return table
-
-
-_DIGITS = _table(b"0123456789")
-_IN_NUMBERS = _table(b"0123456789+-.eE")
+_DIGITS = table_of(b"0123456789")
+_IN_NUMBERS = table_of(b"0123456789+-.eE")  # no blanks: each number fills its quotes
 
 
 @dataclass(frozen=True)
@@ -152,7 +146,7 @@ def read_uniform(block: bytes, element: bytes) -> UniformBlock | None:
     numbers = _numbers(text, begin, end, whole=element == b"triangle")
     if numbers is None:
         return None
-    line_ends = np.flatnonzero(text == _NEWLINE)
+    line_ends = np.flatnonzero(text == NEWLINE)
     first = block.index(b"<")
     starts = np.append(first, quotes[1:, 0] - (int(quotes[0, 0]) - first))
     lines = np.searchsorted(line_ends, starts)
@@ -191,11 +185,5 @@ def _numbers(text: Ints, begin: Ints, end: Ints, *, whole: bool) -> Floats | Int
     inside = np.cumsum(marks[:-1], dtype=np.int8).view(bool)
     if not (_DIGITS if whole else _IN_NUMBERS)[text[inside]].all():
         return None
-    words = np.where(inside, text, np.uint8(32)).tobytes()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            values = np.fromstring(words, np.int64 if whole else np.float64, sep=" ")
-        except (DeprecationWarning, ValueError):
-            return None
-    return values.reshape(begin.shape) if values.size == begin.size else None  # "1-2" is two numbers to numpy
+    values = numbers_of(np.where(inside, text, np.uint8(SPACE)).tobytes(), begin.size, integers=whole)
+    return None if values is None else values.reshape(begin.shape)
