@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Iterable
@@ -76,8 +75,10 @@ class UnknownKey(Refusal):
 
 def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusal] = Refusal) -> Refusal:
     """Return a refusal, of class `kind`, of a name that is not in `known`, with the closest names that are."""
+    from difflib import get_close_matches  # which takes a millisecond to load, for a mistake alone
+
     known = sorted(known)
-    close = difflib.get_close_matches(value, known, n=3, cutoff=0.6)
+    close = get_close_matches(value, known, n=3, cutoff=0.6)
     most = _shown_of(known, _MOST_NAMES)
     more = f" and {len(known) - most} more" if len(known) > most else ""
     names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known[:most])}{more}"
@@ -89,17 +90,19 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
 
     The limit names the most similar keys first, and the command `lists`, which prints all, where it leaves any out.
     """
+    from difflib import SequenceMatcher, get_close_matches
+
     table, _, key = field.rpartition(".")
     known = list(known)
-    close = difflib.get_close_matches(key, known, n=len(known) or 1, cutoff=0.6)
+    close = get_close_matches(key, known, n=len(known) or 1, cutoff=0.6)
     # Among equals the table's first: bed_x_mm before bed_z_mm.
     best = max(
         (name for name in known if name in close),
-        key=lambda name: difflib.SequenceMatcher(None, name, key).ratio(),
+        key=lambda name: SequenceMatcher(None, name, key).ratio(),
         default=None,
     )
     nearest = f"{table}.{best}" if table and best else best
-    alike = sorted(known, key=lambda name: -difflib.SequenceMatcher(None, key, name).ratio())
+    alike = sorted(known, key=lambda name: -SequenceMatcher(None, key, name).ratio())
     most = _shown_of(known, _MOST_KEYS)
     more = len(known) - most
     rest = f" and {more} more{f' ({lists} lists all)' if lists else ''}" if more > 0 else ""

@@ -10,6 +10,7 @@ import typer
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
 from unitcad.errors import Refusal
+from unitcad.lean_import import postpone_tools
 
 if TYPE_CHECKING:
     from unitcad.spec import Spec
@@ -47,6 +48,7 @@ def estimate(
     the least error, and what was measured. Of an array: how much of a unit's motion reaches its neighbours. Of
     several arrays each is compared with the first.
     """
+    postpone_tools()
     from unitcad.arrays.array_names import confirm_known, is_array
     from unitcad.attenuation.edge.fitted_models import MODELS
     from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec, neighbours_of_specs

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 
 from unitcad.geometry.arrays import Ints
+from unitcad.lean_import import postpone_tools
 
 _SMALL = 1_500_000
 
@@ -19,6 +20,7 @@ def scipy_pays(n: int) -> bool:
 def components(n: int, left: Ints, right: Ints) -> Ints:
     """Return the component of each of `n` nodes joined by pairs, numbered in the order of their first node."""
     if scipy_pays(n):
+        postpone_tools()
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 

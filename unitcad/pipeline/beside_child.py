@@ -9,6 +9,7 @@ from typing import Any
 from unitcad.casting.bench_pictures import BenchPictures
 from unitcad.children import answer_requests
 from unitcad.errors import UnitcadError
+from unitcad.lean_import import postpone_tools
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
 from unitcad.spec import from_json
@@ -19,6 +20,7 @@ def begin() -> Callable[[tuple[str, Any]], object]:
     if "step" in sys.argv:
         from unitcad.export import step  # noqa: F401
     else:
+        postpone_tools()
         from unitcad import estimating  # noqa: F401
 
     benches: dict[str, BenchPictures] = {}

@@ -12,6 +12,7 @@ import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, sorted_with_order
 from unitcad.geometry.components import components, scipy_pays
+from unitcad.lean_import import postpone_tools
 
 _SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
 
@@ -89,6 +90,7 @@ def _sorted_edges(low: Ints, high: Ints, n_vertices: int) -> tuple[Ints, Ints, I
         return order, (key >> np.uint64(bits)).astype(np.int32), (key & np.uint64((1 << bits) - 1)).astype(np.int32)
     # To transpose a compressed sparse matrix is a counting sort, ten times faster than a sort of 64-bit keys: first by
     # the high end, then by the low one.
+    postpone_tools()
     from scipy.sparse import csr_array
 
     by_high = csr_array((low, high, np.arange(n + 1, dtype=np.int32)), shape=(n, n_vertices)).tocsc()

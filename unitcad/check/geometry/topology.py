@@ -10,7 +10,6 @@ import numpy as np
 from unitcad.check.geometry import edges as mesh_edges
 from unitcad.check.geometry import volumes
 from unitcad.check.geometry.edges import Edges, Turns
-from unitcad.check.geometry.seams import connected, join, t_junctions
 from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, extent, sorted_with_order
 from unitcad.geometry.ticks import Tick
@@ -162,6 +161,8 @@ def _referenced(mesh: Mesh) -> tuple[Mesh, int]:
 
 def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints, Ints, Ints, Edges, OpenEdges]:
     """Return the faces welded and as stored, what they are in the file, the edges of the former, and the open edges."""
+    from unitcad.check.geometry.seams import connected, join, t_junctions  # most meshes are closed
+
     open_ = np.flatnonzero(edges.size == 1)
     seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])))
     joined, stored, whole = seams.joined, seams.stored, seams.whole

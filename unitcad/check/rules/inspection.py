@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from unitcad.check.detail import detail
-from unitcad.check.geometry.rays import Rays, cast
 from unitcad.check.geometry.self_crossing import Crossings, crossings_of
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import Mesh
@@ -15,6 +14,7 @@ from unitcad.geometry.ticks import Tick
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
+    from unitcad.check.geometry.rays import Rays
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class Inspection:
     @cached_property
     def material(self) -> Rays:
         """How much material lies behind points of its faces, as far as matters for the printer."""
+        from unitcad.check.geometry.rays import cast
+
         assert self.printer is not None
         floors = float(self.printer.least_wall_mm), float(self.printer.least_flat_wall_mm)
         return cast(self.topology, floors, float(self.printer.least_feature_mm), self.tick, side=1)

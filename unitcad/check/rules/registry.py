@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Sequence
 from functools import cache
@@ -24,13 +23,19 @@ FAMILIES = {
     "D": "Printability",
     "M": "Manifest",
 }
+OF_MESHES = "VTG"
+"""Families whose files have a `check_mesh`, which needs a mesh alone."""
 _FAMILY_FILE = re.compile(f"[{''.join(FAMILIES).lower()}]_")
 
 
 @cache
-def modules() -> tuple[ModuleType, ...]:
-    """Return the files of rules, family by family; a file's name begins with the family's letter."""
+def modules(families: str = "".join(FAMILIES)) -> tuple[ModuleType, ...]:
+    """Return the files of rules of some families, one after the other; a file's name begins with its family's letter.
+
+    Others are not loaded.
+    """
     names = sorted(name for _, name, _ in iter_modules(folder.__path__) if _FAMILY_FILE.match(name))
+    names = [name for name in names if name[0].upper() in families]
     names.sort(key=lambda name: list(FAMILIES).index(name[0].upper()))
     return tuple(import_module(f"{folder.__name__}.{name}") for name in names)
 
@@ -62,7 +67,9 @@ def check_prefixes(option: str, prefixes: Sequence[str] | None) -> tuple[str, ..
     for prefix in prefixes or ():
         wanted = prefix.strip().upper()
         if not wanted or not any(code.startswith(wanted) for code in rules()):
-            near = difflib.get_close_matches(wanted, rules(), n=1, cutoff=0.5)
+            from difflib import get_close_matches  # which takes a millisecond to load, for a mistake alone
+
+            near = get_close_matches(wanted, rules(), n=1, cutoff=0.5)
             raise Refusal(option, prefix, "begins no rule's code", near[0] if near else None)
         kept.append(wanted)
     return tuple(kept)
