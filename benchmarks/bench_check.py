@@ -86,12 +86,13 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     import meshes
 
     from unitcad.check.geometry import self_crossing
+    from unitcad.check.geometry.arranged import arranged
     from unitcad.check.geometry.topology import topology_of
     from unitcad.check.geometry.triangle_mesh import Mesh
     from unitcad.check.rules.f_limits import Deadline
 
     vertices, faces = getattr(meshes, shape)(size)
-    found = topology_of(Mesh(vertices, faces), Deadline(600).tick).as_stored()
+    found = topology_of(Mesh(vertices, faces), Deadline(600).tick)
     code = CROSSING.format(here=str(Path(__file__).parent), shape=shape, size=size)
     other = subprocess.Popen([peer, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert other.stdin is not None
@@ -99,7 +100,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     times: dict[str, list[float]] = {"ours": [], "pymeshlab": [], "meshlib": []}
     for _ in range(rounds):
         start = time.process_time()
-        self_crossing.crossings_of(found, Deadline(600).tick)
+        self_crossing.crossings_of(found, arranged(found), Deadline(600).tick)
         times["ours"].append(time.process_time() - start)
         for name in ("pymeshlab", "meshlib"):
             other.stdin.write(f"{name}\n")

@@ -35,7 +35,7 @@ FLOORS = [
     {"shape"},
     {"check"},
     {"catalogue"},
-    {"files", "arguments"},
+    {"files", "arguments", "sharing"},
     {"errors", "children"},
     {"text", "json_text", "notebook", "geometry"},
     {"lean_import"},
@@ -84,6 +84,7 @@ def test_attenuation_and_check_know_nothing_of_cad() -> None:
                 "geometry",
                 "lean_import",
                 "notebook",
+                "sharing",
                 "text",
                 "errors",
             ), f"{file} imports {below}"

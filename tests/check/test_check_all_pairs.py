@@ -8,6 +8,7 @@ from exact_pairs import counts
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.check.geometry import self_crossing
+from unitcad.check.geometry.arranged import arranged
 from unitcad.check.geometry.topology import topology_of
 from unitcad.check.geometry.triangle_mesh import Mesh, weld_exact
 from unitcad.check.rules.f_limits import Deadline
@@ -55,13 +56,12 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
         vertices, faces = weld_exact(soup)
     else:
         vertices, faces = soup.reshape(-1, 3), np.arange(3 * len(soup), dtype=np.int32).reshape(-1, 3)
-    top = topology_of(Mesh(vertices, faces), Deadline(60).tick).as_stored()
-    faces, vertices = top.mesh.faces, top.mesh.vertices
-    faces = faces[(top.areas != 0).any(axis=1)]
-    labels = top.shells[(top.areas != 0).any(axis=1)]
+    top = topology_of(Mesh(vertices, faces), Deadline(60).tick)
+    solid, vertices = (top.stored_areas != 0).any(axis=1), top.mesh.vertices
+    faces, labels = top.stored[solid], top.shells[solid]
     if len(faces) < 2:
         return 0, 0, 0
-    found = self_crossing.crossings_of(top, Deadline(60).tick)
+    found = self_crossing.crossings_of(top, arranged(top), Deadline(60).tick)
     crossings, overlaps, touching = counts(vertices, faces)
     assert len(self_crossing.joined(found.crossing)) == crossings
     # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.

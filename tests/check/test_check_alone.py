@@ -19,6 +19,8 @@ BELOW = (
     "text.py",
     "files.py",
     "children.py",
+    "lean_import.py",
+    "sharing.py",
     "geometry",
     "catalogue",
     "check",

@@ -18,6 +18,7 @@ from unitcad.check.options import Options
 from unitcad.check.readers.sniff import kind_of
 from unitcad.check.rules.f_file import F012
 from unitcad.check.rules.f_limits import F011, OutOfTime, Unreadable
+from unitcad.sharing import two_cores
 
 _GRACE = 5.0  # s, beyond half of the limit more, until code that never looks at the clock is interrupted
 
@@ -97,7 +98,9 @@ def check_files(
     if jobs <= 1 or len(work) <= 1:
         with _bounded(memory_mb):
             for path, options in work:
-                yield guarded(path, options, then)
+                with two_cores():
+                    report = guarded(path, options, then)
+                yield report
         return
     yield from _in_processes(work, min(jobs, len(work)), memory_mb, then)
 

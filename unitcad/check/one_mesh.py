@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,8 @@ import numpy as np
 
 from unitcad.check.detail import detail
 from unitcad.check.findings import Facts, Finding, Location, ending, point
-from unitcad.check.geometry.topology import topology_of
+from unitcad.check.geometry.arranged import Arranged, arranged
+from unitcad.check.geometry.topology import MANY, surface_of, topology_on
 from unitcad.check.geometry.triangle_mesh import Mesh, representable
 from unitcad.check.rules import registry
 from unitcad.check.rules.f_file import F001
@@ -18,6 +20,7 @@ from unitcad.check.rules.f_limits import Deadline, keeping
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import not_finite
 from unitcad.geometry.arrays import extent
+from unitcad.geometry.ticks import Tick
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
@@ -44,7 +47,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Chec
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):
-        part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick, cross)
+        part = _inspected(mesh, deadline.tick, cross=cross)
     topology = part.topology
     area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
     facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)
@@ -55,6 +58,20 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Chec
     if part.solid:
         facts = replace(facts, volume_mm3=float(topology.volumes.sum()))
     return CheckedMesh(in_file(findings, mesh), facts, part)
+
+
+def _inspected(mesh: Mesh, tick: Tick, *, cross: bool) -> Inspection:
+    """Return a mesh to inspect. What the comparison of faces needs is worked out beside the topology."""
+    surface = surface_of(mesh, tick)
+    ready: list[Arranged] = []
+
+    def arrange() -> None:
+        with suppress(MemoryError):  # which comes again where it is wanted
+            ready.append(arranged(surface))
+
+    large = cross and len(surface.kept) >= MANY
+    topology = topology_on(surface, tick, arrange) if large else topology_on(surface, tick)
+    return Inspection(mesh, topology, tick, cross, ready=ready[0] if ready else None)
 
 
 def check_on_bed(part: Inspection, printer: Printer) -> tuple[Finding, ...]:

@@ -16,6 +16,7 @@ from unitcad.geometry.arrays import Bools, Floats, Ints, extent, sorted_with_ord
 from unitcad.geometry.ticks import Tick
 
 _FAN = 4
+_PART = 512  # pairs of nodes in a part at least
 _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at
 _STEP_BITS = 12
 _STEP = 1 << _STEP_BITS  # pairs of nodes looked at together
@@ -148,16 +149,27 @@ def meeting_pairs(boxes: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints
 
     Rows near each other should be near in space.
     """
-    levels = _levels(boxes, 0)
-    first, second = np.triu_indices(len(levels[-1]))
-    yield from _descend(levels, levels, first, second, tick, own=True)
+    for walk in meeting_parts(boxes, 1, tick):
+        yield from walk
+
+
+def meeting_parts(boxes: Ints, n: int, tick: Tick = lambda: None) -> list[Iterator[tuple[Ints, Ints]]]:
+    """Return `n` iterators that yield the pairs of `meeting_pairs` between them."""
+    tree = _tree(boxes, 0)
+    first, second = np.triu_indices(tree.roots)
+    level = len(tree.rows)
+    while level > 1 and n > 1 and len(first) < n * _PART:
+        first, second = _joined(_below(tree, tree, level, first, second, lambda: None, own=True))
+        level -= 1
+    parts = zip(np.array_split(first, n), np.array_split(second, n), strict=True)
+    return [_descend(tree, tree, level, *part, tick, own=True) for part in parts]
 
 
 def meeting_between(boxes: Ints, others: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:
     """Yield the same between the rows of two sets in one frame: row of `boxes`, row of `others`."""
-    here, there = _levels(boxes, len(others)), _levels(others, len(boxes))
-    top = np.indices((len(here[-1]), len(there[-1]))).reshape(2, -1)
-    yield from _descend(here, there, top[0], top[1], tick, own=False)
+    here, there = _tree(boxes, len(others)), _tree(others, len(boxes))
+    top = np.indices((here.roots, there.roots)).reshape(2, -1)
+    yield from _descend(here, there, len(here.rows), top[0], top[1], tick, own=False)
 
 
 def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
@@ -175,14 +187,22 @@ def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
     return pairs[np.lexsort(pairs.T[::-1])]
 
 
-def _levels(boxes: Ints, least: int) -> list[Ints]:
-    """Return the tree's levels from the leaves up, for `least` leaves or more; the uppermost has few boxes."""
-    levels = [_padded(boxes, max(least - len(boxes), 0))]
-    while len(levels) == 1 or len(levels[-1]) > _ROOTS:
-        below = levels[-1]
-        pair = np.minimum(below[0::2], below[1::2])
-        levels.append(_padded(np.minimum(pair[0::2], pair[1::2]), 0))
-    return levels
+@dataclass(frozen=True)
+class _Tree:
+    """The nodes of each level but the uppermost, which has `roots`, four to a column (`_packed`), leaves first."""
+
+    rows: list[Ints]
+    roots: int
+
+
+def _tree(boxes: Ints, least: int) -> _Tree:
+    """Return the tree over boxes, for `least` leaves or more."""
+    level, rows = _padded(boxes, max(least - len(boxes), 0)), list[Ints]()
+    while not rows or len(level) > _ROOTS:
+        rows.append(_packed(level))
+        pair = np.minimum(level[0::2], level[1::2])
+        level = _padded(np.minimum(pair[0::2], pair[1::2]), 0)
+    return _Tree(rows, len(level))
 
 
 def _padded(boxes: Ints, more: int) -> Ints:
@@ -202,22 +222,28 @@ def _packed(boxes: Ints) -> Ints:
 
 
 def _descend(
-    here: list[Ints], there: list[Ints], first: Ints, second: Ints, tick: Tick, *, own: bool
+    here: _Tree, there: _Tree, level: int, first: Ints, second: Ints, tick: Tick, *, own: bool
 ) -> Iterator[tuple[Ints, Ints]]:
-    for level in range(len(here) - 1, 0, -1):
-        rows = _packed(here[level - 1])
-        others = rows if here is there else _packed(there[level - 1])
-        keep = first < rows.shape[1]
-        keep &= second < others.shape[1]
-        first, second = first[keep], second[keep]
-        skip = None if not own else np.greater if level > 1 else np.greater_equal
-        walk = _walk(rows, others, first, second, skip, tick)
-        if level > 1:
-            blocks = [(i.astype(np.int32), j.astype(np.int32)) for i, j in walk]
-            first = np.concatenate([block[0] for block in blocks])
-            second = np.concatenate([block[1] for block in blocks])
-        else:
-            yield from walk
+    """Yield the pairs of leaves below pairs of nodes of a level; `own`: of one tree, each pair once."""
+    for above in range(level, 1, -1):
+        first, second = _joined(_below(here, there, above, first, second, tick, own=own))
+    yield from _below(here, there, 1, first, second, tick, own=own)
+
+
+def _joined(blocks: Iterator[tuple[Ints, Ints]]) -> tuple[Ints, Ints]:
+    kept = [(i.astype(np.int32), j.astype(np.int32)) for i, j in blocks]
+    return np.concatenate([block[0] for block in kept]), np.concatenate([block[1] for block in kept])
+
+
+def _below(
+    here: _Tree, there: _Tree, level: int, first: Ints, second: Ints, tick: Tick, *, own: bool
+) -> Iterator[tuple[Ints, Ints]]:
+    """Return blocks of the pairs of children that meet, of pairs of nodes of a level."""
+    rows, others = here.rows[level - 1], there.rows[level - 1]
+    keep = first < rows.shape[1]
+    keep &= second < others.shape[1]
+    skip = None if not own else np.greater if level > 1 else np.greater_equal
+    return _walk(rows, others, first[keep], second[keep], skip, tick)
 
 
 def _children(rows: Ints, which: Ints) -> tuple[Ints, Ints]:

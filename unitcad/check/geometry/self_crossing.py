@@ -8,28 +8,32 @@ A crossing is one of: two faces pass through each other; an edge lies in a face 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from unitcad.check.geometry import coverings, triangles
-from unitcad.check.geometry.arranged import Arranged, arranged
+from unitcad.check.geometry.arranged import Arranged
 from unitcad.check.geometry.contact import Contacts, FaceBoxes, RankedBoxes, face_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
-from unitcad.check.geometry.stars import height_fields
-from unitcad.check.geometry.topology import Topology
+from unitcad.check.geometry.topology import MANY, Topology
 from unitcad.check.geometry.triangle_mesh import same_place
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct
-from unitcad.geometry.boxes import meeting_pairs
+from unitcad.geometry.boxes import Slabs, meeting_parts
 from unitcad.geometry.ticks import Interrupted, Tick
+from unitcad.sharing import shared
 
 _BLOCK = 1 << 17
+_PARTS = 24  # of the walk over MANY faces or more
 _PAIRS = 1 << 15  # pairs looked at together: enough to outweigh the calls, few enough for the cache
 _RARE = 16  # of so many faces less than one has such a corner: most pairs need no look for one in common
 _SPARSE = 4  # of so many faces less than one is in a pair: a sieve of those few is the cheaper one
 _OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothing but perhaps touching
-_FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
+_FEW = (
+    4_000_000  # meeting pairs kept of a part; more is a mesh that lies on itself everywhere, which one is enough to say
+)
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,8 @@ def _sieve(faces: Faces, some: Ints | None = None) -> Sieve:
 class Crossings:
     """Pairs of `faces` that meet, collected over the blocks; `stopped`: why not all were looked at, None if they were.
 
-    `crossing` pass through each other, `covering` overlap in one plane; `contact` has pairs of shells that meet.
+    `crossing` pass through each other, `covering` overlap in one plane; `contact` has pairs of shells that meet. Those
+    of one of several `parts` of the walk have no `faces` of their own.
     """
 
     faces: Faces | None = None
@@ -91,6 +96,7 @@ class Crossings:
     leaning: list[Ints] = field(default_factory=list)
     kept: int = 0
     looked_at: int = 0
+    parts: int = 1
     stopped: Interrupted | None = None
 
     @property
@@ -104,20 +110,40 @@ class Crossings:
         return self.contact.shells_of(keys[distinct(keys)])
 
 
-def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Crossings:
-    """Find the pairs of faces that meet; `every`: all of those that touch, else one for each pair of shells."""
-    ready = arranged(topology.mesh.vertices, topology.mesh.faces, topology.areas)
+def crossings_of(topology: Topology, ready: Arranged, tick: Tick, *, every: bool = False) -> Crossings:
+    """Find the pairs of faces that meet, each where the file has it; `ready`: the surface's faces `arranged`.
+
+    `every`: all pairs of those that touch, else one for each pair of shells.
+    """
     if len(ready.order) < 2:
         return Crossings()
     tick()
-    faces = _prepared(topology, ready)
-    boxes, slabs = ready.steps, ready.slabs
-    del ready
+    faces, slabs = _prepared(topology, ready), ready.slabs
     crossings = Crossings(faces, Contacts(topology.n_shells, every=every))
+    walks = meeting_parts(ready.steps, _PARTS if len(ready.order) >= MANY else 1, tick)
+
+    def part(k: int) -> Crossings:
+        # Each begins with nothing known: which process does it has no say in what is found.
+        return _met(faces, slabs, walks[k], Crossings(None, Contacts(topology.n_shells, every), parts=len(walks)), tick)
+
+    for met in shared(part, len(walks)):
+        crossings.crossing += met.crossing
+        crossings.covering += met.covering
+        crossings.leaning += met.leaning
+        crossings.contact.noted += met.contact.noted
+        crossings.stopped = crossings.stopped or met.stopped
+    if crossings.stopped is not None:
+        crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
+    _leaning(faces, crossings)
+    return crossings
+
+
+def _met(faces: Faces, slabs: Slabs, walk: Iterator[tuple[Ints, Ints]], crossings: Crossings, tick: Tick) -> Crossings:
+    """Add to `crossings` the pairs of faces of a walk that meet; return them."""
     waiting: list[tuple[Ints, Ints]] = []
     count = 0
     try:
-        for i, j in meeting_pairs(boxes, tick):
+        for i, j in walk:
             i, j = slabs.meeting(*_strangers(faces, i, j))
             waiting.append((i, j))
             count += len(i)
@@ -127,17 +153,14 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
                 tick()
         _decide(faces, waiting, crossings)
     except Interrupted as stop:
-        crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
         crossings.stopped = stop
-    _leaning(faces, crossings)
     return crossings
 
 
 def _prepared(topology: Topology, ready: Arranged) -> Faces:
     vertices, several = topology.mesh.vertices, topology.n_shells > 1
     order, columns, corners, normal = ready.order, ready.columns, ready.corners, ready.normal
-    smooth = height_fields(columns, corners, normal, _surrounded(topology))
-    safe = smooth.take(corners)
+    safe = ready.smooth.take(corners)
     has_safe = np.asarray(safe.any(axis=0))
     places = same_place(vertices).take(corners) if several else corners
     return Faces(
@@ -152,18 +175,8 @@ def _prepared(topology: Topology, ready: Arranged) -> Faces:
         topology.shells[order],
         topology.kept[order],
         several,
-        several or not topology.edges.closed,
+        several or not ready.closed,
     )
-
-
-def _surrounded(topology: Topology) -> Bools:
-    """Return vertices all of whose edges have two faces, wound alike."""
-    edges, whole = topology.edges, np.ones(len(topology.mesh.vertices), bool)
-    if not edges.closed:
-        wrong = (edges.size != 2) | ~edges.balanced
-        whole[edges.low[wrong]] = False
-        whole[edges.high[wrong]] = False
-    return whole
 
 
 def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
@@ -196,7 +209,7 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings
     j = np.concatenate([pair[1] for pair in waiting])
     state, shared = np.empty((2, len(i)), np.int8)
     crossings.looked_at += len(i)
-    if crossings.looked_at * _SPARSE < faces.corners.shape[1]:
+    if "sieve" not in vars(faces) and crossings.looked_at * crossings.parts * _SPARSE < faces.corners.shape[1]:
         some, at = np.unique(np.concatenate([i, j]), return_inverse=True)
         sieve, at = _sieve(faces, some), at.reshape(2, -1)
     else:

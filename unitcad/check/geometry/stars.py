@@ -68,21 +68,29 @@ def _along_means(columns: Floats, corners: Ints, areas: Floats, asked: Bools) ->
     if not len(some):
         return np.zeros(n, bool)
     ids = [corner.take(some) for corner in corners]
-    sides = _sides(columns, ids)
     area = [part.take(some) for part in areas]
-    size = np.sqrt(_dot(area, area))
-    sound = size > _SOUND * _longest(sides)
-    share = 1 / np.where(sound, size, np.inf)
-    along = [np.add.reduce([np.bincount(corner, share * part, n) for corner in ids]) for part in area]
+    blocks = [slice(start, start + _BLOCK) for start in range(0, len(some), _BLOCK)]
+    share, angle, steep = np.empty(len(some)), np.empty((3, len(some))), np.empty((3, len(some)), bool)
+    for block in blocks:
+        size = np.sqrt(_dot(*2 * ([part[block] for part in area],)))
+        sound = size > _SOUND * _longest(_sides(columns, [corner[block] for corner in ids]))
+        share[block] = 1 / np.where(sound, size, np.inf)
+    along = [np.add.reduce([np.bincount(corner, weight, n) for corner in ids]) for weight in (share * a for a in area)]
     length = np.maximum(np.sqrt(_dot(along, along)), 1e-300)
     along = [part / length for part in along]
+    for block in blocks:
+        near, here = [corner[block] for corner in ids], [part[block] for part in area]
+        sides = _sides(columns, near)
+        for k, corner in enumerate(near):
+            up = [part.take(corner) for part in along]
+            double = _dot(here, up)
+            flat = _dot(sides[k], up) * _dot(sides[k - 1], up) - _dot(sides[k], sides[k - 1])
+            steep[k, block] = double * share[block] <= _FACING
+            np.arctan2(double, flat, out=angle[k, block])
     turns = np.zeros(n)
     for k, corner in enumerate(ids):
-        up = [part.take(corner) for part in along]
-        double = _dot(area, up)
-        flat = _dot(sides[k], up) * _dot(sides[k - 1], up) - _dot(sides[k], sides[k - 1])
-        asked[corner[double * share <= _FACING]] = False
-        turns += np.bincount(corner, np.arctan2(double, flat), n)
+        asked[corner[steep[k]]] = False
+        turns += np.bincount(corner, angle[k], n)
     return asked & (np.abs(turns - 2 * np.pi) < 0.1)
 
 

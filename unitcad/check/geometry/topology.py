@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,10 @@ from unitcad.check.geometry.edges import Edges, Turns
 from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, extent, sorted_with_order
 from unitcad.geometry.ticks import Tick
+from unitcad.sharing import shared
+
+MANY = 200_000
+"""Faces from which a second core is worth its while."""
 
 
 @dataclass(frozen=True)
@@ -31,33 +37,48 @@ class OpenEdges:
 
 
 @dataclass(frozen=True)
-class Topology:
-    """A mesh without degenerate faces whose open edges are welded, and what follows from that.
+class Surface:
+    """A mesh without degenerate faces whose open edges are welded.
 
-    `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2; `shells` labels faces,
-    `turns` has those round edges of four and more. `stored` are the faces before welding moved any, with vertices in
-    one place joined. `low` and `high`: each shell's box, mm; `volumes`: what it encloses, mm3, below zero where its
-    faces look inwards; `closed`: whether it has an inside.
-    `repeated` are the file's faces that use a vertex twice, `unused` counts vertices that no face uses, `opened` has
-    the edges of one face, if any. `pinched` are vertices of several fans, `twice` faces with the vertices of another
-    one, `unbalanced` edges of an even number of faces along which more run one way than the other.
+    `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2. `stored` are the faces before welding
+    moved any, with vertices in one place joined. `repeated` are the file's faces that use a vertex twice, `unused`
+    counts vertices that no face uses, `opened` has the edges of one face, if any.
     """
 
     mesh: Mesh
     kept: Ints
     edges: Edges
+    areas: Floats
+    stored: Ints
+    repeated: Ints
+    unused: int
+    opened: OpenEdges | None
+
+    @cached_property
+    def stored_areas(self) -> Floats:
+        """Twice the area vectors of the faces as stored, mm2."""
+        if self.stored is self.mesh.faces:
+            return self.areas
+        return area_vectors(self.mesh.vertices, self.stored)
+
+
+@dataclass(frozen=True)
+class Topology(Surface):
+    """A surface, and what follows from its edges.
+
+    `shells` labels faces, `turns` has those round edges of four and more. `low` and `high`: each shell's box, mm;
+    `volumes`: what it encloses, mm3, below zero where its faces look inwards; `closed`: whether it has an inside.
+    `pinched` are vertices of several fans, `twice` faces with the vertices of another one, `unbalanced` edges of an
+    even number of faces along which more run one way than the other.
+    """
+
     turns: Turns | None
     shells: Ints
     n_shells: int
-    areas: Floats
-    stored: Ints
     low: Floats
     high: Floats
     volumes: Floats
     closed: Bools
-    repeated: Ints
-    unused: int
-    opened: OpenEdges | None
     pinched: Ints
     twice: Ints
     unbalanced: Ints
@@ -72,25 +93,14 @@ class Topology:
         """Whether neighbours are wound alike."""
         return not len(self.unbalanced)
 
-    @cached_property
-    def stored_areas(self) -> Floats:
-        """Twice the area vectors of the faces as stored, mm2."""
-        if self.stored is self.mesh.faces:
-            return self.areas
-        return area_vectors(self.mesh.vertices, self.stored)
-
-    def as_stored(self) -> Topology:
-        """Return the same with every face where the file has it."""
-        if self.stored is self.mesh.faces:
-            return self
-        edges = mesh_edges.edges_of(self.stored, len(self.mesh.vertices))
-        return replace(
-            self, mesh=replace(self.mesh, faces=self.stored), edges=edges, turns=None, areas=self.stored_areas
-        )
-
 
 def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     """Work out the topology of a mesh with finite vertices."""
+    return topology_on(surface_of(mesh, tick), tick)
+
+
+def surface_of(mesh: Mesh, tick: Tick) -> Surface:
+    """Work out the edges and areas of a mesh with finite vertices, and weld what is open."""
     mesh, unused = _referenced(mesh) if mesh.indexed else (mesh, 0)
     faces, vertices = mesh.faces, mesh.vertices
     repeated = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
@@ -103,49 +113,66 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     stored, opened = faces, None
     if not edges.closed and (edges.size == 1).any():
         faces, stored, kept, edges, opened = _welded(vertices, faces, kept, edges)
-    areas = area_vectors(vertices, faces)
     tick()
-    across = mesh_edges.opposite(edges, 3 * len(faces)) if edges.closed else None
-    same = None
-    if across is not None:
-        pinched = mesh_edges.pinched_closed(faces, across, len(vertices))
-        twice = np.flatnonzero(across[0::3] // 3 == across[1::3] // 3)
-    else:
-        pinched = mesh_edges.pinched_open(faces, edges, len(vertices))
-        same = _same_vertices(faces)
-        twice = np.sort(same[0][same[1]])
+    areas, mesh = area_vectors(vertices, faces), replace(mesh, faces=faces, normals=None)
     tick()
-    turns = mesh_edges.turns_of(vertices, faces, edges)
-    shells = mesh_edges.shells_of(faces, edges, turns)
-    low, high = _boxes(vertices, faces, shells)
-    volume = volumes.signed(vertices, faces, areas, shells, len(low))
-    closed = volumes.closed(edges, shells, len(low))
+    return Surface(mesh, kept, edges, areas, stored, np.flatnonzero(repeated), unused, opened)
+
+
+def topology_on(surface: Surface, tick: Tick, first: Callable[[], object] = lambda: None) -> Topology:
+    """Work out what follows from the edges of a surface, after `first` or, where two cores share it, beside that."""
+    edges = surface.edges
+    parts = (_by_shell, _pinched_and_twice)
+    results: list[Any] = shared(
+        lambda k: parts[k](surface, tick), len(parts), large=len(surface.kept) >= MANY, first=first
+    )
+    turns, shells, low, high, volume, closed = results[0]
+    pinched, twice, same = results[1]
     if same is not None and len(twice):
-        twice = np.setdiff1d(twice, _facing(*same, areas, shells, volume * closed))
-    tick()
+        twice = np.setdiff1d(twice, _facing(*same, surface.areas, shells, volume * closed))
     unbalanced = np.empty(0, int)
     if not edges.closed:
         unbalanced = np.flatnonzero((edges.size % 2 == 0) & ~edges.balanced)
     return Topology(
-        replace(mesh, faces=faces, normals=None),
-        kept,
-        edges,
-        turns,
-        shells,
-        len(low),
-        areas,
-        stored,
-        low,
-        high,
-        volume,
-        closed,
-        np.flatnonzero(repeated),
-        unused,
-        opened,
-        pinched,
-        twice,
-        unbalanced,
+        **{field.name: getattr(surface, field.name) for field in fields(surface)},
+        turns=turns,
+        shells=shells,
+        n_shells=len(low),
+        low=low,
+        high=high,
+        volumes=volume,
+        closed=closed,
+        pinched=pinched,
+        twice=twice,
+        unbalanced=unbalanced,
     )
+
+
+def _by_shell(surface: Surface, tick: Tick) -> tuple[Turns | None, Ints, Floats, Floats, Floats, Bools]:
+    """Return `turns`, `shells`, `low`, `high`, `volumes` and `closed` of a `Topology`."""
+    vertices, faces, edges = surface.mesh.vertices, surface.mesh.faces, surface.edges
+    turns = mesh_edges.turns_of(vertices, faces, edges)
+    shells = mesh_edges.shells_of(faces, edges, turns)
+    tick()
+    low, high = _boxes(vertices, faces, shells)
+    volume = volumes.signed(vertices, faces, surface.areas, shells, len(low))
+    return turns, shells, low, high, volume, volumes.closed(edges, shells, len(low))
+
+
+def _pinched_and_twice(surface: Surface, tick: Tick) -> tuple[Ints, Ints, tuple[Ints, Bools] | None]:
+    """Return the vertices of several fans, the faces with the vertices of others, and `_same_vertices` if it was used.
+
+    Shells that touch in a face are among the faces still.
+    """
+    faces, edges, n = surface.mesh.faces, surface.edges, len(surface.mesh.vertices)
+    if edges.closed:
+        across = mesh_edges.opposite(edges, 3 * len(faces))
+        pinched = mesh_edges.pinched_closed(faces, across, n)
+        return pinched, np.flatnonzero(across[0::3] // 3 == across[1::3] // 3), None
+    pinched = mesh_edges.pinched_open(faces, edges, n)
+    tick()
+    same = _same_vertices(faces)
+    return pinched, np.sort(same[0][same[1]]), same
 
 
 def _referenced(mesh: Mesh) -> tuple[Mesh, int]:

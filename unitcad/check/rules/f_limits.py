@@ -48,6 +48,10 @@ class OutOfTime(Unreadable):
 
     def __init__(self, seconds: float) -> None:
         super().__init__(F011.finding(f"not finished within --timeout {seconds:g} s"))
+        self.seconds = seconds
+
+    def __reduce__(self) -> tuple[type[OutOfTime], tuple[float]]:
+        return OutOfTime, (self.seconds,)
 
 
 class Deadline:

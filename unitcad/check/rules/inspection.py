@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from unitcad.check.detail import detail
+from unitcad.check.geometry.arranged import Arranged, arranged
 from unitcad.check.geometry.self_crossing import Crossings, crossings_of
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import Mesh
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 class Inspection:
     """A mesh with finite vertices, as the file has it, with its topology.
 
-    `tick` is called now and then by what takes long; `cross`: whether faces are compared with each other.
+    `tick` is called now and then by what takes long; `cross`: whether faces are compared with each other; `ready`: the
+    faces arranged for that, where they are already.
     """
 
     mesh: Mesh
@@ -29,6 +31,7 @@ class Inspection:
     tick: Tick
     cross: bool = True
     printer: Printer | None = None
+    ready: Arranged | None = None
 
     @property
     def solid(self) -> bool:
@@ -41,7 +44,7 @@ class Inspection:
         if not self.cross or not len(self.topology.kept):
             return Crossings()
         every = detail().meshes is not None
-        return crossings_of(self.topology.as_stored(), self.tick, every=every)
+        return crossings_of(self.topology, self.ready or arranged(self.topology), self.tick, every=every)
 
     @cached_property
     def material(self) -> Rays:
