@@ -129,12 +129,12 @@ def topology_on(surface: Surface, tick: Tick, first: Callable[[], object] = lamb
     turns, shells, low, high, volume, closed = results[0]
     pinched, twice, same = results[1]
     if same is not None and len(twice):
-        twice = np.setdiff1d(twice, _facing(*same, surface.areas, shells, volume * closed))
+        twice = np.setdiff1d(twice, _facing(same[0], same[1], surface.areas, shells, volume * closed))
     unbalanced = np.empty(0, int)
     if not edges.closed:
         unbalanced = np.flatnonzero((edges.size % 2 == 0) & ~edges.balanced)
     return Topology(
-        **{field.name: getattr(surface, field.name) for field in fields(surface)},
+        **{each.name: getattr(surface, each.name) for each in fields(surface)},
         turns=turns,
         shells=shells,
         n_shells=len(low),
