@@ -154,6 +154,7 @@ def _met(faces: Faces, slabs: Slabs, walk: Iterator[tuple[Ints, Ints]], crossing
         _decide(faces, waiting, crossings)
     except Interrupted as stop:
         crossings.stopped = stop
+    crossings.contact.pairs()  # what is noted twice goes where two processes share the work
     return crossings
 
 
