@@ -17,7 +17,7 @@ from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, extent, sorte
 from unitcad.geometry.ticks import Tick
 from unitcad.sharing import shared
 
-MANY = 200_000
+MANY = 50_000
 """Faces from which a second core is worth its while."""
 
 
