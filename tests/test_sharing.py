@@ -81,6 +81,17 @@ def test_what_a_copy_does_not_bring_back_is_done_here(fate: str) -> None:
     assert _no_child_left()
 
 
+def test_where_no_copy_can_be_made_all_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_left() -> int:
+        raise BlockingIOError("Resource temporarily unavailable")
+
+    monkeypatch.setattr(os, "fork", none_left)
+    before = len(os.listdir("/proc/self/fd"))
+    with sharing.two_cores():
+        assert {process for _, process in sharing.shared(_slow, 5)} == {os.getpid()}
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
 def test_an_error_is_raised_here_and_the_copy_ended() -> None:
     def work(k: int) -> int:
         time.sleep(0.01)

@@ -43,21 +43,23 @@ def shared(
     What it did not bring back, since it failed or was killed, is done here, and so is what comes `first`.
     """
     assert n <= MOST_PARTS
-    if sys.platform != "linux" or not large or not _ALLOWED.get():
+    if sys.platform != "linux" or n < 2 or not large or not _ALLOWED.get():
         first()
         return [work(k) for k in range(n)]
     places, filling = os.pipe()
     os.write(filling, bytes(range(n)))  # a byte a part: who reads it does it
     os.close(filling)
     answers, sending = os.pipe()
-    with warnings.catch_warnings():  # of other threads, those of numpy's BLAS: nothing here waits for them
-        warnings.simplefilter("ignore", DeprecationWarning)
-        copy = os.fork()
-    if copy == 0:
-        _answer(work, places, sending)
-    os.close(sending)
+    copy = 0
     done: dict[int, T] = {}
     try:
+        # No memory or no process left for a copy: this one reads all places.
+        with warnings.catch_warnings(), contextlib.suppress(OSError):
+            warnings.simplefilter("ignore", DeprecationWarning)  # of numpy's BLAS threads: nothing here waits for them
+            copy = os.fork()
+            if copy == 0:
+                _answer(work, places, sending)
+        os.close(sending)
         first()
         for k in _claimed(places):
             done[k] = work(k)
@@ -67,9 +69,9 @@ def shared(
     finally:
         os.close(places)
         os.close(answers)
-        with contextlib.suppress(ProcessLookupError):
+        if copy:
             os.kill(copy, signal.SIGKILL)  # it holds nothing that must be written
-        os.waitpid(copy, 0)
+            os.waitpid(copy, 0)
 
 
 def _claimed(places: int) -> Iterator[int]:

@@ -66,6 +66,12 @@ def test_the_report_does_not_depend_on_who_does_what(lattice: Path, monkeypatch:
     assert whole.facts == alone.facts
 
 
+def test_a_small_mesh_is_checked_by_one_process(lattice: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "fork", lambda: pytest.fail("a copy was made"))
+    report = _report(lattice, shared=True, options=Options())
+    assert report.findings == check_file(lattice, Options()).findings
+
+
 def test_a_time_limit_ends_both(lattice: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _in_parts(monkeypatch)
     report = _report(lattice, shared=True, options=Options(limits=replace(Limits(), seconds=0.0)))
