@@ -12,13 +12,16 @@ import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES, stl
 
 from unitcad import sharing
-from unitcad.check import Options, check_file, one_mesh
+from unitcad.check import Options, check_file
 from unitcad.check.findings import FileReport
 from unitcad.check.geometry import self_crossing, topology
+from unitcad.check.geometry.arranged import arranged
+from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.rules.f_limits import Limits
 from unitcad.geometry import boxes
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="copies are made on Linux")
+TWO_CUBES = np.concatenate([CUBE_FACES, CUBE_FACES + 8]).astype(np.int32)
 
 
 def _lattice() -> np.ndarray:
@@ -47,7 +50,7 @@ def lattice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def _in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (topology, one_mesh, self_crossing):
+    for module in (topology, self_crossing):
         monkeypatch.setattr(module, "MANY", 0)
 
 
@@ -64,6 +67,18 @@ def test_the_report_does_not_depend_on_who_does_what(lattice: Path, monkeypatch:
     counts = [[(item.code, item.count) for item in report.findings] for report in (whole, alone)]
     assert counts[0] == counts[1]
     assert whole.facts == alone.facts
+
+
+def test_the_most_pairs_kept_are_those_of_all_parts() -> None:
+    """A mesh that lies on itself everywhere takes no more memory and time in parts than whole."""
+    body = topology.topology_of(Mesh(np.concatenate([CUBE_CORNERS, CUBE_CORNERS + 0.5]), TWO_CUBES), lambda: None)
+    faces = self_crossing.crossings_of(body, arranged(body), lambda: None).faces
+    assert faces is not None
+    pair = np.array([0]), np.array([1])
+    for kept, looked_at in ((self_crossing._FEW // 24, 1), (self_crossing._FEW // 24 + 1, 0)):
+        part = self_crossing.Crossings(kept=kept, parts=24)
+        self_crossing._decide(faces, [pair], part)
+        assert part.looked_at == looked_at
 
 
 def test_a_small_mesh_is_checked_by_one_process(lattice: Path, monkeypatch: pytest.MonkeyPatch) -> None:

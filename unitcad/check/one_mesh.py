@@ -12,7 +12,7 @@ import numpy as np
 from unitcad.check.detail import detail
 from unitcad.check.findings import Facts, Finding, Location, ending, point
 from unitcad.check.geometry.arranged import Arranged, arranged
-from unitcad.check.geometry.topology import MANY, surface_of, topology_on
+from unitcad.check.geometry.topology import surface_of, topology_on
 from unitcad.check.geometry.triangle_mesh import Mesh, representable
 from unitcad.check.rules import registry
 from unitcad.check.rules.f_file import F001
@@ -66,11 +66,11 @@ def _inspected(mesh: Mesh, tick: Tick, *, cross: bool) -> Inspection:
     ready: list[Arranged] = []
 
     def arrange() -> None:
-        with suppress(MemoryError):  # which comes again where it is wanted
-            ready.append(arranged(surface))
+        if cross and len(surface.kept):
+            with suppress(MemoryError):  # which comes again where it is wanted
+                ready.append(arranged(surface))
 
-    large = cross and len(surface.kept) >= MANY
-    topology = topology_on(surface, tick, arrange) if large else topology_on(surface, tick)
+    topology = topology_on(surface, tick, arrange)
     return Inspection(mesh, topology, tick, cross, ready=ready[0] if ready else None)
 
 

@@ -31,9 +31,7 @@ _PAIRS = 1 << 15  # pairs looked at together: enough to outweigh the calls, few 
 _RARE = 16  # of so many faces less than one has such a corner: most pairs need no look for one in common
 _SPARSE = 4  # of so many faces less than one is in a pair: a sieve of those few is the cheaper one
 _OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothing but perhaps touching
-_FEW = (
-    4_000_000  # meeting pairs kept of a part; more is a mesh that lies on itself everywhere, which one is enough to say
-)
+_FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
 @dataclass(frozen=True)
@@ -204,7 +202,7 @@ def _share_safe(faces: Faces, i: Ints, j: Ints) -> Bools:
 
 def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings) -> None:
     """Decide pairs of faces that are near each other: boxes and planes first, then exact signs."""
-    if not waiting or crossings.kept > _FEW:
+    if not waiting or crossings.kept * crossings.parts > _FEW:
         return
     i = np.concatenate([pair[0] for pair in waiting])
     j = np.concatenate([pair[1] for pair in waiting])
