@@ -59,7 +59,7 @@ def _leave_interrupted() -> NoReturn:
     sys.exit(INTERRUPTED)
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Entry point of `unitcad`: run a command, turn every error into one line and an exit code."""
     as_json = "--json" in sys.argv
     speak_anywhere()
@@ -107,4 +107,3 @@ def program() -> NoReturn:
                 sys.stderr.flush()
                 os._exit(left.code)
         raise
-    raise AssertionError

@@ -72,7 +72,8 @@ def _along_means(columns: Floats, corners: Ints, areas: Floats, asked: Bools) ->
     blocks = [slice(start, start + _BLOCK) for start in range(0, len(some), _BLOCK)]
     share, angle, steep = np.empty(len(some)), np.empty((3, len(some))), np.empty((3, len(some)), bool)
     for block in blocks:
-        size = np.sqrt(_dot(*2 * ([part[block] for part in area],)))
+        here = [part[block] for part in area]
+        size = np.sqrt(_dot(here, here))
         sound = size > _SOUND * _longest(_sides(columns, [corner[block] for corner in ids]))
         share[block] = 1 / np.where(sound, size, np.inf)
     along = [np.add.reduce([np.bincount(corner, weight, n) for corner in ids]) for weight in (share * a for a in area)]
