@@ -78,12 +78,15 @@ def test_components_as_a_search_finds_them(n: int, scipy: bool, monkeypatch: pyt
     assert label.tolist() == [seen[node] for node in range(n)]
 
 
-def test_weld_joins_equal_corners_only() -> None:
+@pytest.mark.parametrize("collisions", [False, True])
+def test_weld_joins_equal_corners_only_in_their_order(collisions: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if collisions:
+        monkeypatch.setattr("unitcad.check.geometry.triangle_mesh._mix", lambda bits: bits[:, 0].astype(np.uint64) % 3)
     rng = np.random.default_rng(0)
     corners = rng.integers(-2, 3, (500, 3, 3)).astype(np.float32) * np.float32(0.1)
     corners[corners == 0] = -0.0
     vertices, faces = weld_exact(corners)
-    assert len(vertices) == len({tuple(row) for row in (corners.reshape(-1, 3) + 0.0).tolist()})
+    assert vertices.tolist() == list(map(list, dict.fromkeys(map(tuple, (corners.reshape(-1, 3) + 0.0).tolist()))))
     assert (vertices[faces] == corners).all()
 
 

@@ -59,7 +59,8 @@ def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
 def weld_points(points: Floats) -> tuple[Floats, Ints]:
     """Return distinct points as float64 (v, 3), and for each of the points (n, 3) which of them it is.
 
-    Points with the same three numbers are one; -0.0 is 0.0. Their order is that of a hash, the same on every run.
+    Points with the same three numbers are one; -0.0 is 0.0. They are in the order in which they first appear: those of
+    a face are mostly near each other then, which the processor's cache needs.
     """
     flat = np.ascontiguousarray(points if points.dtype == np.float32 else representable(points))
     bits = (flat + np.zeros(1, flat.dtype)).view(np.uint32 if flat.dtype == np.float32 else np.uint64)
@@ -71,13 +72,23 @@ def weld_points(points: Floats) -> tuple[Floats, Ints]:
     del key
     rank = np.cumsum(starts, dtype=np.int32)
     rank -= 1
+    places, number = _by_appearance(order[starts])
     index = np.empty(len(flat), np.int32)
-    index[order] = rank
-    vertices = flat[order[starts]]
+    index[order] = number.take(rank)
+    vertices = flat[places]
     if not _same_places(vertices, index, flat):  # two places with one hash
-        vertices, inverse = np.unique(flat + np.zeros(1, flat.dtype), axis=0, return_inverse=True)
-        index = inverse.reshape(-1).astype(np.int32)
+        _, first, rank = np.unique(flat + np.zeros(1, flat.dtype), axis=0, return_index=True, return_inverse=True)
+        places, number = _by_appearance(first)
+        vertices, index = flat[places], number.take(rank.reshape(-1))
     return vertices.astype(np.float64), index
+
+
+def _by_appearance(first: Ints) -> tuple[Ints, Ints]:
+    """Return the first places of points (v,) in their order, and where in it each stands."""
+    places, order = sorted_with_order(first.astype(np.uint64), int(first.max(initial=0)).bit_length())
+    number = np.empty(len(first), np.int32)
+    number[order] = np.arange(len(first), dtype=np.int32)
+    return places.astype(np.intp), number
 
 
 def same_place(points: Floats) -> Ints:
@@ -85,7 +96,7 @@ def same_place(points: Floats) -> Ints:
     distinct, index = weld_points(points)
     if len(distinct) == len(points):
         return np.arange(len(points), dtype=np.int32)
-    _, first = np.unique(index, return_index=True)
+    first = np.flatnonzero(np.diff(np.maximum.accumulate(index), prepend=np.int32(-1)))
     return first[index].astype(np.int32)
 
 
