@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 Floats = NDArray[Any]
 Ints = NDArray[Any]
 Bools = NDArray[Any]
+_BLOCK = 1 << 15  # numbers that stay in the processor's cache
 
 
 def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDArray[np.uint64], Ints]:
@@ -25,11 +26,18 @@ def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDAr
         order = np.argsort(key, kind="stable")
         return key[order], order.astype(np.int32)
     packed = key << np.uint64(room)
-    packed |= np.arange(len(key), dtype=np.uint64)
-    packed.sort()
-    order = (packed & np.uint64((1 << room) - 1)).astype(np.int32)
-    packed >>= np.uint64(room)
-    return packed, order
+    return packed, order_of_packed(packed, room)
+
+
+def order_of_packed(key: NDArray[np.uint64], room: int) -> Ints:
+    """Sort `key` in place and return the order that does it; its low `room` bits are free, and are gone afterwards."""
+    for start in range(0, len(key), _BLOCK):
+        key[start : start + _BLOCK] |= np.arange(start, min(start + _BLOCK, len(key)), dtype=np.uint64)
+    key.sort()
+    order = np.empty(len(key), np.int32)
+    np.bitwise_and(key, np.uint64((1 << room) - 1), out=order, casting="unsafe")
+    key >>= np.uint64(room)
+    return order
 
 
 def distinct(ordered: Ints) -> Bools:

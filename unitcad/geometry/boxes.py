@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache, reduce
 
 import numpy as np
 
@@ -74,20 +75,35 @@ def morton_order(steps: list[Ints], corner: Ints | None = None) -> Ints:
 
     With `corner`: of faces, by `corner[i]`, the first point of each.
     """
-    key = np.zeros(len(steps[0]), np.uint64)
-    for axis in range(3):
-        key |= _spread((steps[axis] >> np.uint16(16 - _BITS)).astype(np.uint64)) << np.uint64(axis)
-    return sorted_with_order(key if corner is None else key[corner], 3 * _BITS)[1]
+    if corner is None:
+        return _curve_order(len(steps[0]), lambda block: [step[block] for step in steps])
+    return _curve_order(len(corner), lambda block: [step.take(corner[block]) for step in steps])
 
 
 def box_order(boxes: Ints, frame: Frame) -> Ints:
     """Return the order of boxes by their middles, along a space-filling curve whose cells are near cubes."""
-    middle = [boxes[:, axis] // 2 + (np.uint16(65_535) - boxes[:, axis + 3]) // 2 for axis in range(3)]
-    return morton_order(frame.even(middle))
+
+    def middles(block: slice) -> list[Ints]:
+        some = boxes[block]
+        return frame.even([some[:, axis] // 2 + (np.uint16(65_535) - some[:, axis + 3]) // 2 for axis in range(3)])
+
+    return _curve_order(len(boxes), middles)
 
 
-def _spread(value: np.ndarray) -> np.ndarray:
-    """Return bits of `value` (up to 16) moved three apart."""
+def _curve_order(n: int, steps_of: Callable[[slice], list[Ints]]) -> Ints:
+    """Return the order of `n` places along a space-filling curve; `steps_of` gives the steps of a block of them."""
+    key, spread = np.zeros(n, np.uint64), _spread()
+    for start in range(0, n, _FACES):
+        block = slice(start, start + _FACES)
+        for axis, step in enumerate(steps_of(block)):
+            key[block] |= spread.take(step >> np.uint16(16 - _BITS)) << np.uint64(axis)
+    return sorted_with_order(key, 3 * _BITS)[1]
+
+
+@cache
+def _spread() -> np.ndarray:
+    """Return all numbers of `_BITS` bits with their bits moved three apart."""
+    value = np.arange(1 << _BITS, dtype=np.uint64)
     for shift, mask in ((16, 0xFF0000FF), (8, 0x0F00F00F00F), (4, 0xC30C30C30C3), (2, 0x249249249249)):
         value = (value | (value << np.uint64(shift))) & np.uint64(mask)
     return value
@@ -96,13 +112,13 @@ def _spread(value: np.ndarray) -> np.ndarray:
 def boxes_of(steps: list[Ints], *corners: Ints) -> Ints:
     """Return boxes (m, 6) round the points of each row of corners: low corner, 65,535 less high corner."""
     boxes = np.empty((len(corners[0]), 6), np.uint16)
-    for axis in range(3):
-        low = high = steps[axis][corners[0]]
-        for corner in corners[1:]:
-            column = steps[axis][corner]
-            low, high = np.minimum(low, column), np.maximum(high, column)
-        boxes[:, axis] = low
-        np.subtract(np.uint16(65_535), high, out=boxes[:, axis + 3])
+    for start in range(0, len(boxes), _FACES):
+        block = slice(start, start + _FACES)
+        places = [corner[block].astype(np.intp) for corner in corners]
+        for axis, step in enumerate(steps):
+            at = [step.take(place) for place in places]
+            boxes[block, axis] = reduce(np.minimum, at)
+            np.subtract(np.uint16(65_535), reduce(np.maximum, at), out=boxes[block, axis + 3])
     return boxes
 
 

@@ -42,7 +42,7 @@ def arranged(surface: Surface) -> Arranged:
     steps = frame.steps(vertices)
     boxes = boxes_of(steps, *faces.T)
     order = box_order(boxes, frame)
-    normal = np.stack([areas[:, axis].take(order) for axis in range(3)])
+    normal = np.ascontiguousarray(areas.take(order, axis=0).T)
     solid = (normal != 0).any(axis=0)
     if not solid.all():
         order, normal = order[solid], normal.compress(solid, axis=1)  # keeps each axis in one piece

@@ -49,8 +49,9 @@ def ranked_boxes(ranks: list[Ints], ids: Ints) -> RankedBoxes:
     highs[:, 3], lows[:, 3] = 0xFFFF, 0  # never touch along the axis that is not there
     for start in range(0, ids.shape[1], _FACES):
         block = slice(start, start + _FACES)
+        places = [corner[block].astype(np.intp) for corner in ids]
         for axis, rank in enumerate(ranks):
-            one, two, three = (rank.take(corner[block], mode="clip") for corner in ids)
+            one, two, three = (rank.take(place, mode="clip") for place in places)
             least, most = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
             on_low, on_high = np.zeros((2, len(one)), np.uint16)
             for corner in (one, two, three):
@@ -99,8 +100,9 @@ def face_boxes(columns: Floats, ids: Ints) -> FaceBoxes:
     on_low, on_high = np.zeros(ids.shape[1], np.uint16), np.zeros(ids.shape[1], np.uint16)
     for start in range(0, ids.shape[1], _FACES):
         block = slice(start, start + _FACES)
+        places = [corner[block].astype(np.intp) for corner in ids]
         for axis, column in enumerate(columns):
-            at = [column.take(corner[block], mode="clip") for corner in ids]
+            at = [column.take(place, mode="clip") for place in places]
             for find, side, on in ((np.minimum, low, on_low), (np.maximum, high, on_high)):
                 find(find(at[0], at[1]), at[2], out=side[axis, block])
                 for corner in at:

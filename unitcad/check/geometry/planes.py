@@ -102,8 +102,9 @@ def planes_of(columns: Floats, ids: Ints, normal: Floats) -> Planes:
     offset, longest = np.zeros((2, ids.shape[1]))
     for start in range(0, ids.shape[1], _FACES):
         block = slice(start, start + _FACES)
+        places = [corner[block].astype(np.intp) for corner in ids]
         for axis, column in enumerate(columns):
-            at = [column.take(corner[block], mode="clip") for corner in ids]
+            at = [column.take(place, mode="clip") for place in places]
             offset[block] += normal[axis, block] * at[0]
             for k in range(3):
                 side = at[k] - at[k - 1]

@@ -35,7 +35,7 @@ def _along_axes(columns: Floats, corners: Ints, areas: Floats) -> Bools:
     rises, falls = np.zeros((2, 3, m), np.uint8)  # a bit an axis, for each side
     for start in range(0, m, _BLOCK):
         block = slice(start, start + _BLOCK)
-        sides = _sides(columns, [corner[block] for corner in corners])
+        sides = _sides(columns, [corner[block].astype(np.intp) for corner in corners])
         least = _ROUNDING * _longest(sides)
         for axis in range(3):
             up = areas[axis, block]
@@ -74,13 +74,13 @@ def _along_means(columns: Floats, corners: Ints, areas: Floats, asked: Bools) ->
     for block in blocks:
         here = [part[block] for part in area]
         size = np.sqrt(_dot(here, here))
-        sound = size > _SOUND * _longest(_sides(columns, [corner[block] for corner in ids]))
+        sound = size > _SOUND * _longest(_sides(columns, [corner[block].astype(np.intp) for corner in ids]))
         share[block] = 1 / np.where(sound, size, np.inf)
     along = [np.add.reduce([np.bincount(corner, weight, n) for corner in ids]) for weight in (share * a for a in area)]
     length = np.maximum(np.sqrt(_dot(along, along)), 1e-300)
     along = [part / length for part in along]
     for block in blocks:
-        near, here = [corner[block] for corner in ids], [part[block] for part in area]
+        near, here = [corner[block].astype(np.intp) for corner in ids], [part[block] for part in area]
         sides = _sides(columns, near)
         for k, corner in enumerate(near):
             up = [part.take(corner) for part in along]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unitcad.check.geometry.source import Source
-from unitcad.geometry.arrays import Floats, Ints, sorted_with_order
+from unitcad.geometry.arrays import Floats, Ints, distinct, order_of_packed
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -51,44 +51,61 @@ def representable(points: Floats) -> Floats:
 
 
 def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
-    """Return vertices and faces of a triangle soup (m, 3, 3), welded by `weld_points`."""
-    vertices, index = weld_points(corners.reshape(-1, 3))
-    return vertices, index.reshape(-1, 3)
-
-
-def weld_points(points: Floats) -> tuple[Floats, Ints]:
-    """Return distinct points as float64 (v, 3), and for each of the points (n, 3) which of them it is.
+    """Return distinct points as float64 (v, 3), and for each of the corners (m, k, 3) which of them it is, (m, k).
 
     Points with the same three numbers are one; -0.0 is 0.0. They are in the order in which they first appear: those of
-    a face are mostly near each other then, which the processor's cache needs.
+    a face are mostly near each other then, which the processor's cache needs. By blocks, since memory that is used for
+    the first time takes longer than what is done with it.
     """
-    flat = np.ascontiguousarray(points if points.dtype == np.float32 else representable(points))
-    bits = (flat + np.zeros(1, flat.dtype)).view(np.uint32 if flat.dtype == np.float32 else np.uint64)
-    kept = 64 - max(len(flat) - 1, 1).bit_length()
-    key, order = sorted_with_order(_mix(bits) >> np.uint64(64 - kept), kept)
-    starts = np.empty(len(key), bool)
-    starts[:1] = True
-    np.not_equal(key[1:], key[:-1], out=starts[1:])
-    del key
-    rank = np.cumsum(starts, dtype=np.int32)
-    rank -= 1
-    places, number = _by_appearance(order[starts])
-    index = np.empty(len(flat), np.int32)
-    index[order] = number.take(rank)
-    vertices = flat[places]
-    if not _same_places(vertices, index, flat):  # two places with one hash
-        _, first, rank = np.unique(flat + np.zeros(1, flat.dtype), axis=0, return_index=True, return_inverse=True)
-        places, number = _by_appearance(first)
-        vertices, index = flat[places], number.take(rank.reshape(-1))
+    if corners.dtype != np.float32:
+        corners = representable(corners)
+    sides, n = corners.shape[1], corners.shape[0] * corners.shape[1]
+    rows = max(_BLOCK // sides, 1)
+    blocks = [slice(start, start + rows) for start in range(0, len(corners), rows)]
+    room = max(n - 1, 1).bit_length()
+    key, at = np.empty(n, np.uint64), 0
+    for block in blocks:
+        mixed = _mix(_bits(corners[block]))
+        np.bitwise_and(mixed, ~np.uint64((1 << room) - 1), out=key[at : at + len(mixed)])
+        at += len(mixed)
+    order = order_of_packed(key, room)
+    fresh = distinct(key)
+    places, number = _by_appearance(order[fresh], n)
+    index, before = np.empty(n, np.int32), -1
+    for start in range(0, n, _BLOCK):
+        rank = np.cumsum(fresh[start : start + _BLOCK], dtype=np.int32)
+        rank += before
+        index[order[start : start + _BLOCK]] = number.take(rank)
+        before = rank[-1]
+    index = index.reshape(-1, sides)
+    vertices = corners[places // sides, places % sides]
+    if not all(np.array_equal(vertices.take(index[block], axis=0), np.ascontiguousarray(corners[block])) for block in blocks):
+        # Two places have one hash.
+        values = _bits(corners).view(corners.dtype)
+        _, first, rank = np.unique(values, axis=0, return_index=True, return_inverse=True)
+        places, number = _by_appearance(first, n)
+        vertices, index = values[places], number.take(rank.reshape(-1, sides))
     return vertices.astype(np.float64), index
 
 
-def _by_appearance(first: Ints) -> tuple[Ints, Ints]:
-    """Return the first places of points (v,) in their order, and where in it each stands."""
-    places, order = sorted_with_order(first.astype(np.uint64), int(first.max(initial=0)).bit_length())
-    number = np.empty(len(first), np.int32)
-    number[order] = np.arange(len(first), dtype=np.int32)
-    return places.astype(np.intp), number
+def weld_points(points: Floats) -> tuple[Floats, Ints]:
+    """Return what `weld_exact` does of points (n, 3): distinct ones, and for each which of them it is, (n,)."""
+    vertices, index = weld_exact(points[:, None])
+    return vertices, index.reshape(-1)
+
+
+def _bits(corners: Floats) -> NDArray[np.unsignedinteger]:
+    """Return the numbers of corners (m, k, 3) as integers, (m k, 3); -0.0 as 0.0."""
+    # A record of a file is copied first: sums of a few numbers each, apart in memory, take three times as long.
+    values = (np.ascontiguousarray(corners) + np.zeros(1, corners.dtype)).reshape(-1, 3)
+    return values.view(np.uint32 if corners.dtype == np.float32 else np.uint64)
+
+
+def _by_appearance(first: Ints, n: int) -> tuple[Ints, Ints]:
+    """Return the first places of points, of `n`, in their order, and where in it each stands."""
+    appears = np.zeros(n, bool)
+    appears[first] = True
+    return np.flatnonzero(appears), np.cumsum(appears, dtype=np.int32).take(first) - np.int32(1)
 
 
 def same_place(points: Floats) -> Ints:
@@ -100,23 +117,16 @@ def same_place(points: Floats) -> Ints:
     return first[index].astype(np.int32)
 
 
-def _same_places(vertices: Floats, index: Ints, flat: Floats) -> bool:
-    blocks = (slice(start, start + _BLOCK) for start in range(0, len(flat), _BLOCK))
-    return all(np.array_equal(vertices.take(index[block], axis=0), flat[block]) for block in blocks)
-
-
 def _mix(bits: NDArray[np.unsignedinteger]) -> NDArray[np.uint64]:
     """Return a 64-bit hash of each row of three integers (multiply and xor-shift, as in splitmix64)."""
-    keys = np.zeros(len(bits), np.uint64)
-    for start in range(0, len(bits), _BLOCK):
-        key = keys[start : start + _BLOCK]
-        for column in range(3):
-            key += bits[start : start + _BLOCK, column]
-            key *= np.uint64(0x9E3779B97F4A7C15)
-            key ^= key >> np.uint64(29)
-            key *= np.uint64(0xBF58476D1CE4E5B9)
-            key ^= key >> np.uint64(32)
-    return keys
+    key = np.zeros(len(bits), np.uint64)
+    for column in bits.T:
+        key += column
+        key *= np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(29)
+        key *= np.uint64(0xBF58476D1CE4E5B9)
+        key ^= key >> np.uint64(32)
+    return key
 
 
 def float32_step(vertices: Floats) -> float:
@@ -142,15 +152,16 @@ def solid_of(vertices: Floats, faces: Ints) -> Manifold:
 
 def area_vectors(vertices: Floats, faces: Ints) -> Floats:
     """Return twice the area of each face along its normal (right-hand rule), (m, 3) mm2."""
-    corners = [np.ascontiguousarray(faces[:, k]) for k in range(3)]
-    first, second = [], []
-    for axis in range(3):
-        column = np.ascontiguousarray(vertices[:, axis])
-        origin = column.take(corners[0])
-        first.append(column.take(corners[1]) - origin)
-        second.append(column.take(corners[2]) - origin)
-    areas = np.empty((len(faces), 3))
-    for axis in range(3):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        np.subtract(first[i] * second[j], first[j] * second[i], out=areas[:, axis])
+    columns, areas = np.ascontiguousarray(vertices.T), np.empty((len(faces), 3))
+    for start in range(0, len(faces), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        one, two, three = (corner.astype(np.intp) for corner in faces[block].T)
+        first, second = [], []
+        for column in columns:
+            origin = column.take(one)
+            first.append(column.take(two) - origin)
+            second.append(column.take(three) - origin)
+        for axis in range(3):
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            np.subtract(first[i] * second[j], first[j] * second[i], out=areas[block, axis])
     return areas

@@ -21,7 +21,7 @@ from unitcad.check.rules.f_file import F001, F002, F003, F005, F006, F007, F008,
 from unitcad.check.rules.f_limits import F011, Deadline, Limits, Unreadable
 from unitcad.check.rules.rule import Rule
 from unitcad.check.rules.v_values import faces_not_finite
-from unitcad.geometry.arrays import Floats
+from unitcad.geometry.arrays import Floats, Ints
 
 RECORD = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _TOKENS = 21  # facet normal x y z outer loop (vertex x y z) x 3 endloop endfacet
@@ -31,6 +31,7 @@ _NUMBERS = [i for i in range(_TOKENS) if i not in _WORDS]
 _NAN_SPELLINGS = re.compile(rb"^[+-]?(nan(\(\w*\))?|inf(inity)?|1\.#(ind|inf|qnan|snan)\w*)$", re.IGNORECASE)
 _PRINTABLE = bytes(b for b in range(256) if b in b"\t\n\v\f\r" or (b >= 32 and b != 127))
 _BLOCK = 8_000_000
+_FACES = 1 << 14  # faces whose corners stay in the processor's cache
 
 
 def read_stl(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
@@ -63,7 +64,7 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline, findings: lis
         raise F001.unreadable("the file has no facet")
     records = np.frombuffer(data, RECORD, facets, 84)
     deadline.tick()
-    return _mesh(records["corners"], np.ascontiguousarray(records["normal"]), findings)
+    return _mesh(records["corners"], records["normal"], findings)
 
 
 def _binary_size(data: memoryview) -> int:
@@ -73,15 +74,24 @@ def _binary_size(data: memoryview) -> int:
 
 def _mesh(corners: Floats, normals: Floats, findings: list[Finding]) -> Mesh | None:
     """Return the mesh of corners (m, 3, 3); none where one is no float32 number (V001)."""
-    corners = np.ascontiguousarray(corners)
-    with np.errstate(over="ignore"):
-        finite = np.isfinite(corners.astype(np.float32, copy=False))
-    if not finite.all():
-        bad = np.flatnonzero(~finite.all(axis=(1, 2)))
+    bad = _not_single(corners)
+    if len(bad):
         findings.append(faces_not_finite(len(bad), (Location(face=int(i)) for i in bad)))
         return None
     vertices, faces = weld_exact(corners)
-    return Mesh(vertices, faces, normals, indexed=False)
+    # Zeros are no normals (T013), and most programs write none.
+    return Mesh(vertices, faces, np.ascontiguousarray(normals) if normals.any() else None, indexed=False)
+
+
+def _not_single(corners: Floats) -> Ints:
+    """Return the faces of corners (m, 3, 3) of which one is no float32 number."""
+    found = [np.empty(0, np.intp)]
+    with np.errstate(over="ignore"):
+        for start in range(0, len(corners), _FACES):
+            finite = np.isfinite(corners[start : start + _FACES].astype(np.float32))
+            if not finite.all():
+                found.append(start + np.flatnonzero(~finite.all(axis=(1, 2))))
+    return np.concatenate(found)
 
 
 def _is_text(head: bytes, data: memoryview) -> bool:
