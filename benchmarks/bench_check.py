@@ -87,6 +87,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
 
     from unitcad.check.geometry import self_crossing
     from unitcad.check.geometry.arranged import arranged
+    from unitcad.check.geometry.stars import stars_of
     from unitcad.check.geometry.topology import topology_of
     from unitcad.check.geometry.triangle_mesh import Mesh
     from unitcad.check.rules.f_limits import Deadline
@@ -100,7 +101,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     times: dict[str, list[float]] = {"ours": [], "pymeshlab": [], "meshlib": []}
     for _ in range(rounds):
         start = time.process_time()
-        self_crossing.crossings_of(found, arranged(found), Deadline(600).tick)
+        self_crossing.crossings_of(found, arranged(found), stars_of(found), Deadline(600).tick)
         times["ours"].append(time.process_time() - start)
         for name in ("pymeshlab", "meshlib"):
             other.stdin.write(f"{name}\n")

@@ -9,6 +9,7 @@ from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.check.geometry import self_crossing
 from unitcad.check.geometry.arranged import arranged
+from unitcad.check.geometry.stars import stars_of
 from unitcad.check.geometry.topology import topology_of
 from unitcad.check.geometry.triangle_mesh import Mesh, weld_exact
 from unitcad.check.rules.f_limits import Deadline
@@ -61,7 +62,7 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
     faces, labels = top.stored[solid], top.shells[solid]
     if len(faces) < 2:
         return 0, 0, 0
-    found = self_crossing.crossings_of(top, arranged(top), Deadline(60).tick)
+    found = self_crossing.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick)
     crossings, overlaps, touching = counts(vertices, faces)
     assert len(self_crossing.joined(found.crossing)) == crossings
     # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.

@@ -9,6 +9,7 @@ from unitcad.check.geometry import self_crossing
 from unitcad.check.geometry.arranged import arranged
 from unitcad.check.geometry.contact import MOST_RANK, Contacts, face_boxes, ranked_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
+from unitcad.check.geometry.stars import stars_of
 from unitcad.check.geometry.topology import topology_of
 from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
 from unitcad.check.geometry.triangles import meet
@@ -180,7 +181,7 @@ def test_few_pairs_and_many_are_sieved_alike(monkeypatch: pytest.MonkeyPatch) ->
     for sparse in (0, 10**9):
         monkeypatch.setattr(self_crossing, "_SPARSE", sparse)
         top = topology_of(Mesh(points, faces), Deadline(60).tick)
-        crossings = self_crossing.crossings_of(top, arranged(top), Deadline(60).tick, every=True)
+        crossings = self_crossing.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick, every=True)
         assert crossings.faces is not None
         assert ("sieve" in vars(crossings.faces)) == (sparse > 0)
         found.append(

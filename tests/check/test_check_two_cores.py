@@ -12,10 +12,11 @@ import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES, stl
 
 from unitcad import sharing
-from unitcad.check import Options, check_file
+from unitcad.check import Options, check_file, one_mesh
 from unitcad.check.findings import FileReport
 from unitcad.check.geometry import self_crossing, topology
 from unitcad.check.geometry.arranged import arranged
+from unitcad.check.geometry.stars import stars_of
 from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.rules.f_limits import Limits
 from unitcad.geometry import boxes
@@ -50,7 +51,7 @@ def lattice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def _in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (topology, self_crossing):
+    for module in (one_mesh, self_crossing):
         monkeypatch.setattr(module, "MANY", 0)
 
 
@@ -72,7 +73,7 @@ def test_the_report_does_not_depend_on_who_does_what(lattice: Path, monkeypatch:
 def test_the_most_pairs_kept_are_those_of_all_parts() -> None:
     """A mesh that lies on itself everywhere takes no more memory and time in parts than whole."""
     body = topology.topology_of(Mesh(np.concatenate([CUBE_CORNERS, CUBE_CORNERS + 0.5]), TWO_CUBES), lambda: None)
-    faces = self_crossing.crossings_of(body, arranged(body), lambda: None).faces
+    faces = self_crossing.crossings_of(body, arranged(body), stars_of(body), lambda: None).faces
     assert faces is not None
     pair = np.array([0]), np.array([1])
     for kept, looked_at in ((self_crossing._FEW // 24, 1), (self_crossing._FEW // 24 + 1, 0)):

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.geometry.contact import MOST_RANK, RankedBoxes, ranked_boxes
-from unitcad.check.geometry.edges import Edges, edges_of
-from unitcad.check.geometry.stars import height_fields
 from unitcad.check.geometry.topology import Surface
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.boxes import Slabs, box_order, boxes_of, frame_of, ranks_of, slabs_of
 
 
@@ -19,8 +17,7 @@ class Arranged:
     """Faces that have an area, in the order `order`: `columns` (3, n) of their vertices, `corners` (3, m) into them.
 
     `normal` (3, m) is twice their area vectors, `steps` (m, 6) their boxes in the tree's steps; `ranked` are these
-    boxes where vertices have few coordinates. `smooth` are the vertices (n,) whose stars are height fields; `closed`:
-    every edge has two faces, wound alike.
+    boxes where vertices have few coordinates.
     """
 
     order: Ints
@@ -30,14 +27,11 @@ class Arranged:
     steps: Ints
     slabs: Slabs
     ranked: RankedBoxes | None
-    smooth: Bools
-    closed: bool
 
 
 def arranged(surface: Surface) -> Arranged:
     """Arrange the faces of a surface, each where the file has it."""
     vertices, faces, areas = surface.mesh.vertices, surface.stored, surface.stored_areas
-    edges = surface.edges if faces is surface.mesh.faces else edges_of(faces, len(vertices))
     frame = frame_of(vertices)
     steps = frame.steps(vertices)
     boxes = boxes_of(steps, *faces.T)
@@ -56,16 +50,4 @@ def arranged(surface: Surface) -> Arranged:
         boxes.take(order, axis=0),
         slabs_of(steps, *corners),
         None if ranks is None else ranked_boxes(ranks, corners),
-        height_fields(columns, corners, normal, _surrounded(edges, len(vertices))),
-        edges.closed,
     )
-
-
-def _surrounded(edges: Edges, n: int) -> Bools:
-    """Return which of `n` vertices have two faces, wound alike, at all their edges."""
-    whole = np.ones(n, bool)
-    if not edges.closed:
-        wrong = (edges.size != 2) | ~edges.balanced
-        whole[edges.low[wrong]] = False
-        whole[edges.high[wrong]] = False
-    return whole

@@ -165,6 +165,19 @@ def shells_of(faces: Ints, edges: Edges, turns: Turns | None) -> Ints:
     return components(len(faces), left // 3, right // 3)
 
 
+def shells_by_vertex(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
+    """Return the same where no vertex has faces of two shells."""
+    shells = components(n_vertices, edges.low, edges.high).take(faces[:, 0])
+    n = int(shells.max(initial=0)) + 1
+    if n == 1:
+        return shells
+    first = np.full(n, len(shells))
+    first[shells[::-1]] = np.arange(len(shells))[::-1]
+    number = np.empty(n, shells.dtype)
+    number[np.argsort(first, kind="stable")] = np.arange(n)
+    return number.take(shells)
+
+
 def turns_of(vertices: Floats, faces: Ints, edges: Edges) -> Turns | None:
     """Return the turns at the edges of four, six and so on faces that are balanced; None where there are none."""
     if edges.closed:

@@ -18,8 +18,9 @@ from unitcad.check.geometry import coverings, triangles
 from unitcad.check.geometry.arranged import Arranged
 from unitcad.check.geometry.contact import Contacts, FaceBoxes, RankedBoxes, face_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
-from unitcad.check.geometry.topology import MANY, Topology
-from unitcad.check.geometry.triangle_mesh import same_place
+from unitcad.check.geometry.stars import Stars
+from unitcad.check.geometry.topology import Topology
+from unitcad.check.geometry.triangle_mesh import MANY, same_place
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct
 from unitcad.geometry.boxes import Slabs, meeting_parts
 from unitcad.geometry.ticks import Interrupted, Tick
@@ -108,7 +109,7 @@ class Crossings:
         return self.contact.shells_of(keys[distinct(keys)])
 
 
-def crossings_of(topology: Topology, ready: Arranged, tick: Tick, *, every: bool = False) -> Crossings:
+def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, *, every: bool = False) -> Crossings:
     """Find the pairs of faces that meet, each where the file has it; `ready`: the surface's faces `arranged`.
 
     `every`: all pairs of those that touch, else one for each pair of shells.
@@ -116,7 +117,7 @@ def crossings_of(topology: Topology, ready: Arranged, tick: Tick, *, every: bool
     if len(ready.order) < 2:
         return Crossings()
     tick()
-    faces, slabs = _prepared(topology, ready), ready.slabs
+    faces, slabs = _prepared(topology, ready, stars), ready.slabs
     crossings = Crossings(faces, Contacts(topology.n_shells, every=every))
     walks = meeting_parts(ready.steps, _PARTS if len(ready.order) >= MANY else 1, tick)
 
@@ -156,10 +157,10 @@ def _met(faces: Faces, slabs: Slabs, walk: Iterator[tuple[Ints, Ints]], crossing
     return crossings
 
 
-def _prepared(topology: Topology, ready: Arranged) -> Faces:
+def _prepared(topology: Topology, ready: Arranged, stars: Stars) -> Faces:
     vertices, several = topology.mesh.vertices, topology.n_shells > 1
     order, columns, corners, normal = ready.order, ready.columns, ready.corners, ready.normal
-    safe = ready.smooth.take(corners)
+    safe = stars.smooth.take(corners)
     has_safe = np.asarray(safe.any(axis=0))
     places = same_place(vertices).take(corners) if several else corners
     return Faces(
@@ -174,7 +175,7 @@ def _prepared(topology: Topology, ready: Arranged) -> Faces:
         topology.shells[order],
         topology.kept[order],
         several,
-        several or not ready.closed,
+        several or not stars.closed,
     )
 
 

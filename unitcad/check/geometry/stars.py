@@ -5,14 +5,51 @@ Most pairs of faces whose boxes meet are neighbours round such a vertex, and nee
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from unitcad.check.geometry.edges import Edges, edges_of
+from unitcad.check.geometry.topology import Surface
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _BLOCK = 1 << 14  # faces whose coordinates stay in the processor's cache
 _ROUNDING = 1e-15  # of the squared longest side: more than rounding takes from twice an area
 _SOUND = 1e-9  # of the squared longest side: faces with less area have no direction worth adding to a mean
 _FACING = 0.01  # cosine to the mean direction
+
+
+@dataclass(frozen=True)
+class Stars:
+    """Vertices of a surface, `smooth` (n,) where their stars are height fields.
+
+    `closed`: whether every edge has two faces, wound alike.
+    """
+
+    smooth: Bools
+    closed: bool
+
+
+def stars_of(surface: Surface) -> Stars:
+    """Return the stars of a surface's vertices, each face where the file has it."""
+    vertices, faces, areas = surface.mesh.vertices, surface.stored, surface.stored_areas
+    edges = surface.edges if faces is surface.mesh.faces else edges_of(faces, len(vertices))
+    normal, corners = np.ascontiguousarray(areas.T), np.ascontiguousarray(faces.T)
+    solid = (normal != 0).any(axis=0)
+    if not solid.all():
+        normal, corners = normal.compress(solid, axis=1), corners.compress(solid, axis=1)
+    surrounded = _surrounded(edges, len(vertices))
+    return Stars(height_fields(np.ascontiguousarray(vertices.T), corners, normal, surrounded), edges.closed)
+
+
+def _surrounded(edges: Edges, n: int) -> Bools:
+    """Return which of `n` vertices have two faces, wound alike, at all their edges."""
+    whole = np.ones(n, bool)
+    if not edges.closed:
+        wrong = (edges.size != 2) | ~edges.balanced
+        whole[edges.low[wrong]] = False
+        whole[edges.high[wrong]] = False
+    return whole
 
 
 def height_fields(columns: Floats, corners: Ints, areas: Floats, surrounded: Bools) -> Bools:

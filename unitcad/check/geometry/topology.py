@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -15,10 +15,9 @@ from unitcad.check.geometry.edges import Edges, Turns
 from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, extent, sorted_with_order
 from unitcad.geometry.ticks import Tick
-from unitcad.sharing import shared
 
-MANY = 50_000
-"""Faces from which a second core is worth its while."""
+Found = tuple[Any, ...]
+"""Some of what a `Topology` has beside its surface."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,8 @@ class Topology(Surface):
 
 def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     """Work out the topology of a mesh with finite vertices."""
-    return topology_on(surface_of(mesh, tick), tick)
+    surface = surface_of(mesh, tick)
+    return topology_on(surface, [work(surface, tick) for work in works_on(surface)])
 
 
 def surface_of(mesh: Mesh, tick: Tick) -> Surface:
@@ -119,18 +119,17 @@ def surface_of(mesh: Mesh, tick: Tick) -> Surface:
     return Surface(mesh, kept, edges, areas, stored, np.flatnonzero(repeated), unused, opened)
 
 
-def topology_on(surface: Surface, tick: Tick, first: Callable[[], object] = lambda: None) -> Topology:
-    """Work out what follows from the edges of a surface, after `first` or, where two cores share it, beside that."""
-    edges = surface.edges
-    parts = (_by_shell, _pinched_and_twice)
-    results: list[Any] = shared(
-        lambda k: parts[k](surface, tick), len(parts), large=len(surface.kept) >= MANY, first=first
-    )
-    turns, shells, low, high, volume, closed = results[0]
-    pinched, twice, same = results[1]
+def works_on(surface: Surface) -> list[Callable[[Surface, Tick], Found]]:
+    """Return what is to be worked out for `topology_on`, each alone."""
+    return [_of_closed] if surface.edges.closed else [_by_shell, _pinched_and_twice]
+
+
+def topology_on(surface: Surface, found: Sequence[Found]) -> Topology:
+    """Return the topology of a surface from the results of `works_on`."""
+    turns, shells, low, high, volume, closed, pinched, twice, same = (one for part in found for one in part)
     if same is not None and len(twice):
         twice = np.setdiff1d(twice, _facing(same[0], same[1], surface.areas, shells, volume * closed))
-    unbalanced = np.empty(0, int)
+    edges, unbalanced = surface.edges, np.empty(0, int)
     if not edges.closed:
         unbalanced = np.flatnonzero((edges.size % 2 == 0) & ~edges.balanced)
     return Topology(
@@ -148,28 +147,43 @@ def topology_on(surface: Surface, tick: Tick, first: Callable[[], object] = lamb
     )
 
 
-def _by_shell(surface: Surface, tick: Tick) -> tuple[Turns | None, Ints, Floats, Floats, Floats, Bools]:
+def _of_closed(surface: Surface, tick: Tick) -> Found:
+    """Return all of a surface whose edges have two faces each, wound alike.
+
+    Where no vertex is pinched, faces with a common vertex are of one shell, and there are half as many vertices.
+    """
+    faces, edges, n = surface.mesh.faces, surface.edges, len(surface.mesh.vertices)
+    across = mesh_edges.opposite(edges, 3 * len(faces))
+    pinched = mesh_edges.pinched_closed(faces, across, n)
+    tick()
+    twice = np.flatnonzero(across[0::3] // 3 == across[1::3] // 3)
+    shells = mesh_edges.shells_of(faces, edges, None) if len(pinched) else mesh_edges.shells_by_vertex(faces, edges, n)
+    return None, *_of_shells(surface, shells, tick), pinched, twice, None
+
+
+def _by_shell(surface: Surface, tick: Tick) -> Found:
     """Return `turns`, `shells`, `low`, `high`, `volumes` and `closed` of a `Topology`."""
     vertices, faces, edges = surface.mesh.vertices, surface.mesh.faces, surface.edges
     turns = mesh_edges.turns_of(vertices, faces, edges)
-    shells = mesh_edges.shells_of(faces, edges, turns)
+    return turns, *_of_shells(surface, mesh_edges.shells_of(faces, edges, turns), tick)
+
+
+def _of_shells(surface: Surface, shells: Ints, tick: Tick) -> tuple[Ints, Floats, Floats, Floats, Bools]:
+    """Return `shells`, `low`, `high`, `volumes` and `closed` of a `Topology`."""
+    vertices, faces = surface.mesh.vertices, surface.mesh.faces
     tick()
     low, high = _boxes(vertices, faces, shells)
     volume = volumes.signed(vertices, faces, surface.areas, shells, len(low))
-    return turns, shells, low, high, volume, volumes.closed(edges, shells, len(low))
+    return shells, low, high, volume, volumes.closed(surface.edges, shells, len(low))
 
 
-def _pinched_and_twice(surface: Surface, tick: Tick) -> tuple[Ints, Ints, tuple[Ints, Bools] | None]:
-    """Return the vertices of several fans, the faces with the vertices of others, and `_same_vertices` if it was used.
+def _pinched_and_twice(surface: Surface, tick: Tick) -> Found:
+    """Return the vertices of several fans, the faces with the vertices of others, and `_same_vertices`.
 
     Shells that touch in a face are among the faces still.
     """
-    faces, edges, n = surface.mesh.faces, surface.edges, len(surface.mesh.vertices)
-    if edges.closed:
-        across = mesh_edges.opposite(edges, 3 * len(faces))
-        pinched = mesh_edges.pinched_closed(faces, across, n)
-        return pinched, np.flatnonzero(across[0::3] // 3 == across[1::3] // 3), None
-    pinched = mesh_edges.pinched_open(faces, edges, n)
+    faces = surface.mesh.faces
+    pinched = mesh_edges.pinched_open(faces, surface.edges, len(surface.mesh.vertices))
     tick()
     same = _same_vertices(faces)
     return pinched, np.sort(same[0][same[1]]), same

@@ -23,6 +23,9 @@ LARGEST = float(np.finfo(np.float32).max)
 SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
 """Coordinates below this are 0 as float32, and are taken for it: even doubles do not hold their products."""
 
+MANY = 50_000
+"""Faces from which a second core is worth its while."""
+
 _BLOCK = 1 << 15  # points that stay in the processor's cache
 
 
@@ -79,7 +82,9 @@ def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
         before = rank[-1]
     index = index.reshape(-1, sides)
     vertices = corners[places // sides, places % sides]
-    if not all(np.array_equal(vertices.take(index[block], axis=0), np.ascontiguousarray(corners[block])) for block in blocks):
+    if not all(
+        np.array_equal(vertices.take(index[block], axis=0), np.ascontiguousarray(corners[block])) for block in blocks
+    ):
         # Two places have one hash.
         values = _bits(corners).view(corners.dtype)
         _, first, rank = np.unique(values, axis=0, return_index=True, return_inverse=True)

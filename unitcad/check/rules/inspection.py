@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from unitcad.check.detail import detail
 from unitcad.check.geometry.arranged import Arranged, arranged
 from unitcad.check.geometry.self_crossing import Crossings, crossings_of
+from unitcad.check.geometry.stars import Stars, stars_of
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.geometry.ticks import Tick
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 class Inspection:
     """A mesh with finite vertices, as the file has it, with its topology.
 
-    `tick` is called now and then by what takes long; `cross`: whether faces are compared with each other; `ready`: the
-    faces arranged for that, where they are already.
+    `tick` is called now and then by what takes long; `cross`: whether faces are compared with each other; `ready`: what
+    that needs, where it is known already.
     """
 
     mesh: Mesh
@@ -31,7 +32,7 @@ class Inspection:
     tick: Tick
     cross: bool = True
     printer: Printer | None = None
-    ready: Arranged | None = None
+    ready: tuple[Arranged, Stars] | None = None
 
     @property
     def solid(self) -> bool:
@@ -44,7 +45,8 @@ class Inspection:
         if not self.cross or not len(self.topology.kept):
             return Crossings()
         every = detail().meshes is not None
-        return crossings_of(self.topology, self.ready or arranged(self.topology), self.tick, every=every)
+        ready, stars = self.ready or (arranged(self.topology), stars_of(self.topology))
+        return crossings_of(self.topology, ready, stars, self.tick, every=every)
 
     @cached_property
     def material(self) -> Rays:
