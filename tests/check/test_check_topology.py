@@ -41,12 +41,13 @@ def test_edges_are_counted_as_a_dictionary_counts_them(seed: int) -> None:
 def test_edges_are_sorted_alike_by_scipy_and_without(
     n_vertices: int, n_faces: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    start, end = mesh_edges.half_edges(_random_faces(1, n_vertices, n_faces))
+    faces = _random_faces(1, n_vertices, n_faces)
+    start, end = mesh_edges.half_edges(faces)
     low, high = np.minimum(start, end), np.maximum(start, end)
     order = np.lexsort((np.arange(len(low)), high, low))
     for pays in (False, True):
         monkeypatch.setattr(mesh_edges, "scipy_pays", lambda n, pays=pays: pays)
-        found = mesh_edges._sorted_edges(low, high, n_vertices)
+        found = mesh_edges._sorted_edges(faces, n_vertices)
         for array, expected in zip(found, (order, low[order], high[order]), strict=True):
             assert array.dtype == np.int32
             assert (array == expected).all()

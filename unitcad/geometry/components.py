@@ -9,7 +9,7 @@ import numpy as np
 from unitcad.geometry.arrays import Ints
 from unitcad.lean_import import postpone_tools
 
-_SMALL = 1_500_000
+_SMALL = 6_000_000
 
 
 def scipy_pays(n: int) -> bool:
@@ -26,17 +26,19 @@ def components(n: int, left: Ints, right: Ints) -> Ints:
 
         graph = coo_array((np.ones(len(left)), (left, right)), shape=(n, n))
         return connected_components(graph, directed=False)[1]
-    root = np.arange(n)
+    root = np.arange(n, dtype=np.int32)
     while True:
-        a, b = root[left], root[right]
-        apart = a != b
-        if not apart.any():
+        a, b = root.take(left), root.take(right)
+        apart = np.flatnonzero(a != b)
+        if not len(apart):
             break
-        left, right, a, b = left[apart], right[apart], a[apart], b[apart]
+        left, right, a, b = left.take(apart), right.take(apart), a.take(apart), b.take(apart)
         np.minimum.at(root, np.maximum(a, b), np.minimum(a, b))
         while True:
-            above = root[root]
+            above = root.take(root)
             if np.array_equal(above, root):
                 break
             root = above
-    return np.unique(root, return_inverse=True)[1].reshape(-1)
+    # Each component's root is its first node.
+    first = root == np.arange(n, dtype=np.int32)
+    return (np.cumsum(first, dtype=np.int32) - np.int32(1)).take(root)
