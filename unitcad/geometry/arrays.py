@@ -76,6 +76,14 @@ def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
     return low.T, high.T
 
 
+def columns_of(rows: Floats, order: Ints) -> Floats:
+    """Return some rows of (n, k) numbers, by their places (m,), as columns (k, m)."""
+    columns = np.empty((rows.shape[1], len(order)), rows.dtype)
+    for start in range(0, len(order), _BLOCK):
+        columns[:, start : start + _BLOCK] = rows.take(order[start : start + _BLOCK], axis=0).T
+    return columns
+
+
 def cross(a: Floats, b: Floats) -> Floats:
     """Return the row-wise cross product of (n, 3) arrays; several times faster than numpy.cross on long arrays."""
     product = np.empty_like(a)

@@ -2,7 +2,7 @@
 
 Boxes are put in Morton order; every four neighbours share a box, every four of those the next. A walk down keeps the
 pairs of nodes that meet. Coordinates are 16-bit steps of a common frame: rounding keeps their order, so no pair is
-lost, four children's corners fit one 64-bit word, and a block of node pairs stays in the processor's cache.
+lost, four children's boxes are 48 bytes in a row, and a block of node pairs stays in the processor's cache.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, reduce
+from operator import ge, gt
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from unitcad.geometry.ticks import Tick
 _FAN = 4
 _PART = 512  # pairs of nodes in a part at least
 _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at
-_STEP_BITS = 12
+_STEP_BITS = 13
 _STEP = 1 << _STEP_BITS  # pairs of nodes looked at together
 _FEW = 4096  # points, which are sorted in less time than all steps are gone through
 _TOP = 65_534  # largest step; 65,535 is an empty box's low corner
@@ -205,7 +206,7 @@ def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
 
 @dataclass(frozen=True)
 class _Tree:
-    """The nodes of each level but the uppermost, which has `roots`, four to a column (`_packed`), leaves first."""
+    """The nodes of each level but the uppermost, which has `roots`, four to a row (`_packed`), leaves first."""
 
     rows: list[Ints]
     roots: int
@@ -228,13 +229,12 @@ def _padded(boxes: Ints, more: int) -> Ints:
 
 
 def _packed(boxes: Ints) -> Ints:
-    """Return every four rows in one column: six words of four coordinates each, low then high, (6, n / 4).
+    """Return every four boxes as a row of 24 numbers: of each the low corner, then the high one.
 
     They are signed, less half their range: such comparisons are the fastest.
     """
-    children = boxes.reshape(-1, _FAN, 6).transpose(2, 0, 1) ^ np.uint16(0x8000)
-    np.invert(children[3:], out=children[3:])
-    return np.ascontiguousarray(children).view(np.uint64).reshape(6, -1)
+    flip = np.array([0x8000] * 3 + [0x7FFF] * 3, np.uint16)
+    return (boxes ^ flip).view(np.int16).reshape(-1, _FAN * 6)
 
 
 def _descend(
@@ -256,17 +256,16 @@ def _below(
 ) -> Iterator[tuple[Ints, Ints]]:
     """Return blocks of the pairs of children that meet, of pairs of nodes of a level."""
     rows, others = here.rows[level - 1], there.rows[level - 1]
-    keep = first < rows.shape[1]
-    keep &= second < others.shape[1]
-    skip = None if not own else np.greater if level > 1 else np.greater_equal
+    keep = first < len(rows)
+    keep &= second < len(others)
+    skip = None if not own else gt if level > 1 else ge
     return _walk(rows, others, first[keep], second[keep], skip, tick)
 
 
 def _children(rows: Ints, which: Ints) -> tuple[Ints, Ints]:
-    """Return low and high corners of the children of some nodes: (axis, child, node) each."""
-    words = rows.take(which, axis=1, mode="clip")
-    corners = np.ascontiguousarray(words.view(np.int16).reshape(6, -1, _FAN).transpose(0, 2, 1))
-    return corners[:3], corners[3:]
+    """Return low and high corners of the children of some nodes: (child, axis, node) each."""
+    corners = np.ascontiguousarray(rows.take(which, axis=0, mode="clip").T).reshape(_FAN, 6, -1)
+    return corners[:, :3], corners[:, 3:]
 
 
 def _walk(
@@ -274,16 +273,14 @@ def _walk(
     others: Ints,
     first: Ints,
     second: Ints,
-    skip: Callable[[Ints, Ints], Bools] | None,
+    skip: Callable[[int, int], bool] | None,
     tick: Tick,
 ) -> Iterator[tuple[Ints, Ints]]:
     """Yield children of the node pairs whose boxes meet.
 
     Of a node with itself the pairs of children (p, q) for which `skip(p, q)` are left out.
     """
-    column = np.arange(_FAN)
-    grid_i, grid_j = (side.reshape(-1) for side in np.meshgrid(column, column, indexing="ij"))
-    left_out = np.zeros(_FAN * _FAN, bool) if skip is None else skip(grid_i, grid_j)
+    left_out = [pair for pair in np.ndindex(_FAN, _FAN) if skip is not None and skip(*pair)]
     empty = np.empty(0, np.intp)
     yield empty, empty
     for start in range(0, len(first), _STEP):
@@ -295,14 +292,15 @@ def _walk(
         hit = np.empty((_FAN, len(i)), bool)
         part = np.empty((_FAN, len(i)), bool)
         for p in range(_FAN):
-            np.less_equal(low_a[0, p], high_b[0], out=hit)
+            np.less_equal(low_a[p, 0], high_b[:, 0], out=hit)
             for axis in range(3):
                 if axis:
-                    hit &= np.less_equal(low_a[axis, p], high_b[axis], out=part)
-                hit &= np.less_equal(low_b[axis], high_a[axis, p], out=part)
+                    hit &= np.less_equal(low_a[p, axis], high_b[:, axis], out=part)
+                hit &= np.less_equal(low_b[:, axis], high_a[p, axis], out=part)
             meet[p, :, : len(i)] = hit
         if skip is not None and len(own := np.flatnonzero(i == j)):
-            meet.reshape(_FAN * _FAN, -1)[np.ix_(left_out, own)] = False
+            for p, q in left_out:
+                meet[p, q, own] = False
         hits = np.flatnonzero(meet)
         which, pair = hits >> _STEP_BITS, hits & (_STEP - 1)
         i, j = (i * _FAN).take(pair), (j * _FAN).take(pair)

@@ -8,7 +8,7 @@ import numpy as np
 
 from unitcad.check.geometry.contact import MOST_RANK, RankedBoxes, ranked_boxes
 from unitcad.check.geometry.topology import Surface
-from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.arrays import Floats, Ints, columns_of
 from unitcad.geometry.boxes import Slabs, box_order, boxes_of, frame_of, ranks_of, slabs_of
 
 
@@ -36,11 +36,11 @@ def arranged(surface: Surface) -> Arranged:
     steps = frame.steps(vertices)
     boxes = boxes_of(steps, *faces.T)
     order = box_order(boxes, frame)
-    normal = np.ascontiguousarray(areas.take(order, axis=0).T)
+    normal = columns_of(areas, order)
     solid = (normal != 0).any(axis=0)
     if not solid.all():
         order, normal = order[solid], normal.compress(solid, axis=1)  # keeps each axis in one piece
-    columns, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(faces.take(order, axis=0).T)
+    columns, corners = np.ascontiguousarray(vertices.T), columns_of(faces, order)
     ranks = ranks_of(steps, vertices, MOST_RANK)
     return Arranged(
         order,
