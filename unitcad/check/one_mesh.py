@@ -41,7 +41,9 @@ class CheckedMesh:
 def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> CheckedMesh:
     """Apply the rules that need no printer; `cross=False` leaves out what compares faces with each other."""
     facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
-    mesh = replace(mesh, vertices=representable(mesh.vertices))
+    points = representable(mesh.vertices)
+    # What was made 0 may be where another vertex is.
+    mesh = replace(mesh, vertices=points, indexed=mesh.indexed or points is not mesh.vertices)
     if broken := not_finite(mesh):
         return CheckedMesh(in_file(broken, mesh), facts)
     if not len(mesh.faces):
@@ -80,10 +82,10 @@ def _inspected(mesh: Mesh, tick: Tick, *, cross: bool) -> Inspection:
 
     cross = cross and len(surface.kept) > 0
     if cross:
-        works.append(stars)
+        works.insert(0, stars)  # which mostly takes longest
     found = shared(lambda k: works[k](), len(works), large=len(surface.kept) >= MANY, first=arrange)
-    known = found.pop() if cross else None
-    topology = topology_on(surface, found)
+    known = found.pop(0) if cross else None
+    topology = topology_on(surface, found, tick)
     return Inspection(mesh, topology, tick, cross, ready=(ready[0], known) if ready and known is not None else None)
 
 

@@ -162,7 +162,7 @@ def _prepared(topology: Topology, ready: Arranged, stars: Stars) -> Faces:
     order, columns, corners, normal = ready.order, ready.columns, ready.corners, ready.normal
     safe = stars.smooth.take(corners)
     has_safe = np.asarray(safe.any(axis=0))
-    places = same_place(vertices).take(corners) if several else corners
+    places = same_place(vertices).take(corners) if several and topology.mesh.indexed else corners
     return Faces(
         vertices,
         corners,

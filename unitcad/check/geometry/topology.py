@@ -96,7 +96,7 @@ class Topology(Surface):
 def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     """Work out the topology of a mesh with finite vertices."""
     surface = surface_of(mesh, tick)
-    return topology_on(surface, [work(surface, tick) for work in works_on(surface)])
+    return topology_on(surface, [work(surface, tick) for work in works_on(surface)], tick)
 
 
 def surface_of(mesh: Mesh, tick: Tick) -> Surface:
@@ -121,12 +121,15 @@ def surface_of(mesh: Mesh, tick: Tick) -> Surface:
 
 def works_on(surface: Surface) -> list[Callable[[Surface, Tick], Found]]:
     """Return what is to be worked out for `topology_on`, each alone."""
-    return [_of_closed] if surface.edges.closed else [_by_shell, _pinched_and_twice]
+    return [_by_vertex, _fans] if surface.edges.closed else [_by_shell, _pinched_and_twice]
 
 
-def topology_on(surface: Surface, found: Sequence[Found]) -> Topology:
+def topology_on(surface: Surface, found: Sequence[Found], tick: Tick) -> Topology:
     """Return the topology of a surface from the results of `works_on`."""
-    turns, shells, low, high, volume, closed, pinched, twice, same = (one for part in found for one in part)
+    by_shell, (pinched, twice, same) = found
+    if surface.edges.closed and len(pinched):
+        by_shell = _by_shell(surface, tick)
+    turns, shells, low, high, volume, closed = by_shell
     if same is not None and len(twice):
         twice = np.setdiff1d(twice, _facing(same[0], same[1], surface.areas, shells, volume * closed))
     edges, unbalanced = surface.edges, np.empty(0, int)
@@ -147,18 +150,22 @@ def topology_on(surface: Surface, found: Sequence[Found]) -> Topology:
     )
 
 
-def _of_closed(surface: Surface, tick: Tick) -> Found:
-    """Return all of a surface whose edges have two faces each, wound alike.
+def _by_vertex(surface: Surface, tick: Tick) -> Found:
+    """Return what `_by_shell` does of a surface whose edges have two faces each, wound alike, if no vertex is pinched.
 
-    Where no vertex is pinched, faces with a common vertex are of one shell, and there are half as many vertices.
+    Then faces with a common vertex are of one shell, and there are half as many vertices as faces.
     """
-    faces, edges, n = surface.mesh.faces, surface.edges, len(surface.mesh.vertices)
-    across = mesh_edges.opposite(edges, 3 * len(faces))
-    pinched = mesh_edges.pinched_closed(faces, across, n)
+    shells = mesh_edges.shells_by_vertex(surface.mesh.faces, surface.edges, len(surface.mesh.vertices))
+    return None, *_of_shells(surface, shells, tick)
+
+
+def _fans(surface: Surface, tick: Tick) -> Found:
+    """Return what `_pinched_and_twice` does of a surface whose edges have two faces each, wound alike."""
+    faces = surface.mesh.faces
+    across = mesh_edges.opposite(surface.edges, 3 * len(faces))
     tick()
-    twice = np.flatnonzero(across[0::3] // 3 == across[1::3] // 3)
-    shells = mesh_edges.shells_of(faces, edges, None) if len(pinched) else mesh_edges.shells_by_vertex(faces, edges, n)
-    return None, *_of_shells(surface, shells, tick), pinched, twice, None
+    pinched = mesh_edges.pinched_closed(faces, across, len(surface.mesh.vertices))
+    return pinched, np.flatnonzero(across[0::3] // 3 == across[1::3] // 3), None
 
 
 def _by_shell(surface: Surface, tick: Tick) -> Found:
