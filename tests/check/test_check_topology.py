@@ -110,6 +110,43 @@ def test_pinch_by_both_ways() -> None:
     assert mesh_edges.shells_of(faces, edges, mesh_edges.turns_of(np.zeros((16, 3)), faces, edges)).max() == 1
 
 
+def _pinched_by_search(faces: list[list[int]]) -> list[int]:
+    """Vertices of which the faces are in several parts, joined across edges of two; without edges of more."""
+    by_edge, at = defaultdict(list), defaultdict(set)
+    for n, face in enumerate(faces):
+        for k in range(3):
+            by_edge[frozenset((face[k], face[k - 1]))].append(n)
+            at[face[k]].add(n)
+    found = []
+    for vertex, around in sorted(at.items()):
+        edges = [of for edge, of in by_edge.items() if vertex in edge]
+        parts = {n: {n} for n in around}
+        for one, other in (of for of in edges if len(of) == 2):
+            if parts[one] is not parts[other]:
+                parts[one] |= parts[other]
+                for n in parts[other]:
+                    parts[n] = parts[one]
+        if max(map(len, edges)) <= 2 and len({id(part) for part in parts.values()}) > 1:
+            found.append(vertex)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_pinches_of_open_meshes_as_a_search_finds_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    faces = np.concatenate([CUBE_FACES + 8 * n for n in range(5)])
+    joined = np.arange(40)
+    joined[rng.choice(40, 6)] = rng.choice(40, 6)
+    faces = joined[faces]
+    faces = faces[rng.random(len(faces)) < rng.choice([0.8, 0.95, 1.0])]
+    flipped = rng.random(len(faces)) < rng.choice([0.0, 0.1])
+    faces[flipped] = faces[flipped, ::-1]
+    whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    faces = faces[whole].astype(np.int32)
+    found = mesh_edges.pinched_open(faces, mesh_edges.edges_of(faces, 40), 40)
+    assert found.tolist() == _pinched_by_search(faces.tolist())
+
+
 @pytest.mark.parametrize(
     ("point", "expected"), [((5, 5, 5), 1), ((0.1, 9.9, 5), 1), ((-1, 5, 5), 0), ((5, 5, 10.5), 0)]
 )

@@ -128,25 +128,8 @@ def opposite(edges: Edges, n_half: int) -> Ints:
 
 
 def pinched_closed(faces: Ints, across: Ints, n_vertices: int) -> Ints:
-    """Return vertices of a closed, consistently wound mesh whose faces form more than one fan.
-
-    The half-edges leaving a vertex are permuted by turning to the next face; a fan is one cycle. Cycles are counted
-    by pointer doubling, in as many rounds as the largest valence has binary digits.
-    """
-    n = 3 * len(faces)
-    start = faces.reshape(-1)
-    turn = across.reshape(-1, 3)[:, [2, 0, 1]].reshape(-1)
-    valence = np.bincount(start, minlength=n_vertices)
-    label = np.arange(n, dtype=np.int32)
-    rounds = int(valence.max(initial=1)).bit_length()
-    for i in range(rounds):
-        np.minimum(label, label[turn], out=label)
-        if i < rounds - 1:
-            turn = turn[turn]
-    roots = label == np.arange(n, dtype=np.int32)
-    if np.count_nonzero(roots) == np.count_nonzero(valence):
-        return np.empty(0, np.int32)
-    return np.flatnonzero(np.bincount(start[roots], minlength=n_vertices) > 1).astype(np.int32)
+    """Return vertices of a closed, consistently wound mesh whose faces form more than one fan."""
+    return np.flatnonzero(_fans(faces, across, np.ones(n_vertices, bool)) > 1).astype(np.int32)
 
 
 def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
@@ -154,21 +137,64 @@ def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
 
     Fans are joined across edges of two faces.
     """
-    start, _ = half_edges(faces)
-    n = len(start)
-    pairs = edges.first[edges.size == 2]
-    one, other = edges.order[pairs], edges.order[pairs + 1]
-    ahead = np.arange(n, dtype=np.int32).reshape(-1, 3)[:, [1, 2, 0]].reshape(-1)
-    same = start[one] == start[other]
-    left = np.concatenate([one, ahead[one]])
-    right = np.concatenate([np.where(same, other, ahead[other]), np.where(same, ahead[other], other)])
-    fans = components(n, left, right)
-    _, where = np.unique(fans, return_index=True)
-    several = np.bincount(start[where], minlength=n_vertices) > 1
+    pairs = np.flatnonzero(edges.size == 2)
+    one, other = edges.order[edges.first[pairs]], edges.order[edges.first[pairs] + 1]
+    start = np.ascontiguousarray(faces).reshape(-1)
+    wrong = edges.size != 2
+    wrong[pairs[start[one] == start[other]]] = True
+    whole, rest = np.ones(n_vertices, bool), np.zeros(n_vertices, bool)
+    whole[edges.low[wrong]] = whole[edges.high[wrong]] = False
+    rest[edges.low[wrong]] = rest[edges.high[wrong]] = True
     many = edges.size > 2
-    several[edges.low[many]] = False
-    several[edges.high[many]] = False
+    rest[edges.low[many]] = rest[edges.high[many]] = False
+    several = _fans(faces, opposite(edges, len(start)), whole) > 1
+    if rest.any():
+        some = rest[edges.low[pairs]] | rest[edges.high[pairs]]
+        several |= _joined_fans(start, one[some], other[some], rest) > 1
     return np.flatnonzero(several).astype(np.int32)
+
+
+def _fans(faces: Ints, across: Ints, asked: Bools) -> Ints:
+    """Return how many fans the faces of each vertex form, of those that are `asked`, where all edges have two faces.
+
+    The half-edges leaving a vertex are permuted by turning to the next face; a fan is one cycle. Cycles are counted
+    by pointer doubling, in as many rounds as the largest valence has binary digits.
+    """
+    start, places = np.ascontiguousarray(faces).reshape(-1), np.arange(3 * len(faces), dtype=np.int32)
+    turn = across.reshape(-1, 3)[:, [2, 0, 1]].reshape(-1)
+    valence = np.bincount(start, minlength=len(asked))
+    if not asked.all():
+        turn = np.where(asked.take(start), turn, places)
+    label = places.copy()
+    rounds = int(valence.max(initial=1, where=asked)).bit_length()
+    for i in range(rounds):
+        np.minimum(label, label.take(turn), out=label)
+        if i < rounds - 1:
+            turn = turn.take(turn)
+    fresh = label == places
+    if np.count_nonzero(fresh) == np.count_nonzero(valence):
+        return np.minimum(valence, 1)
+    fans = np.bincount(start[fresh], minlength=len(asked))
+    fans[~asked] = 0
+    return fans
+
+
+def _joined_fans(start: Ints, one: Ints, other: Ints, asked: Bools) -> Ints:
+    """Return how many fans the faces of each vertex form, of those that are `asked`.
+
+    `one` and `other` are half-edges in pairs, at least all of edges of two faces at these vertices.
+    """
+    half = np.flatnonzero(asked.take(start))
+    number = np.full(len(start), -1)
+    number[half] = np.arange(len(half))
+    one_on, other_on = (side // 3 * 3 + (side + 1) % 3 for side in (one, other))  # the next half-edge of its face
+    alike = start[one] == start[other]
+    left = number[np.concatenate([one, one_on])]
+    right = number[np.concatenate([np.where(alike, other, other_on), np.where(alike, other_on, other)])]
+    kept = left >= 0
+    fans = components(len(half), left[kept], right[kept])
+    _, where = np.unique(fans, return_index=True)
+    return np.bincount(start[half[where]], minlength=len(asked))
 
 
 def shells_of(faces: Ints, edges: Edges, turns: Turns | None) -> Ints:
