@@ -108,25 +108,29 @@ def test_boxes_that_touch_hold_faces_that_do_no_more() -> None:
     a, b = _pairs("lattice", np.random.default_rng(7))
     points = np.ascontiguousarray(np.concatenate([a, b]).reshape(-1, 3).T)
     faces = np.ascontiguousarray(np.arange(6 * N).reshape(-1, 3).T)
-    apart, flush = face_boxes(points, faces).relation(np.arange(N), np.arange(N, 2 * N))
+    i, j = np.arange(N), np.arange(N, 2 * N)
     solid = [(area_vectors(c.reshape(-1, 3), np.arange(3 * N).reshape(-1, 3)) != 0).any(axis=1) for c in (a, b)]
     exact = meet(a, b)
-    assert (apart == ((a.min(axis=1) > b.max(axis=1)) | (b.min(axis=1) > a.max(axis=1))).any(axis=1)).all()
-    assert not (apart & exact.touches & solid[0] & solid[1]).any()
-    rows = flush & solid[0] & solid[1]
-    assert (rows & exact.touches).sum() > 20
-    assert not (rows & (exact.crosses | exact.overlaps)).any()
+    apart = ((a.min(axis=1) > b.max(axis=1)) | (b.min(axis=1) > a.max(axis=1))).any(axis=1)
     touch = np.zeros(N, bool)  # in a plane that does not hold a side of one and all of the other
     for one, other in ((a, b), (b, a)):
         plane = one.max(axis=1)
         held = (one == plane[:, None]).sum(axis=1) + (other == plane[:, None]).sum(axis=1)
         touch |= ((plane == other.min(axis=1)) & (held < 5)).any(axis=1)
-    assert (flush == (touch & ~apart)).all()
     ranks = ranks_of(frame_of(points.T).steps(points.T), points.T, MOST_RANK)
     assert ranks is not None
-    apart_by_rank, flush_by_rank = ranked_boxes(ranks, faces).relation(np.arange(N), np.arange(N, 2 * N))
-    assert not apart_by_rank.any()  # of pairs whose boxes meet, which alone are asked for
-    assert (flush_by_rank == flush)[~apart].all()
+    # Single precision, negative zeros among it; double; all vertices, and only those of some faces; by ranks.
+    signed = np.where((points == 0) & (np.arange(6 * N) % 2 == 0), -0.0, points)
+    more = np.concatenate([points * 0.1, np.zeros((3, 18 * N))], axis=1)
+    for boxes in (
+        *(face_boxes(columns, faces) for columns in (points, points - 3, signed, points * 0.1, more)),
+        ranked_boxes(ranks, faces),
+    ):
+        found = boxes.touching(i, j)
+        assert (found == (touch | apart)).all()
+        rows = found & solid[0] & solid[1]
+        assert (rows & exact.touches).sum() > 20
+        assert not (rows & (exact.crosses | exact.overlaps)).any()
 
 
 def test_ranks_tell_all_coordinates_apart_or_are_none() -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.geometry.contact import MOST_RANK, RankedBoxes, ranked_boxes
+from unitcad.check.geometry.contact import MOST_RANK, FaceBoxes, ranked_boxes
 from unitcad.check.geometry.topology import Surface
 from unitcad.geometry.arrays import Floats, Ints, columns_of
 from unitcad.geometry.boxes import Slabs, box_order, boxes_of, frame_of, ranks_of, slabs_of
@@ -26,7 +26,7 @@ class Arranged:
     normal: Floats
     steps: Ints
     slabs: Slabs
-    ranked: RankedBoxes | None
+    ranked: FaceBoxes | None
 
 
 def arranged(surface: Surface) -> Arranged:

@@ -6,108 +6,78 @@ has a corner, a side or its whole. Comparisons of coordinates only, hence exact.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, sorted_with_order
 
 _FACES = 1 << 14  # faces whose corners stay in the processor's cache
 _RECENT = 1 << 16  # pairs of shells remembered: those found again are near each other in the order of the faces
-_FIVE = np.uint16(0x333)  # added to sums of corners, four bits an axis: the fourth bit says five or more
 
 
 @dataclass(frozen=True)
-class RankedBoxes:
-    """Boxes of faces by the ranks of their sides, words of three axes: what can only touch is told by one comparison.
+class FaceBoxes:
+    """Boxes of faces by the ranks of their sides, rows of three axes: what can only touch is told by one comparison.
 
-    `high` are 8 times the ranks and how many corners lie there; `low` are 8 times the ranks less that number, plus 4.
-    Where the boxes of two faces touch, the former is at most the latter if four corners or fewer lie in the plane.
+    `high` (n, 4) are 8 times the ranks and how many corners lie there; `low` are 8 times the ranks less that number,
+    plus 4. Where the boxes of two faces touch, the former is at most the latter if four corners or fewer lie in the
+    plane: then the plane holds no side of one and all of the other. Boxes that are apart touch by this.
     """
 
     low: Ints
     high: Ints
 
-    def relation(self, i: Ints, j: Ints) -> tuple[Bools, Bools]:
-        """Return what `FaceBoxes.relation` does for pairs of faces whose steps meet: no boxes are apart."""
+    def touching(self, i: Ints, j: Ints) -> Bools:
+        """Return for pairs of faces whether they can do no more than touch."""
         touch = self._below(i, j)
         touch |= self._below(j, i)
-        return np.zeros(len(i), bool), np.asarray(touch.view(np.uint32) != 0)
+        return np.asarray(touch.view(np.uint32)[:, 0] != 0)
 
     def _below(self, i: Ints, j: Ints) -> Bools:
-        return self.high.take(i, mode="clip").view(np.uint16) <= self.low.take(j, mode="clip").view(np.uint16)
+        return self.high.take(i, axis=0, mode="clip") <= self.low.take(j, axis=0, mode="clip")
 
 
 MOST_RANK = 8191
-"""The largest rank that `RankedBoxes` has room for."""
-
-
-def ranked_boxes(ranks: list[Ints], ids: Ints) -> RankedBoxes:
-    """Return the boxes of faces from the ranks of the vertices along each axis, and the faces' ids (3, m)."""
-    low, high = np.zeros(ids.shape[1], np.uint64), np.full(ids.shape[1], 0xFFFF, np.uint64)
-    lows, highs = (words.view(np.uint16).reshape(-1, 4) for words in (low, high))
-    highs[:, 3], lows[:, 3] = 0xFFFF, 0  # never touch along the axis that is not there
-    for start in range(0, ids.shape[1], _FACES):
-        block = slice(start, start + _FACES)
-        places = [corner[block].astype(np.intp) for corner in ids]
-        for axis, rank in enumerate(ranks):
-            one, two, three = (rank.take(place, mode="clip") for place in places)
-            least, most = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
-            on_low, on_high = np.zeros((2, len(one)), np.uint16)
-            for corner in (one, two, three):
-                on_low += corner == least
-                on_high += corner == most
-            highs[block, axis] = most * np.uint16(8) + on_high
-            lows[block, axis] = least * np.uint16(8) + np.uint16(4) - on_low
-    return RankedBoxes(low, high)
-
-
-@dataclass(frozen=True)
-class FaceBoxes:
-    """Boxes of faces, (3, n) each, and how many corners of each face lie on their sides: four bits an axis, (n,)."""
-
-    low: Floats
-    high: Floats
-    on_low: Ints
-    on_high: Ints
-
-    def relation(self, i: Ints, j: Ints) -> tuple[Bools, Bools]:
-        """Return for pairs of faces whether their boxes are apart, and whether the faces can only touch.
-
-        They can where their boxes do, and the plane between these holds no side of one and all of the other.
-        """
-        apart, flush = np.zeros((2, len(i)), bool)
-        above, below = (
-            one.take(i, mode="clip") + other.take(j, mode="clip") + _FIVE
-            for one, other in ((self.on_high, self.on_low), (self.on_low, self.on_high))
-        )
-        for axis in range(3):
-            low_a, low_b = (self.low[axis].take(f, mode="clip") for f in (i, j))
-            high_a, high_b = (self.high[axis].take(f, mode="clip") for f in (i, j))
-            apart |= low_a > high_b
-            apart |= low_b > high_a
-            for plane, other, corners in ((high_a, low_b, above), (low_a, high_b, below)):
-                meets = plane == other
-                if meets.any():
-                    meets &= (corners & np.uint16(8 << 4 * axis)) == 0
-                    flush |= meets
-        return apart, flush & ~apart
+"""The largest rank for which numbers of 16 bits suffice."""
 
 
 def face_boxes(columns: Floats, ids: Ints) -> FaceBoxes:
     """Return the boxes of faces from vertices (3, n) and their ids (3, m)."""
-    low, high = np.empty(ids.shape), np.empty(ids.shape)
-    on_low, on_high = np.zeros(ids.shape[1], np.uint16), np.zeros(ids.shape[1], np.uint16)
+    if ids.size > columns.shape[1]:
+        return ranked_boxes([_numbers(column) for column in columns], ids)
+    corners = np.arange(ids.size).reshape(ids.shape)
+    return ranked_boxes([_numbers(column.take(ids.reshape(-1))) for column in columns], corners)
+
+
+def _numbers(values: Floats) -> NDArray[np.uint64]:
+    """Return whole numbers of at most 32 bits that are in the order of coordinates (n,), and equal where these are."""
+    single = values.astype(np.float32) + np.float32(0)
+    if not np.array_equal(single, values):
+        return np.unique(values, return_inverse=True)[1].astype(np.uint64)
+    bits = single.view(np.uint32)
+    return np.where(bits >> np.uint32(31), ~bits, bits | np.uint32(1 << 31)).astype(np.uint64)
+
+
+def ranked_boxes(ranks: Sequence[NDArray[np.unsignedinteger]], ids: Ints) -> FaceBoxes:
+    """Return the boxes of faces from the ranks of the vertices along each axis, and the faces' ids (3, m)."""
+    kind = ranks[0].dtype.type
+    low, high = np.zeros((ids.shape[1], 4), kind), np.full((ids.shape[1], 4), np.iinfo(kind).max, kind)
     for start in range(0, ids.shape[1], _FACES):
         block = slice(start, start + _FACES)
         places = [corner[block].astype(np.intp) for corner in ids]
-        for axis, column in enumerate(columns):
-            at = [column.take(place, mode="clip") for place in places]
-            for find, side, on in ((np.minimum, low, on_low), (np.maximum, high, on_high)):
-                find(find(at[0], at[1]), at[2], out=side[axis, block])
-                for corner in at:
-                    on[block] += (corner == side[axis, block]).astype(np.uint16) << np.uint16(4 * axis)
-    return FaceBoxes(low, high, on_low, on_high)
+        for axis, rank in enumerate(ranks):  # the fourth column never touches
+            one, two, three = (rank.take(place, mode="clip") for place in places)
+            least, most = np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
+            on_low, on_high = np.zeros((2, len(one)), kind)
+            for corner in (one, two, three):
+                on_low += corner == least
+                on_high += corner == most
+            high[block, axis] = most * kind(8) + on_high
+            low[block, axis] = least * kind(8) + kind(4) - on_low
+    return FaceBoxes(low, high)
 
 
 @dataclass

@@ -16,6 +16,7 @@ from unitcad.check.geometry.triangle_mesh import area_vectors, float32_steps
 from unitcad.check.geometry.volumes import side_by_side
 from unitcad.geometry.arrays import Bools, Floats, Ints, sorted_with_order
 
+_BLOCK = 1 << 14  # pairs of faces that stay in the processor's cache
 _FLAT = 2.0  # float32 steps: a fold thinner than that has no thickness
 _WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding
 
@@ -82,9 +83,11 @@ def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> 
         two &= edges.balanced
     pair = edges.first[two]
     left, right = edges.order[pair] // 3, edges.order[pair + 1] // 3
-    facing = np.zeros(len(pair))
-    for axis in range(3):
-        facing += areas[left, axis] * areas[right, axis]
+    facing = np.empty(len(pair))
+    for start in range(0, len(pair), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        one, other = areas.take(left[block], axis=0), areas.take(right[block], axis=0)
+        facing[block] = np.einsum("ij,ij->i", one, other)
     against = np.flatnonzero(facing < 0)
     if not len(against):
         return against

@@ -16,7 +16,7 @@ import numpy as np
 
 from unitcad.check.geometry import coverings, triangles
 from unitcad.check.geometry.arranged import Arranged
-from unitcad.check.geometry.contact import Contacts, FaceBoxes, RankedBoxes, face_boxes
+from unitcad.check.geometry.contact import Contacts, FaceBoxes, face_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.stars import Stars
 from unitcad.check.geometry.topology import Topology
@@ -51,7 +51,7 @@ class Faces:
     some_safe: Bools | None
     columns: Floats
     places: Ints
-    ranked: RankedBoxes | None
+    ranked: FaceBoxes | None
     shell: Ints
     original: Ints
     several: bool
@@ -68,7 +68,7 @@ class Sieve:
     """Planes and boxes of faces, all or some."""
 
     planes: Planes
-    boxes: FaceBoxes | RankedBoxes
+    boxes: FaceBoxes
 
 
 def _sieve(faces: Faces, some: Ints | None = None) -> Sieve:
@@ -230,9 +230,7 @@ def _sieved(faces: Faces, sieve: Sieve, pair: tuple[Ints, Ints], i: Ints, j: Int
     i, j are what the `sieve` calls the faces of the pairs.
     """
     state, shared = np.zeros((2, len(i)), np.int8)
-    apart, flush = sieve.boxes.relation(i, j)
-    state[apart] = _APART
-    state[flush] = _FLUSH
+    state[sieve.boxes.touching(i, j)] = _FLUSH
     rows = np.flatnonzero(state == _OPEN)
     i, j, planes = i[rows], j[rows], sieve.planes
     ids_a, ids_b = (planes.vertices(f) for f in (i, j))
