@@ -16,6 +16,7 @@ import numpy as np
 
 from unitcad.check.geometry import coverings, triangles
 from unitcad.check.geometry.arranged import Arranged
+from unitcad.check.geometry.common_corners import CommonCorners, common_corners
 from unitcad.check.geometry.contact import Contacts, FaceBoxes, face_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.stars import Stars
@@ -40,14 +41,14 @@ class Faces:
     """Faces in the order of a space-filling curve and what the sieves need of them.
 
     `normal` (3, m) is twice their area vectors; `columns` (3, n) are the vertices by axis, and `places` (3, m) the
-    first vertices in the places of the corners. `safe` are the corners whose stars are height fields, others -1;
+    first vertices in the places of the corners. `safe` are the corners whose stars are height fields;
     `some_safe` says which faces have one, where few do.
     """
 
     vertices: Floats
     corners: Ints
     normal: Floats
-    safe: Ints
+    safe: CommonCorners
     some_safe: Bools | None
     columns: Floats
     places: Ints
@@ -167,7 +168,7 @@ def _prepared(topology: Topology, ready: Arranged, stars: Stars) -> Faces:
         vertices,
         corners,
         normal,
-        np.where(safe, corners, np.int32(-1)),
+        common_corners(corners, safe, len(vertices)),
         has_safe if np.count_nonzero(has_safe) * _RARE < len(order) else None,
         columns,
         places,
@@ -183,22 +184,10 @@ def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     """Drop pairs that share a vertex whose star is a height field."""
     if faces.some_safe is not None:
         some = np.flatnonzero(faces.some_safe.take(i, mode="clip"))
-        drop = some[_share_safe(faces, i[some], j[some])]
+        drop = some[faces.safe.of(i[some], j[some])]
         return (np.delete(i, drop), np.delete(j, drop)) if len(drop) else (i, j)
-    keep = np.flatnonzero(~_share_safe(faces, i, j))
+    keep = np.flatnonzero(~faces.safe.of(i, j))
     return i[keep], j[keep]
-
-
-def _share_safe(faces: Faces, i: Ints, j: Ints) -> Bools:
-    mine = [safe.take(i, mode="clip") for safe in faces.safe]
-    theirs = [corner.take(j, mode="clip") for corner in faces.corners]
-    shared = mine[0] == theirs[0]
-    part = np.empty(len(i), bool)
-    for a in range(3):
-        for b in range(3):
-            if a or b:
-                shared |= np.equal(mine[a], theirs[b], out=part)
-    return shared
 
 
 def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings) -> None:
