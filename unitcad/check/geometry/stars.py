@@ -120,7 +120,7 @@ def _along_means(columns: Floats, corners: Ints, areas: Floats) -> Bools:
     blocks = [slice(start, start + _BLOCK) for start in range(0, m, _BLOCK)]
     share, angle, steep = np.empty(m), np.empty((3, m)), np.empty((3, m), bool)
     for block in blocks:
-        here = areas[:, block]
+        here = list(areas[:, block])
         size = np.sqrt(_dot(here, here))
         sound = size > _SOUND * _longest(_sides(columns, [corner[block].astype(np.intp) for corner in corners]))
         share[block] = 1 / np.where(sound, size, np.inf)
@@ -128,7 +128,7 @@ def _along_means(columns: Floats, corners: Ints, areas: Floats) -> Bools:
     length = np.maximum(np.sqrt(_dot(along, along)), 1e-300)
     along = [part / length for part in along]
     for block in blocks:
-        near, here = [corner[block].astype(np.intp) for corner in corners], areas[:, block]
+        near, here = [corner[block].astype(np.intp) for corner in corners], list(areas[:, block])
         sides = _sides(columns, near)
         for k, corner in enumerate(near):
             up = [part.take(corner) for part in along]
