@@ -68,6 +68,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Chec
 def _inspected(mesh: Mesh, tick: Tick, *, cross: bool) -> Inspection:
     """Return a mesh to inspect. Where two cores share it, all that follows from its edges is worked out together."""
     surface = surface_of(mesh, tick)
+    cross = cross and len(surface.kept) > 0
     works: list[Callable[[], Any]] = [partial(work, surface, tick) for work in works_on(surface)]
     ready: list[Arranged] = []
 
@@ -80,7 +81,6 @@ def _inspected(mesh: Mesh, tick: Tick, *, cross: bool) -> Inspection:
         with suppress(MemoryError):
             return stars_of(surface)
 
-    cross = cross and len(surface.kept) > 0
     if cross:
         works.insert(0, stars)  # which mostly takes longest
     found = shared(lambda k: works[k](), len(works), large=len(surface.kept) >= MANY, first=arrange)

@@ -47,6 +47,13 @@ def distinct(ordered: Ints) -> Bools:
     return fresh
 
 
+def by_appearance(first: Ints, n: int) -> tuple[Ints, Ints]:
+    """Return the places among `first`, of `n`, in their order, and where in it each of `first` stands."""
+    appears = np.zeros(n, bool)
+    appears[first] = True
+    return np.flatnonzero(appears), np.cumsum(appears, dtype=np.int32).take(first) - np.int32(1)
+
+
 def among(numbers: Ints, known: Ints) -> Bools:
     """Return which numbers are among the `known` ones, which are sorted."""
     if not len(known):

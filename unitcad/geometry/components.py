@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from unitcad.geometry.arrays import Ints
+from unitcad.geometry.arrays import Ints, by_appearance
 from unitcad.lean_import import postpone_tools
 
 _SMALL = 6_000_000
@@ -39,6 +39,4 @@ def components(n: int, left: Ints, right: Ints) -> Ints:
             if np.array_equal(above, root):
                 break
             root = above
-    # Each component's root is its first node.
-    first = root == np.arange(n, dtype=np.int32)
-    return (np.cumsum(first, dtype=np.int32) - np.int32(1)).take(root)
+    return by_appearance(root, n)[1]  # each component's root is its first node

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, order_of_packed
+from unitcad.geometry.arrays import Bools, Floats, Ints, by_appearance, cross, distinct, order_of_packed
 from unitcad.geometry.components import components, scipy_pays
 from unitcad.lean_import import postpone_tools
 
@@ -127,6 +127,15 @@ def opposite(edges: Edges, n_half: int) -> Ints:
     return across
 
 
+def surrounded(edges: Edges, n_vertices: int) -> Bools:
+    """Return which vertices have two faces, wound alike, at all their edges."""
+    whole = np.ones(n_vertices, bool)
+    if not edges.closed:
+        wrong = (edges.size != 2) | ~edges.balanced
+        whole[edges.low[wrong]] = whole[edges.high[wrong]] = False
+    return whole
+
+
 def pinched_closed(faces: Ints, across: Ints, n_vertices: int) -> Ints:
     """Return vertices of a closed, consistently wound mesh whose faces form more than one fan."""
     return np.flatnonzero(_fans(faces, across, np.ones(n_vertices, bool)) > 1).astype(np.int32)
@@ -137,20 +146,14 @@ def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
 
     Fans are joined across edges of two faces.
     """
-    pairs = np.flatnonzero(edges.size == 2)
-    one, other = edges.order[edges.first[pairs]], edges.order[edges.first[pairs] + 1]
-    start = np.ascontiguousarray(faces).reshape(-1)
-    wrong = edges.size != 2
-    wrong[pairs[start[one] == start[other]]] = True
-    whole, rest = np.ones(n_vertices, bool), np.zeros(n_vertices, bool)
-    whole[edges.low[wrong]] = whole[edges.high[wrong]] = False
-    rest[edges.low[wrong]] = rest[edges.high[wrong]] = True
-    many = edges.size > 2
+    whole = surrounded(edges, n_vertices)
+    rest, many = ~whole, edges.size > 2
     rest[edges.low[many]] = rest[edges.high[many]] = False
-    several = _fans(faces, opposite(edges, len(start)), whole) > 1
+    several = _fans(faces, opposite(edges, 3 * len(faces)), whole) > 1
     if rest.any():
-        some = rest[edges.low[pairs]] | rest[edges.high[pairs]]
-        several |= _joined_fans(start, one[some], other[some], rest) > 1
+        first = edges.first[(edges.size == 2) & (rest[edges.low] | rest[edges.high])]
+        start = np.ascontiguousarray(faces).reshape(-1)
+        several |= _joined_fans(start, edges.order[first], edges.order[first + 1], rest) > 1
     return np.flatnonzero(several).astype(np.int32)
 
 
@@ -216,11 +219,9 @@ def shells_by_vertex(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
     n = int(shells.max(initial=0)) + 1
     if n == 1:
         return shells
-    first = np.full(n, len(shells))
+    first = np.full(n, len(shells))  # of a vertex that no face uses: after all
     first[shells[::-1]] = np.arange(len(shells))[::-1]
-    number = np.empty(n, shells.dtype)
-    number[np.argsort(first, kind="stable")] = np.arange(n)
-    return number.take(shells)
+    return by_appearance(first, len(shells) + 1)[1].take(shells)
 
 
 def turns_of(vertices: Floats, faces: Ints, edges: Edges) -> Turns | None:

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from unitcad.check.geometry.edges import Edges, edges_of
+from unitcad.check.geometry.edges import edges_of, surrounded
 from unitcad.check.geometry.topology import Surface
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
@@ -43,28 +43,18 @@ def stars_of(surface: Surface) -> Stars:
     solid = (normal != 0).any(axis=0)
     if not solid.all():
         normal, corners = normal.compress(solid, axis=1), corners.compress(solid, axis=1)
-    surrounded = _surrounded(edges, len(vertices))
-    return Stars(height_fields(np.ascontiguousarray(vertices.T), corners, normal, surrounded), edges.closed)
+    whole = surrounded(edges, len(vertices))
+    return Stars(height_fields(np.ascontiguousarray(vertices.T), corners, normal, whole), edges.closed)
 
 
-def _surrounded(edges: Edges, n: int) -> Bools:
-    """Return which of `n` vertices have two faces, wound alike, at all their edges."""
-    whole = np.ones(n, bool)
-    if not edges.closed:
-        wrong = (edges.size != 2) | ~edges.balanced
-        whole[edges.low[wrong]] = False
-        whole[edges.high[wrong]] = False
-    return whole
-
-
-def height_fields(columns: Floats, corners: Ints, areas: Floats, surrounded: Bools) -> Bools:
-    """Return which vertices (3, n) have such a star, of those that are `surrounded` by faces wound alike.
+def height_fields(columns: Floats, corners: Ints, areas: Floats, whole: Bools) -> Bools:
+    """Return which vertices (3, n) have such a star, of the `whole` ones, `surrounded` by faces wound alike.
 
     `corners` (3, m) are the vertices of the faces, `areas` (3, m) twice their area vectors.
     """
-    found = _along(_AXES, columns, corners, areas) & surrounded
+    found = _along(_AXES, columns, corners, areas) & whole
     for further in (partial(_along, _DIAGONALS), _along_means):
-        asked = surrounded & ~found
+        asked = whole & ~found
         some = np.flatnonzero(asked.take(corners[0]) | asked.take(corners[1]) | asked.take(corners[2]))
         if not len(some):
             break

@@ -121,7 +121,7 @@ def surface_of(mesh: Mesh, tick: Tick) -> Surface:
 
 def works_on(surface: Surface) -> list[Callable[[Surface, Tick], Found]]:
     """Return what is to be worked out for `topology_on`, each alone."""
-    return [_by_vertex, _fans] if surface.edges.closed else [_by_shell, _pinched_and_twice]
+    return [_by_vertex, _pinched_and_twice_of_closed] if surface.edges.closed else [_by_shell, _pinched_and_twice]
 
 
 def topology_on(surface: Surface, found: Sequence[Found], tick: Tick) -> Topology:
@@ -159,7 +159,7 @@ def _by_vertex(surface: Surface, tick: Tick) -> Found:
     return None, *_of_shells(surface, shells, tick)
 
 
-def _fans(surface: Surface, tick: Tick) -> Found:
+def _pinched_and_twice_of_closed(surface: Surface, tick: Tick) -> Found:
     """Return what `_pinched_and_twice` does of a surface whose edges have two faces each, wound alike."""
     faces = surface.mesh.faces
     across = mesh_edges.opposite(surface.edges, 3 * len(faces))

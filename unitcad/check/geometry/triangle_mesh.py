@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unitcad.check.geometry.source import Source
-from unitcad.geometry.arrays import Floats, Ints, distinct, order_of_packed
+from unitcad.geometry.arrays import Floats, Ints, by_appearance, distinct, order_of_packed
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -73,7 +73,7 @@ def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
         at += len(mixed)
     order = order_of_packed(key, room)
     fresh = distinct(key)
-    places, number = _by_appearance(order[fresh], n)
+    places, number = by_appearance(order[fresh], n)
     index, before = np.empty(n, np.int32), -1
     for start in range(0, n, _BLOCK):
         rank = np.cumsum(fresh[start : start + _BLOCK], dtype=np.int32)
@@ -88,7 +88,7 @@ def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
         # Two places have one hash.
         values = _bits(corners).view(corners.dtype)
         _, first, rank = np.unique(values, axis=0, return_index=True, return_inverse=True)
-        places, number = _by_appearance(first, n)
+        places, number = by_appearance(first, n)
         vertices, index = values[places], number.take(rank.reshape(-1, sides))
     return vertices.astype(np.float64), index
 
@@ -106,17 +106,10 @@ def _bits(corners: Floats) -> NDArray[np.unsignedinteger]:
     return values.view(np.uint32 if corners.dtype == np.float32 else np.uint64)
 
 
-def _by_appearance(first: Ints, n: int) -> tuple[Ints, Ints]:
-    """Return the first places of points, of `n`, in their order, and where in it each stands."""
-    appears = np.zeros(n, bool)
-    appears[first] = True
-    return np.flatnonzero(appears), np.cumsum(appears, dtype=np.int32).take(first) - np.int32(1)
-
-
 def same_place(points: Floats) -> Ints:
     """Return for each of (n, 3) points the first one that is in the same place."""
-    distinct, index = weld_points(points)
-    if len(distinct) == len(points):
+    places, index = weld_points(points)
+    if len(places) == len(points):
         return np.arange(len(points), dtype=np.int32)
     first = np.flatnonzero(np.diff(np.maximum.accumulate(index), prepend=np.int32(-1)))
     return first[index].astype(np.int32)
