@@ -38,7 +38,7 @@ FLOORS = [
     {"files", "arguments", "sharing"},
     {"errors", "children"},
     {"text", "json_text", "notebook", "geometry"},
-    {"lean_import"},
+    {"lean_import", "heap"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 CAD = ("OCP", "build123d", "cadquery")

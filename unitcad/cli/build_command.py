@@ -104,12 +104,14 @@ def _built(
         from unitcad.arrays.array_file import load_array
         from unitcad.arrays.array_names import confirm_known, is_array
         from unitcad.cli.output import print_json, progress
+        from unitcad.heap import keep_freed_memory
         from unitcad.pipeline.array_build import build_array
         from unitcad.pipeline.build import build as build_spec
         from unitcad.pipeline.folder import PAGE, held
         from unitcad.pipeline.subjects import subject_of, unit_of
         from unitcad.validation import load
 
+        keep_freed_memory()
         changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
         allow_code(code)
         # Every spec is validated before the first one is built.

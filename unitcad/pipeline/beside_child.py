@@ -9,6 +9,7 @@ from typing import Any
 from unitcad.casting.bench_pictures import BenchPictures
 from unitcad.children import answer_requests
 from unitcad.errors import UnitcadError
+from unitcad.heap import keep_freed_memory
 from unitcad.lean_import import postpone_tools
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
@@ -17,6 +18,7 @@ from unitcad.spec import from_json
 
 def begin() -> Callable[[tuple[str, Any]], object]:
     """Return what answers (what, of what); None for what is refused, which the caller then meets itself."""
+    keep_freed_memory()
     if "step" in sys.argv:
         from unitcad.export import step  # noqa: F401
     else:
