@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from unitcad.pipeline.build import Built
     from unitcad.pipeline.manifest_records import Manifest
     from unitcad.pipeline.subjects import Made
+    from unitcad.validation import Changes
 
 
 def build(
@@ -100,16 +101,10 @@ def _built(
     """Build the specs and print what came out; return whether every check passed."""
     # The processes first: they load their modules while this one loads its own.
     with _beside(only, formats) as beside:
-        from unitcad.arrays.array import Array
-        from unitcad.arrays.array_file import load_array
-        from unitcad.arrays.array_names import confirm_known, is_array
+        from unitcad.arrays.array_names import confirm_known
         from unitcad.cli.output import print_json, progress
         from unitcad.heap import keep_freed_memory
-        from unitcad.pipeline.array_build import build_array
-        from unitcad.pipeline.build import build as build_spec
         from unitcad.pipeline.folder import PAGE, held
-        from unitcad.pipeline.subjects import subject_of, unit_of
-        from unitcad.validation import load
 
         keep_freed_memory()
         changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
@@ -117,18 +112,18 @@ def _built(
         # Every spec is validated before the first one is built.
         for spec in specs:
             confirm_known(spec)
-        wanted = [load_array(spec, changes) if is_array(spec) else load(spec, changes) for spec in specs]
+        wanted = [_loaded(spec, changes) for spec in specs]
         results: list[Built] = []
         printing = [""] * len(wanted)
         if slicing:
             from unitcad.pipeline.slicing import begin, check_slicing, finish, take
+            from unitcad.pipeline.subjects import subject_of, unit_of
 
             for spec in wanted:
                 check_slicing(unit_of(spec), chosen)
         for i, spec in enumerate(wanted):
-            run = partial(build_array, spec) if isinstance(spec, Array) else partial(build_spec, spec)
             with progress(spec.name) as say:
-                made = partial(run, out, only=chosen, check=not no_check, say=say, beside=beside)
+                made = partial(_builder(spec), out, only=chosen, check=not no_check, say=say, beside=beside)
                 if slicing:
                     with begin(unit_of(spec), out / subject_of(spec).folder_name, say) as pieces:
                         results.append(made(take=take(pieces)))
@@ -153,6 +148,30 @@ def _built(
     return all(result.ok for result in results)
 
 
+def _loaded(source: str, changes: Changes) -> Made:
+    """Load a spec or an array. What belongs to arrays alone takes long to import, and is for these only."""
+    from unitcad.arrays.array_names import is_array
+    from unitcad.validation import load
+
+    if not is_array(source):
+        return load(source, changes)
+    from unitcad.arrays.array_file import load_array
+
+    return load_array(source, changes)
+
+
+def _builder(of: Made) -> Callable[..., Built]:
+    """Return what builds a spec or an array."""
+    from unitcad.pipeline.build import build
+    from unitcad.spec import Spec
+
+    if isinstance(of, Spec):
+        return partial(build, of)
+    from unitcad.pipeline.array_build import build_array
+
+    return partial(build_array, of)
+
+
 def _beside(only: str | None, formats: str | None) -> Beside:
     """Return the processes beside a build, begun before anything else where what they make may be asked for."""
     from unitcad.pipeline.beside import started
@@ -164,15 +183,15 @@ def _beside(only: str | None, formats: str | None) -> Beside:
 
 def _summary(of: Made, built: Built) -> Iterator[str]:
     """Return the lines of a spec's or an array's result."""
-    from unitcad.arrays.array import Array
+    from unitcad.spec import Spec
 
-    if isinstance(of, Array):
-        from unitcad.cli.array_summary import array_summary
+    if isinstance(of, Spec):
+        from unitcad.cli.build_summary import summary
 
-        return array_summary(of, built)
-    from unitcad.cli.build_summary import summary
+        return summary(of, built)
+    from unitcad.cli.array_summary import array_summary
 
-    return summary(of, built)
+    return array_summary(of, built)
 
 
 def _print_faults(manifest: Manifest) -> None:

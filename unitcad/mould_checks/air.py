@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from manifold3d import Manifold
 
+from unitcad.geometry.arrays import distinct_values
 from unitcad.geometry.components import components
 from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
@@ -104,7 +105,7 @@ class _Boundary:
     def of(cls, solid: Manifold) -> _Boundary:
         vertices, faces = arrays(solid)
         sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges = np.stack(np.divmod(np.unique(sides[:, 0] * len(vertices) + sides[:, 1]), len(vertices)), axis=1)
+        edges = np.stack(np.divmod(distinct_values(sides[:, 0] * len(vertices) + sides[:, 1]), len(vertices)), axis=1)
         corners = vertices[faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

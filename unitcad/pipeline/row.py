@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from unitcad import catalogue
-from unitcad.arrays.array import Array
 from unitcad.pipeline.manifest_records import Manifest
-from unitcad.pipeline.subjects import Made, unit_of
+from unitcad.spec import Spec
+
+# What belongs to arrays alone takes long to import, and a unit's table does without.
+if TYPE_CHECKING:
+    from unitcad.pipeline.subjects import Made
 
 
 def row(of: Made, manifest: Manifest) -> dict[str, Any]:
     """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and edge level by model."""
-    spec = unit_of(of)
+    spec, array = (of, None) if isinstance(of, Spec) else (of.unit, of)
     densities = catalogue.materials(spec.materials)
     columns: dict[str, Any] = {"name": of.name, "design": spec.design, "diameter_mm": spec.diameter_mm}
-    if isinstance(of, Array):
-        columns |= {"array": of.construction, "units": len(of.places), "pitch_mm": round(of.pitch_mm, 3)}
+    if array:
+        columns |= {"array": array.construction, "units": len(array.places), "pitch_mm": round(array.pitch_mm, 3)}
     total = 0.0
     for part in manifest["parts"]:
         # An array's own silicone; its units' parts are named after their folders.
-        own = not isinstance(of, Array) or ":" not in part["name"]
+        own = not array or ":" not in part["name"]
         if own and part["role"] == "unit" and part["material"] is not None:
             # g/cm3 times mm3 is mg.
             mass = part["volume_mm3"] * float(densities[part["material"]].density_g_cm3) / 1000

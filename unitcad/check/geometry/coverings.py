@@ -14,7 +14,7 @@ from unitcad.check.geometry.predicates import orient3d
 from unitcad.check.geometry.topology import Topology, max_side_squared
 from unitcad.check.geometry.triangle_mesh import area_vectors, float32_steps
 from unitcad.check.geometry.volumes import side_by_side
-from unitcad.geometry.arrays import Bools, Floats, Ints, sorted_with_order
+from unitcad.geometry.arrays import Bools, Floats, Ints, distinct_values, sorted_with_order
 
 _BLOCK = 1 << 14  # pairs of faces that stay in the processor's cache
 _FLAT = 2.0  # float32 steps: a fold thinner than that has no thickness
@@ -73,7 +73,7 @@ def through_edges(turns: Turns | None, shells: Ints) -> Ints:
     np.minimum.at(low, of, level[between])
     np.maximum.at(high, of, level[between])
     evenly = np.add.reduceat(change, start) == 0
-    return turns.many[np.unique(group[start][(high - low > 1) & evenly])]
+    return turns.many[distinct_values(group[start][(high - low > 1) & evenly])]
 
 
 def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> Ints:

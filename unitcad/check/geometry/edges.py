@@ -10,7 +10,16 @@ from functools import cached_property
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, by_appearance, cross, distinct, order_of_packed
+from unitcad.geometry.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    by_appearance,
+    cross,
+    distinct,
+    distinct_values,
+    order_of_packed,
+)
 from unitcad.geometry.components import components, scipy_pays
 from unitcad.lean_import import postpone_tools
 
@@ -260,7 +269,7 @@ def _around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> Turns:
 def _order_within(size: Ints, starts: Ints, values: Floats) -> Ints:
     """Return the order of values by size within each of some groups that follow each other; equal ones stay."""
     order = np.arange(len(values))
-    for n in np.unique(size).tolist():
+    for n in distinct_values(size).tolist():
         places = starts[size == n][:, None] + np.arange(n)
         order[places] = np.take_along_axis(places, np.argsort(values[places], axis=1, kind="stable"), axis=1)
     return order

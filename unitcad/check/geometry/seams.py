@@ -11,7 +11,7 @@ import numpy as np
 
 from unitcad.check.geometry.edges import half_edges
 from unitcad.check.geometry.triangle_mesh import float32_steps, same_place
-from unitcad.geometry.arrays import Bools, Floats, Ints, extents
+from unitcad.geometry.arrays import Bools, Floats, Ints, distinct_values, extents
 from unitcad.geometry.boxes import box_pairs
 from unitcad.geometry.components import components
 
@@ -48,7 +48,7 @@ def join(vertices: Floats, faces: Ints, loose: Ints) -> Seams:
     place[loose] = loose[same_place(vertices[loose])]
     stored = place[faces]
     whole = _three(stored)
-    points = np.unique(place[loose])
+    points = distinct_values(place[loose])
     short = _shortest_edges(vertices, stored[whole], points)
     step = 2 * float32_steps(vertices[points])
     part = connected(stored, n)
@@ -103,7 +103,7 @@ def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
     """
     near = [np.empty((0, 2), np.int64)]
     level = np.ceil(np.log2(np.maximum(reach, 1e-300)) / 2)
-    for size in np.unique(level):
+    for size in distinct_values(level):
         some = np.flatnonzero(level >= size)
         if len(some) > 1:
             pairs = some[_within(points[some], float(4.0**size))]

@@ -13,7 +13,7 @@ from unitcad.check.geometry import edges as mesh_edges
 from unitcad.check.geometry import volumes
 from unitcad.check.geometry.edges import Edges, Turns
 from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
-from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, extent, sorted_with_order
+from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, distinct_values, extent, sorted_with_order
 from unitcad.geometry.ticks import Tick
 
 Found = tuple[Any, ...]
@@ -212,7 +212,7 @@ def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[In
     from unitcad.check.geometry.seams import connected, join, t_junctions  # most meshes are closed
 
     open_ = np.flatnonzero(edges.size == 1)
-    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])))
+    seams = join(vertices, faces, distinct_values(np.concatenate([edges.low[open_], edges.high[open_]])))
     joined, stored, whole = seams.joined, seams.stored, seams.whole
     if not whole.all():
         joined, stored, whole_kept = joined[whole], stored[whole], kept[whole]

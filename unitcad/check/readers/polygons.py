@@ -18,7 +18,7 @@ from unitcad.check.rules.f_file import F001, F002, F008, F013
 from unitcad.check.rules.f_limits import F011, Deadline, Limits
 from unitcad.check.rules.p_package import P011
 from unitcad.check.rules.v_values import faces_not_finite
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints, distinct_values
 
 FLAT = 1e-3  # F013: distance of a corner from the polygon's plane, as part of the polygon's size
 _CHUNK = 50_000  # corners looked at together
@@ -72,7 +72,7 @@ def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline, findings: li
     finite = ~used
     finite[used] = (np.abs(vertices[used]) <= LARGEST).all(axis=1)
     if not finite.all():
-        bad = np.unique(np.searchsorted(np.cumsum(sizes), np.flatnonzero(~finite[corners]), "right"))
+        bad = distinct_values(np.searchsorted(np.cumsum(sizes), np.flatnonzero(~finite[corners]), "right"))
         findings.append(faces_not_finite(len(bad), _places(source, bad)))
         return None
     faces, of, bent = _in_triangles(vertices, corners, sizes, deadline)
@@ -105,7 +105,7 @@ def _in_triangles(
     counts = np.maximum(sizes - 2, 0)
     first, offsets = np.cumsum(sizes) - sizes, np.cumsum(counts) - counts
     triangles = np.empty((int(counts.sum()), 3), corners.dtype)
-    for size in np.unique(sizes[sizes >= 3]).tolist():
+    for size in distinct_values(sizes[sizes >= 3]).tolist():
         alike = np.flatnonzero(sizes == size)
         step = max(1, _CHUNK // size)
         for at in range(0, len(alike), step):

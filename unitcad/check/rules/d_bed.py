@@ -17,6 +17,7 @@ from unitcad.check.geometry.volumes import winding_number
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
+from unitcad.geometry.arrays import distinct_values
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
@@ -49,7 +50,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 def _stands(topology: Topology) -> Iterator[Finding]:
     """Apply D005: lowest point at z = 0, and a flat there that faces down."""
     vertices, faces = topology.mesh.vertices, topology.mesh.faces
-    low = float(vertices[np.unique(faces), 2].min())
+    low = float(vertices[distinct_values(faces), 2].min())
     if abs(low) > ON_BED:
         yield D005.finding(f"lowest point at z = {number(low, 4)} mm")
         return

@@ -16,7 +16,7 @@ from unitcad.check.geometry.topology import Topology
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
-from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.arrays import Floats, Ints, distinct_values
 from unitcad.geometry.components import components
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
         return
     topology = part.topology
     mesh, areas = topology.mesh, topology.areas
-    bed = float(mesh.vertices[np.unique(mesh.faces), 2].min())
+    bed = float(mesh.vertices[distinct_values(mesh.faces), 2].min())
     double = np.sqrt(np.einsum("ij,ij->i", areas, areas))
     steep = -np.sin(np.radians(min(float(printer.overhang_deg) + _SLACK, 89.0)))
     leaning = areas[:, 2] < steep * double
@@ -60,7 +60,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     owner = region[np.where(leaning[left[rim]], left[rim], right[rim])]
     segments, supported = _border(topology, beyond, bed + float(printer.layer_mm) / 2)
     bad: list[tuple[float, Location]] = []
-    for label in np.unique(region[leaning]):
+    for label in distinct_values(region[leaning]):
         faces = np.flatnonzero(leaning & (region == label))
         area = float(double[faces].sum()) / 2
         part.tick()

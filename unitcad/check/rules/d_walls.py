@@ -16,7 +16,7 @@ from unitcad.check.geometry.rays import SLACK, Rays, cast, lying
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
-from unitcad.geometry.arrays import Floats
+from unitcad.geometry.arrays import Floats, distinct_values
 from unitcad.geometry.components import components
 
 if TYPE_CHECKING:
@@ -83,14 +83,14 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
     through = thin[marked[rays.across[thin]]]
     wall = components(n, patch[owner[through]], patch[rays.across[through]])
     thinnest: dict[int, tuple[float, Location]] = {}
-    for label in np.unique(group):
+    for label in distinct_values(group):
         mine = thin[group == label]
         of = owner[mine]
         cloud = np.concatenate([points[mine], topology.mesh.vertices[faces[of[whole[of]]]].reshape(-1, 3)])
         if _reach(cloud, bool(level[of[0]])) < upright:
             continue
         worst = mine[np.argmin(thickness[mine])]
-        first, region = int(topology.kept[owner[worst]]), topology.kept[np.unique(of)]
+        first, region = int(topology.kept[owner[worst]]), topology.kept[distinct_values(of)]
         place = Location(face=first, xyz=point(points[worst]), region=region)
         here = (float(thickness[worst]), place)
         thinnest[int(wall[label])] = min(here, thinnest.get(int(wall[label]), here), key=lambda item: item[0])

@@ -17,7 +17,7 @@ from unitcad.check.geometry.triangles import common_point
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_edges
 from unitcad.check.rules.rule import Rule
-from unitcad.geometry.arrays import Ints, among, distinct
+from unitcad.geometry.arrays import Ints, among, distinct, distinct_values
 
 G001 = Rule("""
     G001 error: self-crossing
@@ -108,7 +108,7 @@ def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterato
         begin, end = np.searchsorted(keys, [key, key + 1])
         shells = contact.shells_of(keys[begin : begin + 1])[0]
         x, y, z = (topology.low[shells].max(axis=0) + topology.high[shells].min(axis=0)).tolist()
-        return faces.original[np.unique(touching[begin:end])], (x / 2, y / 2, z / 2)
+        return faces.original[distinct_values(touching[begin:end])], (x / 2, y / 2, z / 2)
 
     places = _places(topology, faces, touching[first], region)
     yield G003.finding(f"{counted(n, 'pair')} of shells that touch", n, places)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from unitcad.check.findings import Facts, Finding, number
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
 from unitcad.check.units import UNITS_MM
-from unitcad.geometry.arrays import extent
+from unitcad.geometry.arrays import distinct_values, extent
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
@@ -55,7 +53,7 @@ def likely_unit(facts: Facts, unit: str | None) -> Iterator[Finding]:
 def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     """Apply S002 to the box of the mesh as it stands."""
     mesh = part.topology.mesh
-    low, high = extent(mesh.vertices[np.unique(mesh.faces)])
+    low, high = extent(mesh.vertices[distinct_values(mesh.faces)])
     size = high - low
     x, y, z = float(printer.bed_x_mm), float(printer.bed_y_mm), float(printer.bed_z_mm)
     upright = size[2] <= z

@@ -10,7 +10,7 @@ from unitcad.check.findings import Location, counted
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.check.rules.p_package import P011, P012, P017, P019
-from unitcad.geometry.arrays import Ints
+from unitcad.geometry.arrays import Ints, distinct_values
 
 _MATERIALS = ("basematerials", "compositematerials")
 _GROUPS = (*_MATERIALS, "colorgroup", "texture2dgroup", "multiproperties")
@@ -120,7 +120,7 @@ def _triangle_properties(model: Model, resource: Object, rows: Ints) -> None:
         model.add(P019, f"a triangle of {who} has p2 or p3 without p1")
     default = int(resource.attributes.get("pid", -1))
     pids = np.where(rows[:, 6] >= 0, rows[:, 6], default)
-    for pid in np.unique(pids):
+    for pid in distinct_values(pids):
         if pid < 0:
             continue
         group = _group(model, int(pid), resource.rank, f"a triangle of {who}")
