@@ -30,7 +30,7 @@ from unitcad.accuracy.runner import JOURNALS
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec.toml import text_of
 
-EXAMPLES = int(os.environ.get("UNITCAD_RANDOM_SPECS", "20"))
+EXAMPLES = int(os.environ.get("UNITCAD_RANDOM_SPECS", "10"))
 """Of both ranges; `unitcad accuracy --quick` builds forty more, the long study ten thousand."""
 
 

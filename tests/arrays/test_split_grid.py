@@ -37,6 +37,8 @@ ARRAYS = {
     "hexagon, y": ("hex-19", [f"{BED['y']}=80"]),
     "hexagon, x and y": ("hex-19", ["layout.rings=3", f"{BED['x']}=110", f"{BED['y']}=100"]),
 }
+MOSTLY = [pytest.param(name, marks=pytest.mark.long if name == "patch, x and y" else ()) for name in ARRAYS]
+"""A large patch takes half a minute and more, and the hexagons have seams along both axes too."""
 PIECES = {"patch, y": 2, "patch, x and y": 4, "hexagon, y": 2, "hexagon, x and y": 4}
 
 
@@ -46,7 +48,7 @@ def made(name: str) -> PatchMoulds:
     return patch_moulds(load_array(template, overrides))
 
 
-@pytest.mark.parametrize("name", ARRAYS)
+@pytest.mark.parametrize("name", MOSTLY)
 def test_every_mould_check_holds(name: str) -> None:
     assert [f for f in check_moulds(made(name)) if not f.ok] == []
     assert {len(each.pieces) for each in made(name).plan.splits} == {PIECES[name]}
@@ -96,7 +98,7 @@ def test_a_hexagons_seams_keep_clear_of_its_cores(name: str) -> None:
             assert all(between_convex(tooth.corners, [at]) >= radius + BESIDE - 1e-6 for tooth in seam.teeth)
 
 
-@pytest.mark.parametrize("name", ARRAYS)
+@pytest.mark.parametrize("name", MOSTLY)
 def test_the_silicone_in_the_seams_is_what_c250_measures(name: str) -> None:
     """What is refused by lengths and heights, and what is measured on meshes."""
     moulds = made(name)

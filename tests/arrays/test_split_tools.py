@@ -120,7 +120,10 @@ def test_what_pieces_have_beyond_their_tool_is_a_burr_and_no_overlap_of_theirs()
         assert found == [pytest.approx(beyond, abs=1e-6)]
 
 
-@pytest.mark.parametrize(("template", "codes"), [("wrist-band", {"C210", "C250"}), ("hex-19", {"C250"})])
+@pytest.mark.parametrize(
+    ("template", "codes"),
+    [("wrist-band", {"C210", "C250"}), pytest.param("hex-19", {"C250"}, marks=pytest.mark.long)],
+)
 def test_pieces_with_less_than_the_printers_play_are_caught(template: str, codes: set[str]) -> None:
     """A gap of 0.02 mm as asked for, on a printer that misses by 0.15 mm: its pieces would not slide together."""
     asked = ["moulds.plinth_clearance_mm=0.02", *(["layout.rings=6"] if template == "hex-19" else [])]
