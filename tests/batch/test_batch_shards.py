@@ -105,7 +105,7 @@ def test_shards_that_do_not_fit_together(tmp_path: Path) -> None:
     with pytest.raises(UnitcadError, match="there are no shards"):
         merge(out, [], BatchOptions())
     made(sweep, out, shard=Shard(1, 2))
-    with pytest.raises(UnitcadError, match="of 2 shards 1 are missing: 2/2"):
+    with pytest.raises(UnitcadError, match="of 2 shards 1 is missing: 2/2"):
         merge(out, shard_folders(out), BatchOptions())
     with pytest.raises(UnitcadError, match=r"is not a shard of a batch \(no shard.json\)"):
         merge(out, [out], BatchOptions())
@@ -126,6 +126,69 @@ def test_shards_that_do_not_fit_together(tmp_path: Path) -> None:
     assert not (out / "journal.jsonl").exists()
     with pytest.raises(UnitcadError, match="holds another batch"):  # another shard in a shard's folder
         made(ring_sweep(tmp_path / "s", heights=[2.0, 5.0], materials=2), out, shard=Shard(1, 2))
+
+
+def test_a_shard_is_refused_where_no_merge_could_take_it(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    made(sweep, out, shard=Shard(1, 2))
+    with pytest.raises(UnitcadError, match=r"holds shards of 2 \(shard-1-of-2\).* go on with --shard K/2"):
+        made(sweep, out, shard=Shard(3, 3))
+    assert [path.name for path in shard_folders(out)] == ["shard-1-of-2"]
+    made(ring_sweep(tmp_path / "t", heights=[5.0]), tmp_path / "other")
+    with pytest.raises(UnitcadError, match="holds another batch"):
+        made(sweep, tmp_path / "other", shard=Shard(1, 2))
+    assert not shard_folders(tmp_path / "other")
+    made(sweep, out, shard=Shard(2, 2))
+    merge(out, shard_folders(out), BatchOptions(folders=False))
+    assert made(sweep, out, shard=Shard(2, 2)).resumed == 2  # beside the batch that was merged of it
+
+
+@pytest.mark.parametrize("lost", ["packs", "content", "unitcad-store"])
+def test_a_merge_of_what_the_store_has_lost_leaves_nothing(
+    lost: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shared_store, "PAUSE_S", 0.0)
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    for number in (1, 2):
+        made(sweep, out, shard=Shard(number, 2))
+    kept = sorted(path for path in (out / "store" / lost).rglob("*") if path.is_file())
+    if lost == "content":
+        kept = kept[-1:]  # not all: some folders are made before it is missed
+    for path in kept or [out / "store" / lost]:
+        path.unlink()
+    before = sorted(out.iterdir())
+    for folders in (True, False) if lost != "content" else (True,):
+        record_packs.store_at.cache_clear()
+        with pytest.raises(UnitcadError, match=r"--verify makes again|there is no store"):
+            merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=folders))
+        assert sorted(out.iterdir()) == before
+
+
+def test_shards_can_be_moved_with_their_store(tmp_path: Path) -> None:
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0], materials=2)
+    for number in (1, 2):
+        made(sweep, tmp_path / "here", shard=Shard(number, 2))
+    (tmp_path / "here").rename(tmp_path / "there")
+    out = tmp_path / "there"
+    cache = DiskStore(tmp_path / "fresh")
+    assert merge(out, shard_folders(out), BatchOptions(folders=False)).ok == 2
+    out = out.rename(tmp_path / "elsewhere")
+    for batch in (out, out / "shard-1-of-2"):
+        folder = rows(batch)[0]["folder"]
+        assert export_variant(batch, folder, batch, cache).is_dir()
+
+
+def test_a_merge_takes_no_option_that_it_does_not_read(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "out"
+    made(sweep, out, shard=Shard(1, 1))
+    for words in (["--dry-run"], ["--limit", 3], ["-j", 2], ["--set", "a=1"], ["--store", "x"], ["--verify"]):
+        done = unitcad("batch", "merge", out, *words)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert "merge takes -o, --folders" in done.stderr
+        assert not (out / "journal.jsonl").exists()
+    done = unitcad("batch", "merge", out, "--report", "--table", "csv")
+    assert done.returncode == 0, done.stderr
+    assert (out / "report.html").is_file()
 
 
 def test_the_command_line_refuses_what_is_no_shard(tmp_path: Path) -> None:

@@ -258,11 +258,43 @@ def test_a_batch_whose_store_is_refused_leaves_nothing(tmp_path: Path) -> None:
     assert sorted((tmp_path / "there").iterdir()) == before
 
 
-@pytest.mark.parametrize(("store", "limit"), [("", "needs a folder"), ("memory://x", "in the memory of one process")])
-def test_a_store_that_workers_can_not_share_is_refused(store: str, limit: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("store", "jobs", "more", "limit"),
+    [
+        ("", 2, {}, "needs a folder"),
+        ("memory://x", 2, {}, "in the memory of one process"),
+        ("memory://x", 0, {"folders": False}, "ends with this process"),
+        ("memory://x", 0, {"shard": "1/2"}, "ends with this process"),
+        ("s3:/bucket/x", 0, {}, "an address begins with s3://"),
+    ],
+)
+def test_a_store_that_keeps_nothing_is_refused(store: str, jobs: int, more: Any, limit: str, tmp_path: Path) -> None:
     with pytest.raises(UnitcadError, match=limit):
-        unitcad.batch(ring_sweep(tmp_path), tmp_path / "out", only="unit", jobs=2, store=store)
+        unitcad.batch(ring_sweep(tmp_path), tmp_path / "out", only="unit", jobs=jobs, store=store, **more)
     assert not (tmp_path / "out").exists()
+
+
+class Elsewhere(SerialExecutor):
+    """Workers on a machine of their own: what they keep in a folder is not on the disk of this one."""
+
+    def __init__(self, store: Path) -> None:
+        self.store = store
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        done = super().submit(fn, *args, **kwargs)
+        for path in self.store.rglob("*"):
+            if path.is_file() and path.name != "unitcad-store":
+                path.unlink()
+        return done
+
+
+def test_results_on_the_disk_of_another_machine_are_not_taken_for_kept(tmp_path: Path) -> None:
+    sweep, store = ring_sweep(tmp_path / "s", heights=[2.0], materials=2), tmp_path / "store"
+    options = BatchOptions(("unit",), store=str(store), folders=False)
+    with pytest.raises(UnitcadError, match="have a disk of their own; name a store that they and this machine reach"):
+        run(load_sweep(sweep), tmp_path / "out", options, Elsewhere(store), workers=1, remote=True)
+    assert (tmp_path / "out" / "journal.jsonl").read_text().count("\n") == 1  # its head alone
+    assert run(load_sweep(sweep), tmp_path / "out", options, SerialExecutor(), workers=1, remote=True).ok == 2
 
 
 def test_content_that_stays_damaged_is_waited_for_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -127,6 +127,12 @@ def test_what_can_not_be_is_refused(table: dict, words: list[str]) -> None:
         assert word in str(refused.value)
 
 
+def test_in_a_zip_a_value_may_come_again() -> None:
+    sweep = _sweep({"mode": "zip", "layers.0.wall_mm": [1.2, 1.25, 1.2], "layers.1.wall_mm": [1.2, 1.25, 1.25]})
+    walls = [[layer.wall_mm for layer in sweep.spec(i).layers] for i in range(sweep.count)]
+    assert walls == [[1.2, 1.2], [1.25, 1.25], [1.2, 1.25]]
+
+
 def test_a_path_is_checked_against_every_base() -> None:
     with pytest.raises(Refusal, match=r"layers\.1"):
         _sweep({"layers.1.material": [SOFT]}, base=["encapsulating", "single-embedded"])
@@ -198,11 +204,37 @@ def test_dry_run_counts_and_makes_nothing(tmp_path: Path) -> None:
     made = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0)
     assert made.returncode == 0, made.stderr
     files = [f for f in (tmp_path / "out").rglob("*") if f.is_file() and f.parent != tmp_path / "out"]
-    assert preview["files"] == len(files)
+    assert preview["files"] == len(files) + 2  # and the tables
     linked = sum(f.stat().st_size for f in files)
     assert preview["linked_mb"] == pytest.approx(linked / 1e6, rel=0.2)
     stored = sum({f.stat().st_ino: f.stat().st_size for f in files}.values())
     assert preview["stored_mb"] == pytest.approx(stored / 1e6, rel=0.2)
+
+
+def test_a_dry_run_counts_what_there_will_be(tmp_path: Path) -> None:
+    """Of a shard, of a batch without folders, and of estimates alone, against what is made."""
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=5)
+    asked = {
+        "part": (sweep, "--only", "unit", "--shard", "1/5"),
+        "stored": (sweep, "--only", "unit", "--no-folders"),
+        "table": ("thickness", "--only", "estimate", "--table", "csv"),
+    }
+    for name, words in asked.items():
+        out = tmp_path / name
+        tried = unitcad("batch", *words, "-o", out, "--dry-run", "--json", "--allow-code")
+        assert tried.returncode == 0, tried.stderr
+        preview = json.loads(tried.stdout)
+        made = unitcad("batch", *words, "-o", out, "-j", 0, "--json")
+        assert made.returncode == 0, made.stderr
+        assert preview["variants"] == json.loads(made.stdout)["variants"]
+        store = [f for f in out.rglob("*") if f.is_file() and "store" in f.parts and f.name != "unitcad-store"]
+        tables = [f for f in out.rglob("*") if f.name in ("variants.csv", "batch.json")]
+        # A geometry's first variants are a pack of their own.
+        assert len(store + tables) - 3 <= preview["files"] <= len(store + tables)
+        size = sum(f.stat().st_size for f in store + tables) / 1e6
+        assert preview["stored_mb"] == pytest.approx(size, rel=0.5), name
+    done = unitcad("batch", sweep, "-o", tmp_path / "none", "--shard", "1/100", "--dry-run", "--json", "--allow-code")
+    assert json.loads(done.stdout)["variants"] == 0
 
 
 def test_dry_run_tells_what_can_not_be() -> None:

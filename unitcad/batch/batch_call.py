@@ -18,12 +18,13 @@ from unitcad.batch.estimate_table import write_estimates
 from unitcad.batch.executors import Workers
 from unitcad.batch.parquet_table import read_parquet
 from unitcad.batch.results import TABLES
-from unitcad.batch.run import Watch, run, trim
-from unitcad.batch.shards import shard_of
+from unitcad.batch.run import Watch, batch_head, run, trim
+from unitcad.batch.shards import expect_room, shard_of
 from unitcad.batch.sweep import Sweep, load_sweep
 from unitcad.errors import WrongArgument, unknown_name
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.folder import STORE
+from unitcad.pipeline.product import checked_outputs
 from unitcad.spec.asked import Format
 from unitcad.text import toml
 from unitcad.validation import Changes
@@ -77,11 +78,21 @@ def make(
     """
     if options.store == "":
         raise WrongArgument("store", "", "needs a folder or an address", "store")
-    if options.store and options.store.startswith("memory://") and workers.jobs != 0:
-        raise WrongArgument("store", options.store, "is in the memory of one process: leave it out, or use jobs = 0")
+    if options.store and options.store.startswith("memory://"):
+        if workers.jobs != 0:
+            raise WrongArgument("store", options.store, "is in the memory of one process: leave it out, or jobs = 0")
+        if options.shard or options.folders is False:
+            raise WrongArgument("store", options.store, "ends with this process: each variant needs a folder then")
+    if options.folders is False and workers.scheduler is not None and options.store is None and not options.shard:
+        why = "results of a cluster go to folders here, or with --store to a store: name one, or leave it out"
+        raise WrongArgument("folders", False, why)
+    if options.folders and options.only == ("estimate",) and not sweep.of_arrays:
+        raise WrongArgument("folders", True, "estimates alone are one table: leave it out")
     if options.shard:
         if options.only == ("estimate",):
             raise WrongArgument("shard", str(options.shard), "estimates alone are one table: leave it out")
+        whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
+        expect_room(folder, options.shard, whole.batch)
         store = options.store or str((folder / STORE).absolute())
         folder, options = folder / options.shard.folder, replace(options, store=store, folders=bool(options.folders))
     if options.only == ("estimate",) and not sweep.of_arrays:

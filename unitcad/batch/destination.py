@@ -12,6 +12,7 @@ from unitcad.batch.batch_records import JournalEntry
 from unitcad.batch.record_packs import intact, packed_specs
 from unitcad.batch.task import Task, VariantOutcome
 from unitcad.cache import DiskStore, SharedStore, digest
+from unitcad.errors import UnitcadError
 from unitcad.pipeline.folder import whole
 
 
@@ -60,11 +61,15 @@ class Folders:
 class InStore:
     """A store that workers write to; only rows pass through the parent.
 
-    With `cache`, a folder on the disk of workers and parent, work is shared by it, else by the store.
+    With `cache`, a folder on the disk of workers and parent, work is shared by it, else by the store. Workers that run
+    `apart`, on machines of their own, may have another disk where the parent has a folder: what they say that they
+    keep there is looked for.
     """
 
-    def __init__(self, store: SharedStore, verify: bool, cache: DiskStore | None) -> None:
+    def __init__(self, store: SharedStore, verify: bool, cache: DiskStore | None, *, apart: bool = False) -> None:
         self.store, self.verify, self.cache = store, verify, cache
+        self.folder = apart and store.in_folder
+        self._seen: str = ""
         store.claim()
 
     @cached_property
@@ -88,6 +93,14 @@ class InStore:
         return replace(task, jobs=jobs, specs=specs, store=self.store.address, cache=cache)
 
     def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
+        place = outcome.record
+        if self.folder and place is not None and place.pack != self._seen:
+            if (self.store.size(place.pack, "packs") or 0) < place.end:
+                raise UnitcadError(
+                    f"--store {self.store.address}: the workers' results are not in this folder: they have a disk of "
+                    "their own; name a store that they and this machine reach, such as s3://bucket/path"
+                )
+            self._seen = place.pack
         return outcome
 
 

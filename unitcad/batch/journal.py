@@ -163,6 +163,16 @@ class Journal:
                     yield line, entry
 
 
+def batch_in(out: Path) -> str | None:
+    """Return the identity of the batch whose journal is in a folder; None where there is none, or a damaged one."""
+    try:
+        with open(out / JOURNAL, "rb") as file:
+            head = _head(file.readline(LONGEST))
+    except OSError:
+        return None
+    return None if head is None else head["batch"]
+
+
 def _lines(file: IO[bytes]) -> Iterator[bytes]:
     """Yield the rest of a file by lines; a last one without its line end gets one."""
     while line := file.readline(LONGEST):

@@ -2,35 +2,41 @@
 
 from __future__ import annotations
 
+import shutil
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import Summary
 from unitcad.batch.journal import Journal
-from unitcad.batch.result_folders import folders_wanted, make_folders, note_store
+from unitcad.batch.result_folders import folders_wanted, found_at, lost, make_folders, note_store
 from unitcad.batch.results import columns_of, write_results
 from unitcad.batch.run import count_entry
 from unitcad.batch.shards import ShardRecord, read_shards, shard_folders
 from unitcad.batch.unread_keys import swept_estimate
 from unitcad.batch.unread_keys import warnings as unread_warnings
-from unitcad.cache import DiskStore, SharedStore, default_root
+from unitcad.cache import DiskStore, MissingContent, SharedStore, default_root
 from unitcad.errors import UnitcadError
+from unitcad.pipeline.folder import ADDRESS, STORE
 
 
 def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     """Put the shards in `folders` together as one batch in `out`: its journal, its tables and, if wanted, its folders.
 
     The result is that of the same sweep without shards. Of `options` those of folders, tables and cache count. Raises
-    UnitcadError where shards are missing, not finished, or of different batches; nothing is then written.
+    UnitcadError where shards are missing, not finished, or of different batches, and where their store has lost
+    something; nothing new is then left in `out`.
     """
     start = time.perf_counter()
     shards = read_shards(folders)
     first = shards[0][1]
-    _expect_finished(shards)
+    stores = {folder: SharedStore(found_at(folder, record.store)) for folder, record in shards}
+    _expect_finished(shards, stores)
     summary = Summary(first.variants)
-    journal = Journal(out, first.head, first.code, beside={"store", *(f.name for f in shard_folders(out))})
+    noted_before = (out / ADDRESS).exists()
+    journal = Journal(out, first.head, first.code, beside={STORE, *(f.name for f in shard_folders(out))})
+    fresh: list[Path] = []
     try:
         for folder, record in shards:
             with _opened(folder, record) as part:
@@ -40,16 +46,15 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
                         journal.add(entry)
         for entry in journal.entries():
             count_entry(summary, entry.status, lambda entry=entry: entry)
-        stores = {record.store for _, record in shards}
-        if len(stores) == 1:
-            note_store(out, *stores)
+        if len({store.address for store in stores.values()}) == 1:
+            note_store(out, stores[folders[0]].address)
         if folders_wanted(options, first.variants):
             cache = DiskStore(options.cache or default_root())
             try:
-                for _, record in shards:
+                for folder, record in shards:
                     entries = filter(None, map(journal.entry, record.indices))
-                    maker = f"the sweep with --shard {record.number}/{record.of} and"
-                    make_folders(out, entries, SharedStore(record.store), cache, maker)
+                    for made in make_folders(out, entries, stores[folder], cache, _maker(record)):
+                        fresh.append(made)  # one by one: what is made before an error is removed
             finally:
                 cache.close()
         found = swept_estimate(first.sweep, first.variants) if "estimate" in first.head.outputs else None
@@ -57,6 +62,13 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
         write_results(
             out, columns_of(first.sweep, journal), journal.entries, first.head, found, options.tables, first.variants
         )
+    except UnitcadError:
+        for made in fresh:
+            shutil.rmtree(made, ignore_errors=True)
+        if not noted_before:
+            (out / ADDRESS).unlink(missing_ok=True)
+        journal.abandon()
+        raise
     finally:
         journal.close()
     summary.seconds = round(time.perf_counter() - start, 3)
@@ -67,13 +79,27 @@ def _opened(folder: Path, record: ShardRecord) -> Journal:
     return Journal(folder, record.shard_head, record.code, first=record.indices.start)
 
 
-def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]]) -> None:
-    """Raise UnitcadError for a shard in which a variant is missing, or in which a batch is running."""
+def _maker(record: ShardRecord) -> str:
+    return f"the sweep with --shard {record.number}/{record.of} and"
+
+
+def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping[Path, SharedStore]) -> None:
+    """Raise UnitcadError for a shard in which a variant is missing or a batch is running, or whose records are gone."""
+    packs: dict[str, dict[str, int]] = {}
     for folder, record in shards:
+        store = stores[folder]
         with _opened(folder, record) as part:
             missing = [index for index in record.indices if part.own(index) is None]
-        if missing:
-            raise UnitcadError(
-                f"{folder}: {len(missing)} of {len(record.indices)} variants are not made yet, the first is variant "
-                f"{missing[0]}; the shard's own command resumes it"
-            )
+            if missing:
+                raise UnitcadError(
+                    f"{folder}: {len(missing)} of {len(record.indices)} variants are not made yet, the first is "
+                    f"variant {missing[0]}; the shard's own command resumes it"
+                )
+            if store.address not in packs:
+                store.expect()
+                packs[store.address] = store.sizes("packs")
+            for entry in part.entries():
+                place = entry.record
+                if place is not None and packs[store.address].get(place.pack, 0) < place.end:
+                    gone = MissingContent(f"pack {place.pack[:12]} is not in {store.address}, or cut there")
+                    raise lost(entry, gone, _maker(record))

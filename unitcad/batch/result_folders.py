@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from unitcad.cache import DiskStore, MissingContent, SharedStore
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.pipeline.folder import ADDRESS, STORE, placing, whole
 
+_HALF = re.compile(r"([a-z][a-z0-9+.-]+):")
 FOLDERS_BELOW = 1000
 """Variants below which each has a folder, unless asked otherwise."""
 
@@ -31,7 +33,7 @@ def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskS
     """Return where the results of a batch in `out` go. Raises UnitcadError for a store that can't be used."""
     if options.store is not None:
         address = absolute(options.store)
-        store = InStore(SharedStore(address), options.verify, None)
+        store = InStore(SharedStore(address), options.verify, None, apart=remote)
         note_store(out, address)
         return store
     if remote:
@@ -43,7 +45,18 @@ def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskS
 
 def note_store(out: Path, address: str) -> None:
     """Write into a batch's folder where its store is. Raises OSError."""
-    files.write(out / ADDRESS, json.dumps({"store": address}).encode() + b"\n")
+    files.write(out / ADDRESS, json.dumps({"store": noted(out, address)}).encode() + b"\n")
+
+
+def noted(out: Path, address: str) -> str:
+    """Return a store's address as a batch in `out` notes it: beside the batch or in it, so that both can be moved."""
+    near = {str((place / STORE).absolute()): way for place, way in ((out, STORE), (out.parent, f"../{STORE}"))}
+    return near.get(address, address)
+
+
+def found_at(out: Path, address: str) -> str:
+    """Return the address that a batch in `out` has `noted`."""
+    return absolute(address if "://" in address else os.path.normpath(out / address))
 
 
 def folders_wanted(options: BatchOptions, variants: int) -> bool:
@@ -56,8 +69,8 @@ _BATCH = "the same batch with"
 
 def make_folders(
     out: Path, entries: Iterable[JournalEntry], store: SharedStore, cache: DiskStore, maker: str = _BATCH
-) -> None:
-    """Make the folders in `out` that are not there, or not whole, of variants that are in a store.
+) -> Iterator[Path]:
+    """Make the folders in `out` that are not there, or not whole, of variants that are in a store; yield each.
 
     Raises UnitcadError for what the store has lost, which the `maker` makes again, OSError.
     """
@@ -72,10 +85,12 @@ def make_folders(
             try:
                 export(store, entry.record, out / entry.folder, cache, partial(placing, scratch=scratch))
             except MissingContent as error:
-                raise _lost(entry, error, maker) from None
+                raise lost(entry, error, maker) from None
+            yield out / entry.folder
 
 
-def _lost(entry: JournalEntry, error: MissingContent, maker: str) -> UnitcadError:
+def lost(entry: JournalEntry, error: MissingContent, maker: str = _BATCH) -> UnitcadError:
+    """Return the error for a variant whose record or content a store has lost; the `maker` makes it again."""
     return UnitcadError(f"variant {entry.index}: {error}; {maker} --verify makes again what is missing")
 
 
@@ -86,12 +101,21 @@ def export_variant(batch: Path, wanted: str, out: Path, cache: DiskStore, addres
     several; UnitcadError for a batch without a store, and for what the store has lost; OSError.
     """
     entry, place = _stored(batch, wanted)
-    out.mkdir(parents=True, exist_ok=True)
+    store = _store_of(batch, address)
     try:
-        export(_store_of(batch, address), place, out / entry.folder, cache)
+        read_record(store, place)  # before there is a folder
+        out.mkdir(parents=True, exist_ok=True)
+        export(store, place, out / entry.folder, cache)
     except MissingContent as error:
-        raise _lost(entry, error, _BATCH) from None
+        raise lost(entry, error, _BATCH) from None
+    except (FileExistsError, NotADirectoryError):
+        raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o") from None
     return out / entry.folder
+
+
+def check_stored(batch: Path, wanted: str) -> None:
+    """Raise what `export_variant` raises for a hash, without asking the store."""
+    _stored(batch, wanted)
 
 
 def stored_spec(batch: Path, folder: str) -> str:
@@ -116,8 +140,10 @@ def _stored(batch: Path, wanted: str) -> tuple[JournalEntry, RecordPlace]:
 def _store_of(batch: Path, address: str | None = None) -> SharedStore:
     """Return the store that a batch names, else the one at `address`, else its own."""
     if address is None and (batch / ADDRESS).is_file():
-        address = str(files.read_json(batch / ADDRESS)["store"])
-    return SharedStore(absolute(address or str(batch / STORE)))
+        address = found_at(batch, str(files.read_json(batch / ADDRESS)["store"]))
+    store = SharedStore(absolute(address or str(batch / STORE)))
+    store.expect()
+    return store
 
 
 def _entry_of(batch: Path, wanted: str) -> JournalEntry:
@@ -145,5 +171,14 @@ def _entry_of(batch: Path, wanted: str) -> JournalEntry:
 
 
 def absolute(address: str) -> str:
-    """Return a store's address as every process may use it: a path from the root."""
-    return address if "://" in address else str(Path(address).absolute())
+    """Return a store's address as every process may use it: a path from the root.
+
+    Raises WrongArgument for half a one, such as s3:/bucket.
+    """
+    scheme, parted, path = address.partition("://")
+    if parted and len(scheme) > 1 and scheme not in ("file", "local"):
+        return address
+    if not parted and (half := _HALF.match(address)):
+        why = f"an address begins with {half[1]}://; a folder of that name is ./{address}"
+        raise WrongArgument("store", address, why, address.replace(":", "://", 1).replace(":///", "://"))
+    return str(Path(path if parted else address).absolute())

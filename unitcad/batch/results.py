@@ -40,8 +40,7 @@ def write_results(
     With None these are CSV and JSON below MOST_ROWS `variants`, else Parquet where its extra is installed. `entries`
     gives the variants in the sweep's order, one at a time. Raises Missing for Parquet without the extra, OSError.
     """
-    if asked is None:
-        asked = ("csv", "json") if variants < MOST_ROWS or not can_write() else ("parquet",)
+    asked = tables_of(variants, asked)
     wanted = {name for name, file in TABLES.items() if name in asked or (out / file).is_file()}
     levels = {"estimate": to_builtins(estimate)} if estimate else {}
     whole = {**to_builtins(head), **levels, "columns": columns}
@@ -51,6 +50,13 @@ def write_results(
         _write_csv(out / TABLES["csv"], columns, entries())
     if "json" in wanted:
         _write_json(out / TABLES["json"], whole, entries())
+
+
+def tables_of(variants: int, asked: Collection[str] | None) -> Collection[str]:
+    """Return the names of a batch's tables: those `asked` for; with None by the number of variants."""
+    if asked is not None:
+        return asked
+    return ("csv", "json") if variants < MOST_ROWS or not can_write() else ("parquet",)
 
 
 def write_timings(out: Path, summary: Summary, workers: int) -> None:

@@ -20,7 +20,7 @@ from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import BatchHead, Failure, JournalEntry, Summary
 from unitcad.batch.destination import Destination, InStore
 from unitcad.batch.journal import JOURNAL, Journal
-from unitcad.batch.result_folders import absolute, destination_of, folders_wanted, make_folders
+from unitcad.batch.result_folders import absolute, destination_of, folders_wanted, make_folders, noted
 from unitcad.batch.results import columns_of, write_results, write_timings
 from unitcad.batch.shards import Shard, ShardRecord, write_shard
 from unitcad.batch.sweep import MOST, Sweep
@@ -84,12 +84,13 @@ def run(
     try:
         clear_leftovers(out)
         if options.shard:
-            write_shard(out, shard_record(sweep, head, options, count))
+            write_shard(out, shard_record(out, sweep, head, options, count))
         batch.all()
         if batch.lost:
             clear_leftovers(out)
         if isinstance(destination, InStore) and folders_wanted(options, summary.variants):
-            make_folders(out, journal.entries(), destination.store, cache)
+            for _ in make_folders(out, journal.entries(), destination.store, cache):
+                pass
         estimated = "estimate" in head.outputs and not options.shard  # of a shard nothing can be said
         found = swept_estimate(sweep, summary.variants) if estimated else None
         summary.warnings += unread_warnings(found)
@@ -216,7 +217,7 @@ class _Batch:
             first = self.seen.setdefault(int(subject_of(spec).folder_name[-12:], 16), index)
             if first != index:
                 self.journal.add(JournalEntry(index=index, same_as=first, values=self.sweep.values(index)[1]))
-                self._finished(VariantOutcome(index, tasks.OK), fresh=False)
+                self._finished(VariantOutcome(index, tasks.OK), fresh=False, before=entry is not None)
                 continue
             key = key_of(spec, self.only, self.options.check)
             self.groups.setdefault(key, _GeometryJobs()).jobs.append(
@@ -304,7 +305,8 @@ class _Batch:
         self.tried.discard(outcome.index)
         self._finished(self.destination.take(outcome, key))
 
-    def _finished(self, outcome: VariantOutcome, fresh: bool = True) -> None:
+    def _finished(self, outcome: VariantOutcome, fresh: bool = True, before: bool = True) -> None:
+        """Count a variant that has ended, and note it if it is `fresh`; others are from `before`, or another's twin."""
         summary = self.summary
         if fresh:
             self.journal.add(
@@ -319,7 +321,7 @@ class _Batch:
                     record=outcome.record,
                 )
             )
-        summary.resumed += not fresh
+        summary.resumed += before and not fresh
         summary.reused += bool(fresh and outcome.reused and not outcome.built)
         count_entry(summary, outcome.status, lambda: self.journal.entry(outcome.index))
         # A refusal concerns one variant only; a failure may happen to each.
@@ -340,7 +342,7 @@ def count_entry(summary: Summary, status: str, entry: Callable[[], JournalEntry 
         summary.failures.append(Failure(found.index, found.status, found.reason, found.folder))
 
 
-def shard_record(sweep: Sweep, head: BatchHead, options: BatchOptions, count: int) -> ShardRecord:
+def shard_record(out: Path, sweep: Sweep, head: BatchHead, options: BatchOptions, count: int) -> ShardRecord:
     """Return what the folder of a shard says of it: the head is that of the batch without shards."""
     assert options.shard
     whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
@@ -351,7 +353,7 @@ def shard_record(sweep: Sweep, head: BatchHead, options: BatchOptions, count: in
         head=whole,
         shard_head=head,
         code=code_version(),
-        store=absolute(options.store or ""),
+        store=noted(out, absolute(options.store or "")),
         sweep=replace(sweep, written=()),  # paths of this machine
     )
 

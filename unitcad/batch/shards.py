@@ -15,6 +15,7 @@ import msgspec
 
 from unitcad import files
 from unitcad.batch.batch_records import BatchHead
+from unitcad.batch.journal import batch_in
 from unitcad.batch.sweep import Sweep
 from unitcad.errors import UnitcadError, WrongArgument
 
@@ -30,6 +31,9 @@ class Shard:
 
     number: int
     of: int
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.of}"
 
     @property
     def folder(self) -> str:
@@ -85,6 +89,23 @@ def shard_folders(out: Path) -> list[Path]:
     return sorted(path for path in out.glob("shard-*-of-*") if _FOLDER.fullmatch(path.name) and path.is_dir())
 
 
+def expect_room(out: Path, shard: Shard, batch: str) -> None:
+    """Raise UnitcadError where `out` holds another batch than this one, or shards of another number, finished or not.
+
+    What a merge would refuse is refused before anything is made.
+    """
+    held = batch_in(out)
+    if held not in (None, batch):
+        raise UnitcadError(f"{out}: holds another batch, so shards can not be merged there; choose another with -o")
+    for other in shard_folders(out):
+        of = int(other.name.rpartition("-")[2])
+        if of != shard.of:
+            raise UnitcadError(
+                f"{out}: holds shards of {of} ({other.name}), with which one of {shard.of} can't be merged; go on with "
+                f"--shard K/{of}, or choose another folder with -o"
+            )
+
+
 def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     """Return the records of all shards of one batch, in order.
 
@@ -108,7 +129,7 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
         if (record.head.batch, record.of, record.variants) != (first.head.batch, first.of, first.variants):
             raise UnitcadError(
                 f"{folder}: is a shard of another batch than {first_folder} (sweep, options or number of shards); "
-                "delete one of them, or name the folders of the shards to merge"
+                "name the folders of the shards to merge"
             )
         if record.code != first.code:
             raise UnitcadError(f"{folder}: was made by unitcad {record.code}, {first_folder} by {first.code}")
@@ -119,5 +140,6 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     missing = [number for number in range(1, of + 1) if number not in records]
     if missing:
         named = ", ".join(f"{number}/{of}" for number in missing[:5]) + (" ..." if len(missing) > 5 else "")
-        raise UnitcadError(f"of {of} shards {len(missing)} are missing: {named}; run them with --shard, then merge")
+        are = "is" if len(missing) == 1 else "are"
+        raise UnitcadError(f"of {of} shards {len(missing)} {are} missing: {named}; run them with --shard, then merge")
     return [records[number] for number in sorted(records)]

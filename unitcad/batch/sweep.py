@@ -251,7 +251,7 @@ def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
         for path, value in file.fixed.items():
             check_path(path, bases[base], "set")
             put(bases[base], path, value)
-    axes = tuple(Axis(path, _values(path, given)) for path, given in values.items())
+    axes = tuple(Axis(path, _values(path, given, table.mode)) for path, given in values.items())
     cases = tuple(
         (case.base or named[0], {"name": case.name, **values} if case.name else values) for case, values in typed
     )
@@ -284,8 +284,11 @@ def _read_base(base: str, folder: Path) -> dict[str, Any]:
     return data
 
 
-def _values(path: str, given: Any) -> Sequence[Any] | Range:
-    """Return the values of an axis: a scalar or a table counts as one, a table with a range's keys as a range."""
+def _values(path: str, given: Any, mode: Mode) -> Sequence[Any] | Range:
+    """Return the values of an axis: a scalar or a table counts as one, a table with a range's keys as a range.
+
+    In a product each differs from the others. In a zip one may come again, beside another value of another axis.
+    """
     if isinstance(given, dict) and given.keys() & fields_of(Range).keys():
         given = convert(given, Range, f"sweep.{path}")
     values = given if isinstance(given, list | Range) else [given]
@@ -297,7 +300,7 @@ def _values(path: str, given: Any) -> Sequence[Any] | Range:
         return values
     seen = [json.dumps(value) for value in values]
     twice = next((value for value, text in zip(values, seen, strict=True) if seen.count(text) > 1), None)
-    if len(set(seen)) < len(seen) and len(seen) <= 10_000:
+    if mode != "zip" and len(set(seen)) < len(seen) and len(seen) <= 10_000:
         raise Refusal(f"sweep.{path}", twice, "is there twice")
     return values
 

@@ -109,7 +109,9 @@ class FsspecObjects:
             self.fs, self.root = fsspec.core.url_to_fs(address, **options)
         except ImportError as error:
             raise Missing(f"--store {address}: {error}") from None
-        except (ValueError, TypeError, OSError) as error:
+        except OSError as error:
+            raise UnitcadError(f"--store {address}: can't be reached ({error})") from None
+        except (ValueError, TypeError) as error:
             raise UnitcadError(f"--store {address}: not an address of a store ({error})") from None
 
     def get(self, name: str, start: int = 0, end: int | None = None) -> bytes:

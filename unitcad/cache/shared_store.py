@@ -45,6 +45,11 @@ class SharedStore:
         self._there: set[str] = set()
         self._damaged: set[tuple[str, int]] = set()
 
+    @property
+    def in_folder(self) -> bool:
+        """Whether it is a folder, which another machine may have of its own."""
+        return isinstance(self.objects, FolderObjects)
+
     def claim(self) -> None:
         """Make the place a store. Raises UnitcadError where it can't be reached, or holds something else."""
         try:
@@ -59,6 +64,14 @@ class SharedStore:
         except OSError as error:
             raise UnitcadError(f"--store {self.address}: can't be reached ({_line(error)})") from None
 
+    def expect(self) -> None:
+        """Raise UnitcadError where there is no store at the address, or it can't be reached."""
+        try:
+            if _tried(lambda: self.objects.size(MARK), 2) is None:
+                raise UnitcadError(f"{self.address}: there is no store of unitcad")
+        except OSError as error:
+            raise UnitcadError(f"{self.address}: can't be reached ({_line(error)})") from None
+
     def keep(self, content: bytes, *, kind: str = "content", anew: bool = False) -> str:
         """Keep content; return its SHA-256 (hex). What is there is not written again, unless `anew`."""
         sha256 = digest(content)
@@ -70,6 +83,10 @@ class SharedStore:
             _tried(lambda: self.objects.create(name, content))
         self._there.add(name)
         return sha256
+
+    def size(self, sha256: str, kind: str = "content") -> int | None:
+        """Return the bytes of what is there of a kind; None where there is nothing."""
+        return _tried(lambda: self.objects.size(_name(kind, sha256)))
 
     def noted(self, sha256: str) -> bool:
         """Tell whether this process knows that content is there, without asking."""

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 
 def batch(
+    ctx: typer.Context,
     sweep: Annotated[
         str, typer.Argument(metavar="SWEEP", help="A sweep file, or the name of a shipped one; or merge, and shards.")
     ],
@@ -107,13 +108,14 @@ def batch(
     from unitcad.batch.preview import preview
     from unitcad.batch.shards import shard_of
     from unitcad.cli.batch_progress import watching
-    from unitcad.cli.output import print_json, progress
+    from unitcad.cli.output import print_json
     from unitcad.errors import Refusal
-    from unitcad.pipeline.folder import PAGE
 
     named = listed(table) if table is not None else None
     if sweep == "merge":
-        _merge(shards or [], out, BatchOptions(folders=folders, cache=cache, tables=checked_tables(named)), as_json)
+        _confirm_merges(ctx)
+        options = BatchOptions(folders=True if page else folders, cache=cache, tables=checked_tables(named, page))
+        _merge(shards or [], out, options, page, as_json)
         return
     if shards:
         raise typer.BadParameter(f"one sweep a batch; {shards[0]} is one too many.", param_hint="SWEEP")
@@ -139,12 +141,7 @@ def batch(
     except KeyboardInterrupt:
         typer.echo(f"interrupted: finished variants stay in {made}; the same command resumes", err=True)
         sys.exit(130)
-    if page or (made / PAGE).is_file():
-        from unitcad.report import write_report
-
-        with progress(wanted.slug) as say:
-            say("page")
-            write_report(made, warn)
+    _write_page(made, page)
     if as_json:
         print_json({"folder": str(made), **to_builtins(summary)})
     elif not json_lines:
@@ -153,7 +150,24 @@ def batch(
         sys.exit(1)
 
 
-def _merge(named: list[Path], out: Path | None, options: BatchOptions, as_json: bool) -> None:
+_OF_MERGE = ("sweep", "shards", "out", "folders", "cache", "table", "page", "as_json")
+"""Parameters of the command that a merge reads; the others are the shards' own."""
+
+
+def _confirm_merges(ctx: typer.Context) -> None:
+    """Raise WrongArgument for an option that a merge would not read."""
+    from unitcad.errors import WrongArgument
+
+    for parameter in ctx.command.params:
+        source = ctx.get_parameter_source(parameter.name or "")
+        if parameter.name not in _OF_MERGE and source is not None and source.name == "COMMANDLINE":
+            taken = "-o, --folders, --no-folders, --cache, --table, --report and --json"
+            raise WrongArgument(
+                max(parameter.opts, key=len).lstrip("-"), None, f"goes with a sweep; merge takes {taken}"
+            )
+
+
+def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: bool, as_json: bool) -> None:
     """Join shards as one batch: in the folder that holds them, or in `out`."""
     from msgspec import to_builtins
 
@@ -164,12 +178,26 @@ def _merge(named: list[Path], out: Path | None, options: BatchOptions, as_json: 
     folders = [each for path in named for each in (shard_folders(path) or [path])]
     whole = out or (folders[0].parent if folders else Path())
     summary = merge(whole, folders, options)
+    _write_page(whole, page)
     if as_json:
         print_json({"folder": str(whole), **to_builtins(summary)})
     else:
         _print_summary(summary, whole)
     if summary.failed:
         sys.exit(1)
+
+
+def _write_page(folder: Path, asked: bool) -> None:
+    """Write a batch's page where it is asked for; one that is there is kept up."""
+    from unitcad.cli.output import progress
+    from unitcad.pipeline.folder import PAGE
+
+    if asked or (folder / PAGE).is_file():
+        from unitcad.report import write_report
+
+        with progress(folder.name) as say:
+            say("page")
+            write_report(folder, warn)
 
 
 def _print_summary(summary: Summary, folder: Path) -> None:

@@ -43,7 +43,8 @@ def gc(
 @cache.command("export")
 def export(
     hashes: Annotated[
-        list[str], typer.Argument(metavar="HASH...", help="The end of a variant's folder, or its begin.")
+        list[str],
+        typer.Argument(metavar="HASH...", help="The hash at the end of a variant's folder, or how it begins."),
     ],
     batch: Annotated[Path, typer.Option("--batch", help="The batch's folder.")] = Path(),
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Where the folders go; else to the batch.")] = None,
@@ -51,9 +52,11 @@ def export(
     where: Where = None,
 ) -> None:
     """Make the folders of some variants of a batch, from its store. Each is a line printed."""
-    from unitcad.batch.result_folders import export_variant
+    from unitcad.batch.result_folders import check_stored, export_variant
     from unitcad.cache import DiskStore, default_root
 
+    for wanted in hashes:  # all, before the first folder
+        check_stored(batch, wanted)
     kept = DiskStore(where or default_root())
     try:
         for wanted in hashes:
