@@ -252,3 +252,28 @@ def test_an_stl_is_judged_without_cad_trimesh_scipy_or_a_parser(tmp_path: Path) 
         "assert not heavy, heavy"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, timeout=60)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs FIFOs")
+def test_what_is_no_file_in_a_folder_is_found(tmp_path: Path) -> None:
+    (tmp_path / "good.stl").write_bytes(GOOD)
+    (tmp_path / "gone.stl").symlink_to(tmp_path / "nothing.stl")
+    os.mkfifo(tmp_path / "pipe.stl")
+    done = run(tmp_path)
+    assert done.returncode == 1
+    assert re.search(r"gone\.stl.*F012.*no such file", done.stdout)
+    assert re.search(r"pipe\.stl.*F012.*a FIFO", done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--show", "hole.stl"], "--show = 'hole.stl': must name a folder; this is a file"),
+        (["--json", "--output-format", "sarif"], "--output-format = 'sarif': --json asks for another one"),
+    ],
+)
+def test_options_that_can_not_be_are_refused_before_the_work(words: list[str], said: str, tmp_path: Path) -> None:
+    (tmp_path / "hole.stl").write_bytes(HOLE)
+    done = run("hole.stl", *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr + done.stdout

@@ -63,13 +63,15 @@ def _step_needs() -> str:
 
 
 def _walked(folder: Path) -> Iterator[str]:
-    """Return mesh files below a folder, without hidden folders and those behind links."""
+    """Return what is named as a mesh file below a folder, without hidden folders and those behind links.
+
+    Links to nothing and FIFOs are among them, and are findings.
+    """
     for here, below, names in os.walk(folder):
         below[:] = [name for name in below if not name.startswith(".")]
         for name in names:
-            path = Path(here, name)
-            if kind_of(name) and path.is_file():
-                yield str(path)
+            if kind_of(name):
+                yield str(Path(here, name))
 
 
 def _inside(paths: Iterable[str]) -> list[str]:

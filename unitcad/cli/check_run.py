@@ -64,6 +64,11 @@ def run(asked: Asked) -> int:
     output_format = "json" if asked.as_json else asked.output_format
     if output_format not in FORMATS:
         raise unknown_name("--output-format", output_format, FORMATS)
+    if asked.as_json and asked.output_format not in (Asked.output_format, "json"):
+        why = "--json asks for another one: leave one of them out, or have both with --report json=FILE"
+        raise Refusal("--output-format", asked.output_format, why)
+    if asked.show is not None and Path(asked.show).exists() and not Path(asked.show).is_dir():
+        raise Refusal("--show", asked.show, "must name a folder; this is a file")
     copies = [_copy(given, FORMATS) for given in asked.report or []]
     configuration = check_settings.find(asked.config, wanted=not asked.no_config)
     fail_on = asked.fail_on or configuration.value("fail_on") or "error"
