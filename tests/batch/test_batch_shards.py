@@ -226,6 +226,27 @@ def test_without_folders_one_is_made_when_asked_for(tmp_path: Path, monkeypatch:
         export_variant(tmp_path, wanted[-12:], tmp_path / "some", cache)
 
 
+def test_folders_asked_for_later_are_made_of_what_is_kept(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    made(sweep, out, folders=False, cache=tmp_path / "one")
+    folder = rows(out)[0]["folder"]
+    before = len(calls(tmp_path / "s"))
+    summary = made(sweep, out, folders=True, cache=tmp_path / "two")
+    assert (summary.ok, summary.resumed, len(calls(tmp_path / "s"))) == (4, 4, before)
+    made(sweep, tmp_path / "plain", folders=True, cache=tmp_path / "one")
+    plain = bytes_of(tmp_path / "plain")
+    assert {path: sha for path, sha in bytes_of(out).items() if path.startswith("ring-")} == {
+        path: sha for path, sha in plain.items() if path.startswith("ring-")
+    }
+    # What the store has lost is made anew.
+    for path in (out / "store" / "packs").rglob("*"):
+        path.unlink() if path.is_file() else None
+    (out / folder / "manifest.json").unlink()
+    record_packs.store_at.cache_clear()
+    summary = made(sweep, out, folders=True, cache=tmp_path / "two")
+    assert (summary.ok, summary.resumed) == (4, 3)
+
+
 def test_what_makes_lost_content_again_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shared_store, "PAUSE_S", 0.0)
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=1), tmp_path / "out"

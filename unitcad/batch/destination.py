@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -9,9 +11,9 @@ from typing import Protocol
 
 from unitcad.batch import task as tasks
 from unitcad.batch.batch_records import JournalEntry
-from unitcad.batch.record_packs import intact, packed_specs
+from unitcad.batch.record_packs import export, intact, packed_specs
 from unitcad.batch.task import Task, VariantOutcome
-from unitcad.cache import DiskStore, SharedStore, digest
+from unitcad.cache import DiskStore, MissingContent, SharedStore, digest
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.folder import whole
 
@@ -37,14 +39,22 @@ class Destination(Protocol):
 
 
 class Folders:
-    """Folders on this disk, which the workers share; `verify` compares hashes, not only sizes."""
+    """Folders on this disk, which the workers share; `verify` compares hashes, not only sizes.
 
-    def __init__(self, out: Path, store: DiskStore, verify: bool) -> None:
-        self.out, self.store, self.verify = out, store, verify
+    `kept` gives the store in which an earlier run without folders left records: folders are made of these.
+    """
+
+    def __init__(self, out: Path, store: DiskStore, verify: bool, kept: Callable[[], SharedStore]) -> None:
+        self.out, self.store, self.verify, self.kept = out, store, verify, kept
 
     def stands(self, entry: JournalEntry) -> bool:
         folder = self.out / entry.folder
-        if not made(entry) or whole(folder, hashes=self.verify) is None:
+        if not made(entry):
+            return False
+        if entry.record is not None and whole(folder) is None:
+            with contextlib.suppress(MissingContent, UnitcadError, OSError):  # then it is made anew
+                export(self.kept(), entry.record, folder, self.store)
+        if whole(folder, hashes=self.verify) is None:
             return False
         return not self.verify or digest((folder / "manifest.json").read_bytes()) == entry.manifest
 

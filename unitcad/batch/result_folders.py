@@ -7,7 +7,7 @@ import json
 import os
 import re
 from collections.abc import Iterable, Iterator
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 from msgspec import MsgspecError
@@ -39,7 +39,7 @@ def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskS
     if remote:
         return Receiver(out, cache, options.verify)
     if folders_wanted(options, variants):
-        return Folders(out, cache, options.verify)
+        return Folders(out, cache, options.verify, lru_cache(partial(_store_of, out)))
     return InStore(SharedStore(str((out / STORE).absolute())), options.verify, cache)
 
 

@@ -50,19 +50,26 @@ def export(
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Where the folders go; else to the batch.")] = None,
     store: Annotated[str | None, typer.Option(metavar="ADDRESS", help="The store; else the batch's.")] = None,
     where: Where = None,
+    as_json: AsJson = False,
 ) -> None:
     """Make the folders of some variants of a batch, from its store. Each is a line printed."""
     from unitcad.batch.result_folders import check_stored, export_variant
     from unitcad.cache import DiskStore, default_root
+    from unitcad.cli.output import print_json
 
     for wanted in hashes:  # all, before the first folder
         check_stored(batch, wanted)
     kept = DiskStore(where or default_root())
     try:
+        made = []
         for wanted in hashes:
-            typer.echo(str(export_variant(batch, wanted, out or batch, kept, store)))
+            made.append(str(export_variant(batch, wanted, out or batch, kept, store)))
+            if not as_json:
+                typer.echo(made[-1])
     finally:
         kept.close()
+    if as_json:
+        print_json({"folders": made})
 
 
 def _print_usage(text: str, root: Path, data: dict, as_json: bool) -> None:
