@@ -36,10 +36,11 @@ def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskS
         store = InStore(SharedStore(address), options.verify, None, apart=remote)
         note_store(out, address)
         return store
+    kept = lru_cache(partial(_store_of, out))
     if remote:
-        return Receiver(out, cache, options.verify)
+        return Receiver(out, cache, options.verify, kept)
     if folders_wanted(options, variants):
-        return Folders(out, cache, options.verify, lru_cache(partial(_store_of, out)))
+        return Folders(out, cache, options.verify, kept)
     return InStore(SharedStore(str((out / STORE).absolute())), options.verify, cache)
 
 
