@@ -41,19 +41,19 @@ class Destination(Protocol):
 class Folders:
     """Folders on this disk, which the workers share; `verify` compares hashes, not only sizes.
 
-    `kept` gives the store in which an earlier run without folders left records: folders are made of these.
+    `kept` gives the store in which an earlier run without folders left records, if any: folders are made of these.
     """
 
-    def __init__(self, out: Path, store: DiskStore, verify: bool, kept: Callable[[], SharedStore]) -> None:
+    def __init__(self, out: Path, store: DiskStore, verify: bool, kept: Callable[[], SharedStore | None]) -> None:
         self.out, self.store, self.verify, self.kept = out, store, verify, kept
 
     def stands(self, entry: JournalEntry) -> bool:
         folder = self.out / entry.folder
         if not made(entry):
             return False
-        if entry.record is not None and whole(folder) is None:
+        if entry.record is not None and whole(folder) is None and (kept := self.kept()):
             with contextlib.suppress(MissingContent, UnitcadError, OSError):  # then it is made anew
-                export(self.kept(), entry.record, folder, self.store)
+                export(kept, entry.record, folder, self.store)
         if whole(folder, hashes=self.verify) is None:
             return False
         return not self.verify or digest((folder / "manifest.json").read_bytes()) == entry.manifest

@@ -31,7 +31,9 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     start = time.perf_counter()
     shards = read_shards(folders)
     first = shards[0][1]
-    stores = {folder: SharedStore(found_at(folder, record.store)) for folder, record in shards}
+    addresses = {folder: found_at(folder, record.store) for folder, record in shards}
+    opened = {address: SharedStore(address) for address in set(addresses.values())}
+    stores = {folder: opened[address] for folder, address in addresses.items()}
     _expect_finished(shards, stores)
     summary = Summary(first.variants)
     noted_before = (out / ADDRESS).exists()
@@ -46,8 +48,8 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
                         journal.add(entry)
         for entry in journal.entries():
             count_entry(summary, entry.status, lambda entry=entry: entry)
-        if len({store.address for store in stores.values()}) == 1:
-            note_store(out, stores[folders[0]].address)
+        if len(opened) == 1:
+            note_store(out, *opened)
         if folders_wanted(options, first.variants):
             cache = DiskStore(options.cache or default_root())
             try:

@@ -36,12 +36,19 @@ def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskS
         store = InStore(SharedStore(address), options.verify, None, apart=remote)
         note_store(out, address)
         return store
-    kept = lru_cache(partial(_store_of, out))
+    kept = lru_cache(partial(_kept, out))
     if remote:
         return Receiver(out, cache, options.verify, kept)
     if folders_wanted(options, variants):
         return Folders(out, cache, options.verify, kept)
     return InStore(SharedStore(str((out / STORE).absolute())), options.verify, cache)
+
+
+def _kept(out: Path) -> SharedStore | None:
+    """Return the store of a batch's earlier run; None where there is none, or it can't be reached."""
+    with contextlib.suppress(UnitcadError):
+        return _store_of(out)
+    return None
 
 
 def note_store(out: Path, address: str) -> None:
