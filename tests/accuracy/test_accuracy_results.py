@@ -213,7 +213,9 @@ def test_the_command_fails_on_a_broken_promise_alone(tmp_path: Path, monkeypatch
     assert "broken: nan, promised 1" in printed.err
 
 
+@pytest.mark.long
 def test_stability_by_the_command_line():
+    """CI runs all suites by the command line after the tests."""
     command = [sys.executable, "-m", "unitcad", "accuracy", "stability", "--quick", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr

@@ -18,6 +18,7 @@ from unitcad.errors import UnitcadError
 pytest.importorskip("flint")
 
 
+@pytest.mark.long
 def test_a_complex_modes_pole_below_the_path():
     """40 % off at an estimate of 5e-8, while the path was as high as the Bessel functions allow."""
     medium = LayeredMedium(

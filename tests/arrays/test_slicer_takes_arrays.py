@@ -21,10 +21,11 @@ pytestmark = [
 ]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.long if name == "sleeve-curved" else ()) for name in array_templates()],
-)
+SLOW = ("sleeve-curved", "wrist-band")
+NAMES = [pytest.param(name, marks=pytest.mark.long if name in SLOW else ()) for name in array_templates()]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_every_tool_of_an_array_is_sliced(name: str, tmp_path: Path) -> None:
     moulds = patch_moulds(load_array(name))
     taken = 0.0

@@ -217,6 +217,7 @@ def test_materials_share_a_model_and_walls_do_not() -> None:
     assert model_key(load("encapsulating", ["layers.0.wall_mm=1.3"])) != model_key(one)
 
 
+@pytest.mark.long
 def test_budget_of_a_batch(built: Path) -> None:
     """1,000 variants, each with numbers of its own, over 20 geometries."""
     record = read_results.read_variant(built, built.parent)[0].as_dict()
