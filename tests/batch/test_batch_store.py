@@ -15,7 +15,8 @@ from object_store import BUCKET, Faulty, s3_server
 
 import unitcad
 from unitcad.batch import BatchOptions, Summary, load_sweep, record_packs, run
-from unitcad.batch.executors import SerialExecutor, WorkerDied
+from unitcad.batch.batch_call import make
+from unitcad.batch.executors import SerialExecutor, WorkerDied, Workers
 from unitcad.batch.sweep import from_file
 from unitcad.batch.task import outcomes
 from unitcad.cache import MissingContent, SharedStore, digest, shared_store
@@ -271,6 +272,15 @@ def test_a_batch_whose_store_is_refused_leaves_nothing(tmp_path: Path) -> None:
 def test_a_store_that_keeps_nothing_is_refused(store: str, jobs: int, more: Any, limit: str, tmp_path: Path) -> None:
     with pytest.raises(UnitcadError, match=limit):
         unitcad.batch(ring_sweep(tmp_path), tmp_path / "out", only="unit", jobs=jobs, store=store, **more)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_cluster_without_a_store_makes_folders_and_no_wish_for_none_is_ignored(tmp_path: Path) -> None:
+    options = BatchOptions(("unit",), folders=False)
+    with pytest.raises(UnitcadError, match="results of a cluster go to folders here"):  # before anybody is asked
+        make(load_sweep(ring_sweep(tmp_path)), tmp_path / "out", options, Workers(scheduler="tcp://127.0.0.1:9"))
+    with pytest.raises(UnitcadError, match="estimates alone are one table"):
+        make(load_sweep("thickness"), tmp_path / "out", BatchOptions(("estimate",), folders=True), Workers(jobs=0))
     assert not (tmp_path / "out").exists()
 
 
