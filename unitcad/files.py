@@ -116,6 +116,12 @@ def regular(links: bool = True) -> Callable[[str, int], int]:
     return opened
 
 
+def in_the_way(folder: Path) -> UnitcadError:
+    """Return the error for a folder that can't be made since it, or one above it, is a file."""
+    file = next(path for path in (*reversed(folder.parents), folder) if path.exists() and not path.is_dir())
+    return UnitcadError(f"{file}: is a file, not a folder; choose another with -o")
+
+
 def write(path: Path, content: bytes, *, sync: bool = False) -> None:
     """Write a file in place of what is at `path`; with `sync` it is on the disk at the end. Raises OSError."""
     with writing(path, sync=sync) as file:

@@ -18,7 +18,7 @@ from unitcad.batch.batch_records import BatchHead, JournalEntry
 from unitcad.batch.executors import Workers
 from unitcad.batch.merging import merge
 from unitcad.batch.parquet_table import read_parquet
-from unitcad.batch.result_folders import export_variant
+from unitcad.batch.result_folders import export_variants
 from unitcad.batch.results import write_results
 from unitcad.batch.shards import Shard, shard_folders, shard_of
 from unitcad.cache import DiskStore, shared_store
@@ -28,6 +28,11 @@ from unitcad.errors import UnitcadError, WrongArgument
 def made(sweep: Path, out: Path, **options: Any) -> Summary:
     record_packs.store_at.cache_clear()
     return make(load_sweep(sweep), out, BatchOptions(("unit",), **options), Workers(jobs=0))
+
+
+def export_variant(batch: Path, wanted: str, out: Path, cache: DiskStore) -> Path:
+    (folder,) = export_variants(batch, [wanted], out, cache)
+    return folder
 
 
 @pytest.fixture(autouse=True)

@@ -94,7 +94,7 @@ def make(
         whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
         expect_room(folder, options.shard, whole.batch)
         store = options.store or str((folder / STORE).absolute())
-        folder, options = folder / options.shard.folder, replace(options, store=store, folders=bool(options.folders))
+        folder, options = folder / options.shard.folder, replace(options, store=store)
     if options.only == ("estimate",) and not sweep.of_arrays:
         return write_estimates(sweep, folder, options)
     with workers.executor(options.timeout) as (executor, number):

@@ -49,14 +49,17 @@ class Folders:
 
     def stands(self, entry: JournalEntry) -> bool:
         folder = self.out / entry.folder
-        if not made(entry):
-            return False
-        if entry.record is not None and whole(folder) is None and (kept := self.kept()):
-            with contextlib.suppress(MissingContent, UnitcadError, OSError):  # then it is made anew
-                export(kept, entry.record, folder, self.store)
-        if whole(folder, hashes=self.verify) is None:
+        if not made(entry) or (whole(folder, hashes=self.verify) is None and not self._restored(entry, folder)):
             return False
         return not self.verify or digest((folder / "manifest.json").read_bytes()) == entry.manifest
+
+    def _restored(self, entry: JournalEntry, folder: Path) -> bool:
+        """Make a folder that is not whole of its record in the store, if there is one; return whether it is whole."""
+        if entry.record is None or whole(folder) is not None or not (kept := self.kept()):
+            return False
+        with contextlib.suppress(MissingContent, UnitcadError, OSError):  # then it is made anew
+            export(kept, entry.record, folder, self.store)
+        return whole(folder, hashes=self.verify) is not None
 
     def damaged(self, entry: JournalEntry) -> str:
         return entry.manifest

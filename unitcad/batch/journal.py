@@ -239,8 +239,7 @@ def _lock(out: Path, head: BatchHead, beside: Collection[str]) -> FileLock:
             _check_free(out, head, beside)
         lock.acquire()
     except (FileExistsError, NotADirectoryError):
-        file = next(path for path in (*reversed(out.parents), out) if path.exists() and not path.is_dir())
-        raise UnitcadError(f"{file}: is a file, not a folder; choose another with -o") from None
+        raise files.in_the_way(out) from None
     except Timeout:
         raise UnitcadError(
             f"{out}: another batch is running in this folder; wait for it or choose another with -o"

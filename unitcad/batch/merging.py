@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from unitcad.batch.batch_options import BatchOptions
-from unitcad.batch.batch_records import Summary
+from unitcad.batch.batch_records import JournalEntry, Summary
 from unitcad.batch.journal import Journal
 from unitcad.batch.result_folders import folders_wanted, found_at, lost, make_folders, note_store
 from unitcad.batch.results import columns_of, write_results
@@ -55,8 +55,7 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
             try:
                 for folder, record in shards:
                     entries = filter(None, map(journal.entry, record.indices))
-                    for made in make_folders(out, entries, stores[folder], cache, _maker(record)):
-                        fresh.append(made)  # one by one: what is made before an error is removed
+                    make_folders(out, entries, stores[folder], cache, _maker(record), fresh.append)
             finally:
                 cache.close()
         found = swept_estimate(first.sweep, first.variants) if "estimate" in first.head.outputs else None
@@ -90,18 +89,25 @@ def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping
     packs: dict[str, dict[str, int]] = {}
     for folder, record in shards:
         store = stores[folder]
+        missing = list[int]()
+        needed: dict[str, tuple[JournalEntry, int]] = {}  # of each pack: its first variant, and where its last one ends
         with _opened(folder, record) as part:
-            missing = [index for index in record.indices if part.own(index) is None]
-            if missing:
-                raise UnitcadError(
-                    f"{folder}: {len(missing)} of {len(record.indices)} variants are not made yet, the first is "
-                    f"variant {missing[0]}; the shard's own command resumes it"
-                )
-            if store.address not in packs:
-                store.expect()
-                packs[store.address] = store.sizes("packs")
-            for entry in part.entries():
-                place = entry.record
-                if place is not None and packs[store.address].get(place.pack, 0) < place.end:
-                    gone = MissingContent(f"pack {place.pack[:12]} is not in {store.address}, or cut there")
-                    raise lost(entry, gone, _maker(record))
+            for index in record.indices:
+                entry = part.own(index)
+                if entry is None:
+                    missing.append(index)
+                elif place := entry.record:
+                    first, end = needed.get(place.pack, (entry, 0))
+                    needed[place.pack] = first, max(end, place.end)
+        if missing:
+            raise UnitcadError(
+                f"{folder}: {len(missing)} of {len(record.indices)} variants are not made yet, the first is "
+                f"variant {missing[0]}; the shard's own command resumes it"
+            )
+        if store.address not in packs:
+            store.expect()
+            packs[store.address] = store.sizes("packs")
+        for pack, (first, end) in needed.items():
+            if packs[store.address].get(pack, 0) < end:
+                gone = MissingContent(f"pack {pack[:12]} is not in {store.address}, or cut there")
+                raise lost(first, gone, _maker(record))

@@ -67,7 +67,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
         weighed = [_weight(spec, only) for spec in drawn[:: max(1, len(drawn) // BUILT)][:BUILT]]
         shared, own, packed, contents, each = (sum(w[i] for w in weighed) / max(1, len(weighed)) for i in range(5))
         linked = (shared + own) * variants
-        if bool(options.folders) if options.shard else folders_wanted(options, count):
+        if folders_wanted(options, count):
             files, stored = each * variants, shared * number + own * variants
         else:  # a store's: what a geometry's variants share, and packs of their records
             files, stored = (contents + 1) * number + variants / NEXT, shared * number + packed * variants

@@ -6,7 +6,7 @@ import contextlib
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -20,11 +20,10 @@ from unitcad.batch.destination import Destination, Folders, InStore, made
 from unitcad.batch.journal import JOURNAL
 from unitcad.batch.record_packs import export, read_record
 from unitcad.batch.remote import Receiver
-from unitcad.cache import DiskStore, MissingContent, SharedStore
+from unitcad.cache import DiskStore, MissingContent, SharedStore, absolute
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.pipeline.folder import ADDRESS, STORE, placing, whole
 
-_HALF = re.compile(r"([a-z][a-z0-9+.-]+):")
 FOLDERS_BELOW = 1000
 """Variants below which each has a folder, unless asked otherwise."""
 
@@ -68,17 +67,24 @@ def found_at(out: Path, address: str) -> str:
 
 
 def folders_wanted(options: BatchOptions, variants: int) -> bool:
-    """Tell whether each variant of a batch has a folder: if asked for, or below FOLDERS_BELOW variants."""
-    return variants < FOLDERS_BELOW if options.folders is None else options.folders
+    """Tell whether each variant of a batch has a folder: if asked for, or below FOLDERS_BELOW variants of no shard."""
+    if options.folders is not None:
+        return options.folders
+    return variants < FOLDERS_BELOW and options.shard is None
 
 
 _BATCH = "the same batch with"
 
 
 def make_folders(
-    out: Path, entries: Iterable[JournalEntry], store: SharedStore, cache: DiskStore, maker: str = _BATCH
-) -> Iterator[Path]:
-    """Make the folders in `out` that are not there, or not whole, of variants that are in a store; yield each.
+    out: Path,
+    entries: Iterable[JournalEntry],
+    store: SharedStore,
+    cache: DiskStore,
+    maker: str = _BATCH,
+    then: Callable[[Path], object] = lambda folder: None,
+) -> None:
+    """Make the folders in `out` that are not there, or not whole, of variants that are in a store; `then` gets each.
 
     Raises UnitcadError for what the store has lost, which the `maker` makes again, OSError.
     """
@@ -94,7 +100,7 @@ def make_folders(
                 export(store, entry.record, out / entry.folder, cache, partial(placing, scratch=scratch))
             except MissingContent as error:
                 raise lost(entry, error, maker) from None
-            yield out / entry.folder
+            then(out / entry.folder)
 
 
 def lost(entry: JournalEntry, error: MissingContent, maker: str = _BATCH) -> UnitcadError:
@@ -102,28 +108,25 @@ def lost(entry: JournalEntry, error: MissingContent, maker: str = _BATCH) -> Uni
     return UnitcadError(f"variant {entry.index}: {error}; {maker} --verify makes again what is missing")
 
 
-def export_variant(batch: Path, wanted: str, out: Path, cache: DiskStore, address: str | None = None) -> Path:
-    """Make the folder of one variant of a batch below `out`; `wanted` is its hash, or how that begins.
+def export_variants(
+    batch: Path, hashes: Sequence[str], out: Path, cache: DiskStore, address: str | None = None
+) -> Iterator[Path]:
+    """Make the folders of some variants of a batch below `out`, by their hashes or how those begin; yield each.
 
-    The store is that of the batch, else the one at `address`. Raises WrongArgument for a hash that no variant has, or
-    several; UnitcadError for a batch without a store, and for what the store has lost; OSError.
+    All are looked up before the first one is made. The store is that of the batch, else the one at `address`. Raises
+    WrongArgument for a hash that no variant has, or several; UnitcadError for a batch without a store, and for what
+    the store has lost; OSError.
     """
-    entry, place = _stored(batch, wanted)
+    wanted = [_stored(batch, each) for each in hashes]
     store = _store_of(batch, address)
-    try:
-        read_record(store, place)  # before there is a folder
-        out.mkdir(parents=True, exist_ok=True)
-        export(store, place, out / entry.folder, cache)
-    except MissingContent as error:
-        raise lost(entry, error, _BATCH) from None
-    except (FileExistsError, NotADirectoryError):
-        raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o") from None
-    return out / entry.folder
-
-
-def check_stored(batch: Path, wanted: str) -> None:
-    """Raise what `export_variant` raises for a hash, without asking the store."""
-    _stored(batch, wanted)
+    for entry, place in wanted:
+        try:
+            export(store, place, out / entry.folder, cache)
+        except MissingContent as error:
+            raise lost(entry, error) from None
+        except (FileExistsError, NotADirectoryError):
+            raise files.in_the_way(out) from None
+        yield out / entry.folder
 
 
 def stored_spec(batch: Path, folder: str) -> str:
@@ -176,17 +179,3 @@ def _entry_of(batch: Path, wanted: str) -> JournalEntry:
             "hash", wanted, f"{len(found)} variants begin so, {several[0]} and {several[1]}", several[0][-12:]
         )
     return next(iter(found.values()))
-
-
-def absolute(address: str) -> str:
-    """Return a store's address as every process may use it: a path from the root.
-
-    Raises WrongArgument for half a one, such as s3:/bucket.
-    """
-    scheme, parted, path = address.partition("://")
-    if parted and len(scheme) > 1 and scheme not in ("file", "local"):
-        return address
-    if not parted and (half := _HALF.match(address)):
-        why = f"an address begins with {half[1]}://; a folder of that name is ./{address}"
-        raise WrongArgument("store", address, why, address.replace(":", "://", 1).replace(":///", "://"))
-    return str(Path(path if parted else address).absolute())

@@ -20,14 +20,14 @@ from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import BatchHead, Failure, JournalEntry, Summary
 from unitcad.batch.destination import Destination, InStore
 from unitcad.batch.journal import JOURNAL, Journal
-from unitcad.batch.result_folders import absolute, destination_of, folders_wanted, make_folders, noted
+from unitcad.batch.result_folders import destination_of, folders_wanted, make_folders, noted
 from unitcad.batch.results import columns_of, write_results, write_timings
 from unitcad.batch.shards import Shard, ShardRecord, write_shard
 from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Task, VariantOutcome
 from unitcad.batch.unread_keys import swept_estimate
 from unitcad.batch.unread_keys import warnings as unread_warnings
-from unitcad.cache import DiskStore, collect, default_root, digest
+from unitcad.cache import DiskStore, absolute, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.pipeline.folder import clear_leftovers
 from unitcad.pipeline.product import checked_outputs
@@ -89,8 +89,7 @@ def run(
         if batch.lost:
             clear_leftovers(out)
         if isinstance(destination, InStore) and folders_wanted(options, summary.variants):
-            for _ in make_folders(out, journal.entries(), destination.store, cache):
-                pass
+            make_folders(out, journal.entries(), destination.store, cache)
         estimated = "estimate" in head.outputs and not options.shard  # of a shard nothing can be said
         found = swept_estimate(sweep, summary.variants) if estimated else None
         summary.warnings += unread_warnings(found)

@@ -16,6 +16,7 @@ all who share a folder:
 
 from unitcad.cache.collect import DEFAULT_LIMIT_MB, Usage, collect, usage
 from unitcad.cache.disk import DiskStore, default_root, free, held
+from unitcad.cache.objects import absolute
 from unitcad.cache.shared_store import SharedStore
 from unitcad.cache.store import Bundle, MemoryStore, MissingContent, Store, digest
 
@@ -28,6 +29,7 @@ __all__ = [
     "SharedStore",
     "Store",
     "Usage",
+    "absolute",
     "collect",
     "default_root",
     "digest",

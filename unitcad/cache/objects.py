@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import uuid
 from pathlib import Path
 from typing import Any, Protocol
 
-from unitcad.errors import Missing, UnitcadError
+from unitcad.errors import Missing, UnitcadError, WrongArgument
 from unitcad.files import write_new
 
 _IMPATIENT = {"s3": {"config_kwargs": {"connect_timeout": 5, "read_timeout": 60, "retries": {"max_attempts": 2}}}}
 """Options of file systems that else try for minutes to reach a server."""
+
+_HALF = re.compile(r"([a-z][a-z0-9+.-]+):")
 
 
 class Objects(Protocol):
@@ -155,10 +158,30 @@ def objects_at(address: str) -> Objects:
 
     Raises UnitcadError for an address that is none, and Missing without the extra for it.
     """
+    folder = _folder_of(address)
+    return FsspecObjects(address) if folder is None else FolderObjects(Path(folder))
+
+
+def absolute(address: str) -> str:
+    """Return an address as every process may use it: that of a folder as its path from the root.
+
+    Raises WrongArgument for half an address, such as s3:/bucket.
+    """
+    folder = _folder_of(address)
+    if folder is None:
+        return address
+    if half := _HALF.match(folder):
+        why = f"an address begins with {half[1]}://; a folder of that name is ./{folder}"
+        raise WrongArgument("store", address, why, folder.replace(":", "://", 1).replace(":///", "://"))
+    return str(Path(folder).absolute())
+
+
+def _folder_of(address: str) -> str | None:
+    """Return the folder of a path, file://PATH or local://PATH; None for what fsspec knows."""
     scheme, parted, path = address.partition("://")
     if not parted or len(scheme) == 1:
-        return FolderObjects(Path(address))
-    return FolderObjects(Path(path)) if scheme in ("file", "local") else FsspecObjects(address)
+        return address
+    return path if scheme in ("file", "local") else None
 
 
 @contextlib.contextmanager

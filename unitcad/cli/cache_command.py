@@ -53,17 +53,15 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Make the folders of some variants of a batch, from its store. Each is a line printed."""
-    from unitcad.batch.result_folders import check_stored, export_variant
+    from unitcad.batch.result_folders import export_variants
     from unitcad.cache import DiskStore, default_root
     from unitcad.cli.output import print_json
 
-    for wanted in hashes:  # all, before the first folder
-        check_stored(batch, wanted)
     kept = DiskStore(where or default_root())
     try:
         made = []
-        for wanted in hashes:
-            made.append(str(export_variant(batch, wanted, out or batch, kept, store)))
+        for folder in export_variants(batch, hashes, out or batch, kept, store):
+            made.append(str(folder))
             if not as_json:
                 typer.echo(made[-1])
     finally:
