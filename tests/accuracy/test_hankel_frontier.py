@@ -22,7 +22,8 @@ def test_fftlog_has_the_range_and_bias_that_come_nearest(monkeypatch):
     assert found.rows[0][1].startswith("128 points")
     assert found.rows[0][3] == "rtol 0.1"
     assert found.rows[0][5] > 0
-    assert found.rows[1][1:] == (None,) * 5
+    assert found.rows[0][6].endswith(")")
+    assert found.rows[1][1:] == (None,) * 6
 
 
 def test_the_first_setting_that_reaches_an_error_is_taken(monkeypatch):

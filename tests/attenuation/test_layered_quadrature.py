@@ -12,8 +12,9 @@ from unitcad.attenuation.layered.integral import Body, Problem
 from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.path import from_origin, halved_towards
-from unitcad.attenuation.layered.quadrature import evaluate, nodes
+from unitcad.attenuation.layered.quadrature import evaluate
 from unitcad.attenuation.layered.rheology import LossFactor
+from unitcad.attenuation.layered.weights import nodes
 
 PHASE = 8.0 * np.pi
 

@@ -171,7 +171,7 @@ def run(quick: bool, say: Say) -> Result:
 
 def beside_fftlog(case: Case, reference: np.ndarray, repeats: int = 21) -> Table:
     """Tabulate a case at every error beside FFTLog, of which the best setting is taken."""
-    own = hankel_frontier.by_response(lambda rtol: _by_unitcad(case, rtol)[0], reference)
+    own = hankel_frontier.by_response(lambda rtol, r: _by_unitcad(case, rtol, r)[0], RADII, reference)
     other = hankel_frontier.by_fftlog(case.remainder, case.known, RADII, reference)
     return hankel_frontier.table(case.name, own, other, repeats)
 
@@ -265,8 +265,8 @@ def _methods(case: Case, quick: bool) -> dict[tuple[str, str], Callable[[], Solv
     return methods
 
 
-def _by_unitcad(case: Case, rtol: float) -> Solved:
-    response = case.medium.response(DISC, case.omega, RADII, rtol=rtol)
+def _by_unitcad(case: Case, rtol: float, r: np.ndarray = RADII) -> Solved:
+    response = case.medium.response(DISC, case.omega, r, rtol=rtol)
     return response.u_z, response.error
 
 

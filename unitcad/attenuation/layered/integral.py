@@ -18,10 +18,11 @@ from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.detours import Poles, around
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, from_origin, halved_towards, onwards, pieced
-from unitcad.attenuation.layered.quadrature import Evaluated, evaluate, nodes, panel_poles
+from unitcad.attenuation.layered.quadrature import Evaluated, evaluate, panel_poles
 from unitcad.attenuation.layered.stack import Stack
 from unitcad.attenuation.layered.statics import Direction, static_kernel, static_kernels
 from unitcad.attenuation.layered.tail import grid, joined, measure_tail
+from unitcad.attenuation.layered.weights import nodes
 from unitcad.errors import UnitcadError
 
 _MAX_ROUNDS = 40
@@ -92,9 +93,7 @@ class Problem:
     def _compliance(self, body: Body, k: w.Array) -> w.Array:
         ways = [1 if load.direction == "normal" else 0 for load in self.loads]
         columns = sorted(set(ways))
-        traction = np.zeros((2, len(columns), k.size), dtype=np.complex128)
-        traction[columns, range(len(columns))] = 1.0
-        u = body.medium.transfer(traction, k, body.omega, self.z)
+        u = body.medium.transfer(columns, k, body.omega, self.z)
         rows = []
         for load, way in zip(self.loads, ways, strict=True):
             u_r, u_z = u[:, columns.index(way)]
@@ -197,16 +196,19 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         if left == 0 or np.max(off) <= _PANELS_SHARE * wanted:
             bad[:] = False
         due = put_off.due(found, bad)
-        dropped = np.isin(put_off.of, due) if due.size else np.zeros_like(bad)
-        bad &= ~dropped
-        room = (MAX_PANELS - done) // 4  # quarters of them are what is left
-        exhausted = exhausted or bool(np.count_nonzero(bad) > room)
-        bad = _worst(found.gains, bad, room)
-        good = ~(bad | dropped)
-        whole_round = bool(np.all(good))
-        kept = slice(None) if whole_round else good
-        total = total + (parts if whole_round else found.parts[kept].sum(0))
-        quadrature += errors if whole_round else found.errors[kept].sum(0)
+        whole_round = not (due.size or np.any(bad))
+        kept: slice | np.ndarray = slice(None)
+        if not whole_round:
+            dropped = np.isin(put_off.of, due)
+            bad &= ~dropped
+            room = (MAX_PANELS - done) // 4  # quarters of them are what is left
+            exhausted = exhausted or bool(np.count_nonzero(bad) > room)
+            bad = _worst(found.gains, bad, room)
+            kept = ~(bad | dropped)
+            whole_round = bool(np.all(kept))
+            parts, errors = found.parts[kept].sum(0), found.errors[kept].sum(0)
+        total = total + parts
+        quadrature += errors
         gained += float(found.gains[kept].sum())
         size += found.sizes[kept].sum(0)
         if not whole_round:

@@ -12,19 +12,12 @@ from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
-from scipy.special import factorial2
 
 from unitcad.attenuation.layered import waves as w
-from unitcad.attenuation.layered.bessel import bessel_bounds, bessels
 from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, poles
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.path import wavenumbers
+from unitcad.attenuation.layered.weights import COUNT, NODES, TO_LEGENDRE, closeness, turns, weights
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
-_COUNT = _NODES.size
-_TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_NODES, _COUNT - 1))
-_DEGREES = np.arange(2 * _COUNT, _COUNT, -1)
-_ODD_FACTORIALS = np.array([float(factorial2(2 * m - 1)) for m in _DEGREES])
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
 _CANCELLED = 4e-15
@@ -76,7 +69,7 @@ class Evaluated:
     @cached_property
     def poles(self) -> Poles:
         """The pole of each panel."""
-        return poles(self.kernel, _NODES, _TO_LEGENDRE, self.closeness)
+        return poles(self.kernel, NODES, TO_LEGENDRE, self.closeness)
 
     @cached_property
     def hidden(self) -> np.ndarray:
@@ -89,20 +82,9 @@ class Evaluated:
         return self.poles.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * self.closeness)
 
 
-def nodes(panels: w.Array) -> tuple[w.Array, w.Array]:
-    """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, nodes)."""
-    half = (panels[:, 1] - panels[:, 0]) / 2.0
-    return wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * _NODES)
-
-
 def panel_poles(panels: w.Array, kernel: w.Array) -> Poles:
     """Return the pole that each panel's kernel (with dk/ds), shape (rows, panels, nodes), would have."""
-    return poles(kernel, _NODES, _TO_LEGENDRE, _closeness(wavenumbers(panels, panels[:, :2])[0]))
-
-
-def _closeness(ends: w.Array) -> np.ndarray:
-    """Return the wavenumber over half of what a panel covers of it."""
-    return np.abs(ends).max(axis=1) / (np.abs(ends[:, 1] - ends[:, 0]) / 2.0)
+    return poles(kernel, NODES, TO_LEGENDRE, closeness(panels))
 
 
 def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Evaluated:
@@ -119,13 +101,10 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
     all that is left of the last coefficients: halving doubles it. Where the kernel is little beside what it is less by,
     their difference's rounding is left, and stays.
     """
-    rest = 2.0 * np.abs(kernel @ _TO_LEGENDRE[-2:].T).sum(axis=-1).T
-    ends, slope = wavenumbers(panels, panels[:, :2])
-    closeness = _closeness(ends)
-    rounding = (ROUNDING * closeness * np.abs(kernel).max(axis=-1)).T
-    turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(seen)
-    pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
-    off_axis = np.any(panels[:, :2].imag, axis=1)
+    rest = 2.0 * np.abs(kernel @ TO_LEGENDRE[-2:].T).sum(axis=-1).T
+    close, turned, off_axis = turns(seen.load, seen.r, panels)
+    rounding = (ROUNDING * close * np.abs(kernel).max(axis=-1)).T
+    pieces = np.maximum(np.ceil(turned / phase), 1.0).astype(int)
     if not np.any(off_axis):
         sums = _summed(seen, panels, kernel, pieces)
     else:
@@ -140,18 +119,14 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
     errors = 2.0 * np.maximum(rest, rounding)[..., None] * covered + swing
     halved = 2.0 * (2.0 * rounding + _CANCELLED * np.abs(seen.taken_out))[..., None] * covered
     gains = np.maximum(errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0)
-    return Evaluated(parts, errors, sizes, covered, gains, kernel, closeness)
-
-
-def _span(seen: Seen) -> float:
-    return float(seen.r.max()) + seen.load.reach
+    return Evaluated(parts, errors, sizes, covered, gains, kernel, close)
 
 
 def _summed(seen: Seen, panels: w.Array, kernel: w.Array, pieces: np.ndarray) -> tuple[w.Array, ...]:
     """Return of each panel, all on the axis or all off it, the sums of what `_integrated` returns of its `pieces`."""
     ends = np.cumsum(pieces)
     cut, values = (panels, kernel) if ends[-1] == len(panels) else _cut(panels, kernel, pieces)
-    step = max(1, _CHUNK // (_COUNT * seen.r.size * len(kernel)))
+    step = max(1, _CHUNK // (COUNT * seen.r.size * len(kernel)))
     first, sums = 0, list[tuple[w.Array, ...]]()
     while first < len(panels):
         low = ends[first] - pieces[first]
@@ -175,7 +150,7 @@ def _cut(panels: w.Array, kernel: w.Array, pieces: np.ndarray) -> tuple[w.Array,
         cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
     for number in np.unique(pieces[pieces > 1]):
         re, im = np.moveaxis(_pair(kernel[:, pieces == number]) @ _spread(int(number)), -2, 0)  # as `products` does
-        values[:, count == number] = (re + 1j * im).reshape(len(kernel), -1, _COUNT)
+        values[:, count == number] = (re + 1j * im).reshape(len(kernel), -1, COUNT)
     return cut, values
 
 
@@ -183,40 +158,25 @@ def _cut(panels: w.Array, kernel: w.Array, pieces: np.ndarray) -> tuple[w.Array,
 def _spread(count: int) -> np.ndarray:
     """Return the matrix from values at a panel's nodes to those at the nodes of its equal pieces."""
     middles = (2.0 * np.arange(count) + 1.0) / count - 1.0
-    at = (middles[:, None] + _NODES / count).ravel()
-    return (np.polynomial.legendre.legvander(at, _COUNT - 1) @ _TO_LEGENDRE).T
+    at = (middles[:, None] + NODES / count).ravel()
+    return (np.polynomial.legendre.legvander(at, COUNT - 1) @ TO_LEGENDRE).T
 
 
 def _integrated(seen: Seen, panels: w.Array, kernel: w.Array) -> tuple[w.Array, np.ndarray, np.ndarray, np.ndarray]:
     """Return of each panel, row and radius the integral, its absolute size, that of the waves alone, the rule's error.
 
-    The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `weight`: their coefficient of degree m is
-    at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
-    meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
-    six halves: there their envelope takes the place of the weight. Off the axis both grow by e^{|Im k| span}.
+    The last by `weights.weights`.
     """
-    load, r, span = seen.load, seen.r, _span(seen)
-    half = (panels[:, 1] - panels[:, 0]) / 2.0
-    k = nodes(panels)[0]
-    if not np.any(panels[:, :2].imag):
-        k, half = k.real, half.real  # Bessel functions of real numbers are cheaper
-    scale = load.transform(k) * (half[:, None] * _WEIGHTS)
-    waves = bessels(seen.orders, k[..., None] * r) * scale[..., None]
-    by_body = kernel.reshape(-1, *waves.shape[:3])
-    of_waves = np.abs(waves)
-    sizes = (np.abs(by_body)[..., None, :] @ of_waves)[..., 0, :]
-    covered = np.broadcast_to(of_waves.sum(axis=-2), sizes.shape)
-    ends, slope = wavenumbers(panels, panels[:, :2])
-    half = np.abs(half)
-    phi = half * np.abs(slope).max(axis=1) * span
-    powers = phi[:, None] ** _DEGREES / _ODD_FACTORIALS
-    swing = (np.abs(by_body @ _TO_LEGENDRE.T) * powers).sum(axis=-1)
-    swing *= 3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span)
-    least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
-    at = np.maximum(least, covers) / 2.0
-    envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None]
-    weight = np.minimum(envelope * bessel_bounds(seen.orders, at[:, None] * r), load.weight)
-    quantities = products(by_body, waves), sizes, covered, swing[..., None] * weight
+    met = weights(seen.load, seen.orders, seen.r, panels)
+    by_body = kernel.reshape(-1, *met.values.shape[:3])
+    sizes = (np.abs(by_body)[..., None, :] @ met.sizes)[..., 0, :]
+    swing = (np.abs(by_body @ TO_LEGENDRE.T) * met.swing).sum(axis=-1)
+    quantities = (
+        products(by_body, met.values),
+        sizes,
+        np.broadcast_to(met.covered, sizes.shape),
+        swing[..., None] * met.most,
+    )
     parts, sizes, covered, oscillation = (
         one.reshape(len(kernel), len(panels), -1).swapaxes(0, 1) for one in quantities
     )

@@ -12,7 +12,7 @@ Time factor e^{+i omega t}; z into the body; u_z with J0(kr), u_r with J1(kr), b
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -145,11 +145,11 @@ class Stack:
             planes.append(raised(materials[kind], h, k, planes[-1], with_bottom=above))
         return planes[::-1]
 
-    def transfer(self, traction: w.Array, k: w.Array, omega: float, depth: float) -> w.Array:
-        """Return (u_r, u_z) at `depth` for m surface tractions (t_r, t_z), both (2, m, n), at wavenumbers k (n,)."""
+    def transfer(self, ways: Sequence[int], k: w.Array, omega: float, depth: float) -> w.Array:
+        """Return (u_r, u_z) at `depth` per unit surface traction along r (0) or z (1) of `ways`, shape (2, ways, n)."""
         planes = self.planes(k, omega, depth)
         top = planes[0]
-        c = w.product(w.adjugate(top.t), traction) / w.determinant(top.t)
+        c = w.adjugate(top.t)[:, ways] / w.determinant(top.t)
         u = w.product(top.u, c)
         materials = self.materials(omega)
         pieces = _cut([layer.thickness for layer in self.layers], depth)

@@ -9,13 +9,14 @@ Rows are those of a load's kernel, with its `orders`: (u_r, u_z) under an axisym
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
 from scipy import special
 
 from unitcad.attenuation.layered import waves as w
+from unitcad.attenuation.layered.kept import kept
 
 Direction = Literal["normal", "radial", "tangential"]
 _CATALAN = 0.915965594177219015
@@ -44,20 +45,15 @@ def disc_integrals(s: Any, direction: Direction) -> Any:
 
     q(k) = J1(k) / k but of a radial load: Weber and Schafheitlin's integrals of J1(k) J_n(ks) / k.
     """
-    s = np.asarray(s, dtype=float)
-    return _disc_integrals(s.tobytes(), s.shape, direction)
+    return _disc_integrals(np.asarray(s, dtype=float), direction)[0]
 
 
-@lru_cache(maxsize=8)  # a response needs them twice, and those at other frequencies or tolerances the same ones again
-def _disc_integrals(buffer: bytes, shape: tuple[int, ...], direction: Direction) -> np.ndarray:
-    s = np.frombuffer(buffer).reshape(shape)
+@kept
+def _disc_integrals(s: np.ndarray, direction: Direction) -> tuple[np.ndarray]:
     if direction == "radial":
-        found = np.array([_radial(s), np.where(s < 1, 1.0 - s, 0.0)])
-    else:
-        zeroth, first = _zeroth(s), np.where(s <= 1, s / 2.0, 0.5 / np.maximum(s, 1.0))
-        found = np.array([first, zeroth] if direction == "normal" else [zeroth, _second(s), first])
-    found.flags.writeable = False
-    return found
+        return (np.array([_radial(s), np.where(s < 1, 1.0 - s, 0.0)]),)
+    zeroth, first = _zeroth(s), np.where(s <= 1, s / 2.0, 0.5 / np.maximum(s, 1.0))
+    return (np.array([first, zeroth] if direction == "normal" else [zeroth, _second(s), first]),)
 
 
 _UNIT = 2.0**-53

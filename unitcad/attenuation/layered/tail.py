@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.bessel import bessel_bounds
+from unitcad.attenuation.layered.kept import kept
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.statics import Direction, static_kernels
 
@@ -114,20 +116,37 @@ def _left(tail: Tail, rtol: float) -> tuple[float, float, float]:
     return max(rest, 0.4 * rtol * tail.scale), stop, rest
 
 
-def _bounds(k: np.ndarray, kernels: w.Array, loads: Sequence[Load], r: np.ndarray) -> np.ndarray:
-    """Return the bounds from each wavenumber on, shape (kernels, wavenumbers, rows, radii); kernels (.., rows, k)."""
-    kernels, load = np.swapaxes(kernels, 1, 2), loads[0]
-    orders = tuple(order for one in loads for order in one.orders)
-    size = np.abs(kernels)[..., None]
+class _Waves(NamedTuple):
+    """Bounds of the load's transform times the Bessel functions, shape (wavenumbers, rows, radii).
+
+    by_parts: the same, over a fourth of the distance from the edge; oscillating (wavenumbers, 1, radii): where that
+    bounds an integral.
+    """
+
+    envelope: np.ndarray
+    by_parts: np.ndarray
+    oscillating: np.ndarray
+
+
+@kept
+def _waves(load: Load, orders: tuple[int, ...], r: np.ndarray, k: np.ndarray) -> _Waves:
     phase = k[:, None] * r
-    waves = load.envelope(k)[:, None, None] * bessel_bounds(orders, phase).swapaxes(0, 1)
-    by_envelope = _from_right(k, size * waves)
-    variation = size.copy()
-    variation[:, :-1] += np.cumsum(np.abs(np.diff(kernels, axis=1))[:, ::-1], axis=1)[:, ::-1, :, None]
+    envelope = load.envelope(k)[:, None, None] * bessel_bounds(orders, phase).swapaxes(0, 1)
     distance = np.maximum(np.abs(r - load.reach), 1e-12 * (r + load.reach) + 1e-300)
     oscillating = (phase > 3.0) & ((k * load.reach > 3.0) | (load.reach == 0.0))[:, None]
-    by_parts = variation * (waves * (4.0 / distance))
-    return _MARGIN * np.minimum(by_envelope, np.where(oscillating[:, None], by_parts, np.inf))
+    return _Waves(envelope, envelope * (4.0 / distance), oscillating[:, None])
+
+
+def _bounds(k: np.ndarray, kernels: w.Array, loads: Sequence[Load], r: np.ndarray) -> np.ndarray:
+    """Return the bounds from each wavenumber on, shape (kernels, wavenumbers, rows, radii); kernels (.., rows, k)."""
+    kernels = np.swapaxes(kernels, 1, 2)
+    waves = _waves(loads[0], tuple(order for one in loads for order in one.orders), r, k)
+    size = np.abs(kernels)[..., None]
+    by_envelope = _from_right(k, size * waves.envelope)
+    variation = size.copy()
+    variation[:, :-1] += np.cumsum(np.abs(np.diff(kernels, axis=1))[:, ::-1], axis=1)[:, ::-1, :, None]
+    by_parts = variation * waves.by_parts
+    return _MARGIN * np.minimum(by_envelope, np.where(waves.oscillating, by_parts, np.inf))
 
 
 def _from_right(k: np.ndarray, f: np.ndarray) -> np.ndarray:
