@@ -179,6 +179,11 @@ def test_progress_is_lines_for_machines_and_nothing_in_a_pipe(tmp_path: Path) ->
     assert [event["event"] for event in events] == ["variant", "variant", "end"]
     assert sorted(event["index"] for event in events[:2]) == [0, 1]
     assert done.stderr == ""
+    refused = unitcad("batch", sweep, "-o", tmp_path / "p", "--json-lines", "--scheduler", "x", "--only", "estimate")
+    (event,) = [json.loads(line) for line in refused.stdout.splitlines()]
+    assert (refused.returncode, event["event"], event["error"]["field"]) == (2, "error", "--scheduler")
+    unknown = unitcad("batch", sweep, "--json-lines", "--slow")
+    assert json.loads(unknown.stdout)["error"]["message"].startswith("No such option: --slow")
     quiet = unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 1)
     assert quiet.stderr == ""
     assert quiet.stdout.splitlines()[-1] == str(tmp_path / "o")

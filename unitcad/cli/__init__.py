@@ -13,7 +13,7 @@ import sys
 import threading
 from typing import Any, NoReturn
 
-from unitcad.cli.output import say_error, speak_anywhere, warn
+from unitcad.cli.output import form_of, say_error, speak_anywhere, warn
 from unitcad.errors import UnitcadError
 
 INTERRUPTED = 130
@@ -61,7 +61,7 @@ def _leave_interrupted() -> NoReturn:
 
 def main() -> NoReturn:
     """Entry point of `unitcad`: run a command, turn every error into one line and an exit code."""
-    as_json = "--json" in sys.argv
+    form = form_of(sys.argv)
     speak_anywhere()
     try:
         code = _run(sys.argv[1:])
@@ -69,7 +69,7 @@ def main() -> NoReturn:
             _leave_interrupted()
         sys.exit(code)
     except UnitcadError as error:
-        say_error(error, as_json)
+        say_error(error, form)
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         _leave_interrupted()
@@ -78,7 +78,7 @@ def main() -> NoReturn:
         sys.exit(1)
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        say_error(UnitcadError(f"{place}{error.strerror or error}"), as_json)
+        say_error(UnitcadError(f"{place}{error.strerror or error}"), form)
         sys.exit(2)
     except Exception as error:
         if _interrupt_behind(error):
@@ -87,7 +87,7 @@ def main() -> NoReturn:
             raise
         say_error(
             UnitcadError(f"internal error: {type(error).__name__}: {error} (a bug; UNITCAD_TRACEBACK=1 shows where)"),
-            as_json,
+            form,
         )
         sys.exit(1)
 

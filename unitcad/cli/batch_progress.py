@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import sys
 from collections.abc import Iterator
 
@@ -12,7 +11,7 @@ from msgspec import to_builtins
 from unitcad.batch.batch_records import Summary
 from unitcad.batch.run import Watch
 from unitcad.batch.task import VariantOutcome
-from unitcad.cli.output import console, stage_lines
+from unitcad.cli.output import console, print_json_line, stage_lines
 
 
 @contextlib.contextmanager
@@ -44,8 +43,7 @@ def _line(summary: Summary, outcome: VariantOutcome | None) -> None:
             "done": summary.done,
             "variants": summary.variants,
         }
-    sys.stdout.write(json.dumps(event) + "\n")
-    sys.stdout.flush()
+    print_json_line(event)
 
 
 @contextlib.contextmanager

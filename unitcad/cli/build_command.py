@@ -81,7 +81,7 @@ def build(
             try:
                 once()
             except UnitcadError as error:
-                say_error(error, as_json)
+                say_error(error, "object" if as_json else "text")
             warn("waiting for a save; Ctrl-C ends")
 
 

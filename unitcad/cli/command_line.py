@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from unitcad import __version__
-from unitcad.cli.output import say_error
+from unitcad.cli.output import Form, form_of, say_error
 from unitcad.errors import UnitcadError
 
 COMMANDS = {
@@ -77,16 +77,16 @@ def run(words: list[str]) -> int:
         named = [word for word in words[:1] if word in COMMANDS]
         return application(*(named or COMMANDS))(standalone_mode=False) or 0
     except WrongArguments as error:
-        _refuse(error, "--json" in words)
+        _refuse(error, form_of(words))
         return error.exit_code
 
 
-def _refuse(error: Any, as_json: bool) -> None:
+def _refuse(error: Any, form: Form) -> None:
     """Print an error of Typer's as one line, with the command whose help says more."""
     context = getattr(error, "ctx", None)
     message = error.format_message()
-    if context and message == context.get_help() and not as_json:  # a command alone that needs another one after it
+    if context and message == context.get_help() and form == "text":  # a command alone that needs another one after it
         error.show()
         return
     line = " ".join(message.partition("\n")[0].split()).rstrip(".")
-    say_error(UnitcadError(f"{line}; see {context.command_path if context else 'unitcad'} --help"), as_json)
+    say_error(UnitcadError(f"{line}; see {context.command_path if context else 'unitcad'} --help"), form)

@@ -7,8 +7,8 @@ import io
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.text import printable
@@ -22,6 +22,23 @@ def print_json(data: Any) -> None:
     sys.stdout.write(json.dumps(data, indent=2, allow_nan=False, ensure_ascii=not _unicode(sys.stdout)) + "\n")
 
 
+def print_json_line(data: Any) -> None:
+    """Write `data` as one line of JSON on standard output, at once."""
+    sys.stdout.write(json.dumps(data) + "\n")
+    sys.stdout.flush()
+
+
+Form = Literal["text", "object", "lines"]
+"""What a command writes on standard output: for a person, one JSON object, or one a line."""
+
+
+def form_of(words: Sequence[str]) -> Form:
+    """Return what a command line asks for."""
+    if "--json-lines" in words:
+        return "lines"
+    return "object" if "--json" in words else "text"
+
+
 def speak_anywhere() -> None:
     """Make standard output and error write the code of a character that their encoding lacks."""
     for stream in (sys.stdout, sys.stderr):
@@ -33,8 +50,8 @@ def _unicode(stream: Any) -> bool:
     return (getattr(stream, "encoding", None) or "").lower().replace("-", "") in ("utf8", "utf16", "utf32")
 
 
-def say_error(error: UnitcadError, as_json: bool) -> None:
-    """Print an error: a line for each fault on standard error and, with `--json`, an object on standard output."""
+def say_error(error: UnitcadError, form: Form) -> None:
+    """Print an error: a line for each fault on standard error and, but for a person, JSON on standard output."""
     if isinstance(error, WrongArgument):
         error = Refusal(_ARGUMENTS.get(error.field, f"--{error.field}"), error.value, error.limit, error.nearest)
     if isinstance(error, Refusal):
@@ -44,8 +61,10 @@ def say_error(error: UnitcadError, as_json: bool) -> None:
         lines = [str(error)]
     for line in lines:
         sys.stderr.write(f"error: {printable(line)}\n")
-    if as_json:
+    if form == "object":
         print_json({"error": error.as_dict()})
+    elif form == "lines":
+        print_json_line({"event": "error", "error": error.as_dict()})
 
 
 _ARGUMENTS = {
