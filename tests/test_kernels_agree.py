@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from sample_bodies import LAYER1, QUARTER, all_bodies
 
+from unitcad.designs import shipped
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
 from unitcad.moulds.ribs import rib_shapes, slot_shapes
@@ -90,7 +91,14 @@ def test_kernels_agree_on_bodies(name):
         assert_mesh_within_bound(shape, mesh.segment_count(20, tolerance), reference)
 
 
-@pytest.mark.parametrize("template", sorted(templates()))
+IN_CI = (*shipped(), "chain")
+"""Templates that `unitcad accuracy --quick kernels` compares in the same way."""
+
+
+@pytest.mark.parametrize(
+    "template",
+    [pytest.param(one, marks=pytest.mark.long if one in IN_CI else ()) for one in sorted(templates())],
+)
 def test_kernels_agree_on_every_part_of_every_template(template):
     variant = Variant.of(template)
     bodies = (*variant.unit, *variant.plan.tools)

@@ -12,6 +12,9 @@ def test_fftlog_has_the_range_and_bias_that_come_nearest(monkeypatch):
     case = cases()[0]
     exact = brute_force(case)
     monkeypatch.setattr(hankel_frontier, "_POINTS", (64, 128))
+    monkeypatch.setattr(hankel_frontier, "_FIRST", (1e-4, 1e-2, 0.1))
+    monkeypatch.setattr(hankel_frontier, "_LAST", (1e4, 1e5))
+    monkeypatch.setattr(hankel_frontier, "_BIASES", (-0.25, 0.0))
     few, many = hankel_frontier.by_fftlog(case.remainder, case.known, RADII, exact)
     assert many.error < few.error < 1e-2
     assert many.error < 2e-4
