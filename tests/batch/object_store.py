@@ -42,6 +42,7 @@ def s3_server() -> Iterator[dict[str, str]]:
     try:
         import fsspec
 
+        fsspec.get_filesystem_class("s3").clear_instance_cache()  # one may know the address of another server
         fsspec.filesystem("s3").mkdir(BUCKET)
         yield environment
     finally:
