@@ -251,9 +251,6 @@ def judge(
         )
     )
     geometries = {name: count for name, count in puts.items() if name.startswith("entries/")}
-    kinds: Counter[str] = Counter()
-    for name, count in puts.items():
-        kinds[name.partition("/")[0]] += count
     twice = sum(geometries.values()) - len(geometries)
     assert len(geometries) == asked.geometries, (len(geometries), asked.geometries)
     assert twice <= 2 * asked.workers * len(events), twice
@@ -267,7 +264,7 @@ def judge(
         "seconds": round(seconds, 1),
         "made_twice": twice,
         "puts_a_variant": round(sum(puts.values()) / last["variants"], 3),
-        "puts": kinds,
+        "puts": Counter(name.partition("/")[0] for name in puts.elements()),
         "parent_bytes_a_variant": round(parent.bytes_passed() / last["variants"]),
         "out_bytes_a_variant": round(int(size) / last["variants"]),
     }

@@ -57,6 +57,20 @@ def test_large_results_and_those_met_long_ago_are_not_kept(monkeypatch):
     assert made[2:] == ["a", "b", "c", "b"]
 
 
+def test_a_small_result_of_large_arrays_is_not_kept():
+    """The arrays would be kept with it, to tell it by."""
+    made = []
+
+    @kept
+    def largest(values: np.ndarray) -> tuple[np.ndarray]:
+        made.append(values.size)
+        return (values.max(keepdims=True),)
+
+    for size in (1, 1, module._MOST_BYTES // 8, module._MOST_BYTES // 8):
+        largest(np.zeros(size))
+    assert made == [1, module._MOST_BYTES // 8, module._MOST_BYTES // 8]
+
+
 @pytest.mark.parametrize("load", [DISC, UniformDisc(3.5e-3, "radial"), Point("tangential")], ids=str)
 def test_a_response_at_radii_met_before_is_the_same_to_the_bit(load):
     """Others in between have all but the load, the radii, the depth or the path alike."""

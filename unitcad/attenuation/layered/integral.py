@@ -196,16 +196,15 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         if left == 0 or np.max(off) <= _PANELS_SHARE * wanted:
             bad[:] = False
         due = put_off.due(found, bad)
-        whole_round = not (due.size or np.any(bad))
-        kept: slice | np.ndarray = slice(None)
+        dropped = np.isin(put_off.of, due) if due.size else np.zeros_like(bad)
+        bad &= ~dropped
+        room = (MAX_PANELS - done) // 4  # quarters of them are what is left
+        exhausted = exhausted or bool(np.count_nonzero(bad) > room)
+        bad = _worst(found.gains, bad, room)
+        good = ~(bad | dropped)
+        whole_round = bool(np.all(good))
+        kept = slice(None) if whole_round else good
         if not whole_round:
-            dropped = np.isin(put_off.of, due)
-            bad &= ~dropped
-            room = (MAX_PANELS - done) // 4  # quarters of them are what is left
-            exhausted = exhausted or bool(np.count_nonzero(bad) > room)
-            bad = _worst(found.gains, bad, room)
-            kept = ~(bad | dropped)
-            whole_round = bool(np.all(kept))
             parts, errors = found.parts[kept].sum(0), found.errors[kept].sum(0)
         total = total + parts
         quadrature += errors

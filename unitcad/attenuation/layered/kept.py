@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 _MOST_BYTES = 500_000
-"""Of a result that is kept."""
+"""Of a result that is kept, with the arrays that it is of."""
 _RESULTS = 16
 """Kept of each function: 8 MB at most."""
 
@@ -30,7 +30,8 @@ def kept(make: Callable[..., Made]) -> Callable[..., Made]:
             result = make(*arguments)
             for array in result:
                 array.flags.writeable = False
-            if sum(array.nbytes for array in result) > _MOST_BYTES:
+            arrays = (*result, *(one for one in arguments if isinstance(one, np.ndarray)))
+            if sum(array.nbytes for array in arrays) > _MOST_BYTES:
                 return result
         results[key] = result  # the last one now
         for oldest in list(results)[:-_RESULTS]:
