@@ -133,7 +133,7 @@ def test_a_name_that_deceives_is_refused_with_its_field(name: str, place: str, c
     fields = {"name": "name", "material": "layers.0.material", "parameter": "parameters.x"}
     assert refused.value.field == fields.get(place, refused.value.field)
     assert text.invisible(str(refused.value)) is None
-    say_error(refused.value, as_json=False)
+    say_error(refused.value, "text")
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert all(unicodedata.category(c) != "Cc" for c in said.removesuffix("\n"))
@@ -143,7 +143,7 @@ def test_a_name_that_deceives_is_refused_with_its_field(name: str, place: str, c
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_an_error_about_a_file_or_from_a_design_is_no_order_to_the_terminal(name: str, capsys) -> None:
-    say_error(UnitcadError(f"{name}: no such file"), as_json=False)
+    say_error(UnitcadError(f"{name}: no such file"), "text")
     assert text.invisible(capsys.readouterr().err.removesuffix("\n")) is None
 
 
