@@ -17,6 +17,8 @@ LEVEL = float(np.cos(np.radians(45.0)))  # normals steeper than this belong to a
 SLACK = 0.995  # of the floor: a wall drawn at the floor passes after rounding and tessellation
 _SAMPLES = 40_000
 _FINEST = 6  # a face has at most _FINEST (_FINEST + 1) / 2 points
+_ROUNDING_MM = 1e-6
+_BLOCKS, _POINTS = 4, 2048  # a look at the faces may take so many blocks of box pairs, and one for so many points
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,18 @@ def cast(topology: Topology, floors: tuple[float, float], least: float, tick: Ti
     sound = double > 1e-3 * longest  # a height of a micrometre: below it a face has no direction worth following
     points, owner = _spread_points(corners, longest, sound, upright or level)
     normal = side * topology.areas / np.maximum(double, 1e-300)[:, None]
-    floor = (np.where(lying(topology), level, upright) * SLACK)[owner]
-    return Rays(points, owner, floor, *_behind(corners, normal, sound, points, owner, np.maximum(floor, least), tick))
+    floor = np.where(lying(topology), level, upright) * SLACK
+    reach = np.maximum(floor, least)
+    thickness, behind = np.full((2, len(points)), np.inf)
+    across = np.full(len(points), -1)
+    solid = np.flatnonzero(sound)
+    if len(solid):
+        seeing = _seeing(corners, normal, solid, reach, len(points), tick)
+        cast = np.flatnonzero(seeing[owner])
+        thickness[cast], behind[cast], across[cast] = _behind(
+            corners, normal, solid, points[cast], owner[cast], reach[owner[cast]], tick
+        )
+    return Rays(points, owner, floor[owner], thickness, behind, across)
 
 
 def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float) -> tuple[Floats, Ints]:
@@ -67,8 +79,47 @@ def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float)
     return np.concatenate(points), np.concatenate(owner)
 
 
+class _Many(Exception):
+    """Box pairs so many that rays alone are cast in less time."""
+
+
+def _seeing(corners: Floats, normal: Floats, solid: Ints, reach: Floats, points: int, tick: Tick) -> Bools:
+    """Return which faces, of `solid` ones, may see an opposed face within `reach` behind them: no ray of others hits.
+
+    Most see none. All of them where the boxes of so many meet that the rays of all `points` are cast in less time.
+    """
+    seeing = np.zeros(len(corners), bool)
+    blocks = _BLOCKS + points // _POINTS
+
+    def counted() -> None:
+        nonlocal blocks
+        tick()
+        blocks -= 1
+        if not blocks:
+            raise _Many
+
+    swept = corners[solid] - (normal * reach[:, None])[solid, None]
+    places = np.concatenate([corners[solid], swept]).reshape(-1, 3)
+    steps = frame_of(places).steps(places)
+    first = 3 * np.arange(len(solid))
+    order = morton_order(steps, first)
+    first, by_place = first[order], solid[order]
+    here = [first + k for k in range(3)]
+    there = [corner + 3 * len(solid) for corner in here]
+    try:
+        for i, j in meeting_between(boxes_of(steps, *here, *there), boxes_of(steps, *here), counted):
+            face, other = by_place[i], by_place[j]
+            opposed = np.einsum("ij,ij->i", normal[face], normal[other]) < -OPPOSED
+            face, other = face[opposed], other[opposed]
+            away = np.einsum("ikx,ix->ik", corners[other] - corners[face, :1], normal[face])
+            seeing[face[(away.min(axis=1) < 0.0) & (away.max(axis=1) > -reach[face] - _ROUNDING_MM)]] = True
+    except _Many:
+        seeing[solid] = True
+    return seeing
+
+
 def _behind(
-    corners: Floats, normal: Floats, sound: Floats, points: Floats, owner: Ints, reach: Floats, tick: Tick
+    corners: Floats, normal: Floats, solid: Ints, points: Floats, owner: Ints, reach: Floats, tick: Tick
 ) -> tuple[Floats, Floats, Ints]:
     """Return distances from each point, against its normal, and the face across, as `Rays` has them."""
     thickness, behind = np.full((2, len(points)), np.inf)
@@ -76,7 +127,6 @@ def _behind(
     ends = points - normal[owner] * reach[:, None]
     if not len(points):
         return thickness, behind, across
-    solid = np.flatnonzero(sound)
     places = np.concatenate([points, ends, corners[solid].reshape(-1, 3)])
     steps = frame_of(places).steps(places)
     n, m = len(points), len(solid)
