@@ -13,11 +13,13 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.errors import UnitcadError
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.beside import Beside, started
 from unitcad.pipeline.build import Built, build
+from unitcad.report.viewer_models import model
 from unitcad.shape import Revolve, Union, cylinder, polygon, turned
+from unitcad.spec import spec_hash
 from unitcad.validation import load
 
 
@@ -71,6 +73,18 @@ def test_what_the_process_gives_is_taken_and_what_it_has_not_begun_is_made_here(
         assert made_here == ["estimate"]
         assert first()["variant"]["diameter_mm"] == spec.diameter_mm
         assert made_here == ["estimate"]
+
+
+def test_a_function_is_called_there_and_here_where_that_fails() -> None:
+    spec, small = load("single-embedded"), load("single-embedded", {"moulds.bed_x_mm": 20})
+    with Beside(rest=True) as process:
+        assert process.call(spec_hash, spec)() == spec_hash(spec)
+        with pytest.raises(Refusal, match="bed"):
+            process.call(model, small)()
+        assert process.call(spec_hash, spec)() == spec_hash(spec)
+        _killed(process)
+        assert process.call(spec_hash, spec)() == spec_hash(spec)
+    assert Beside().call(spec_hash, spec)() == spec_hash(spec)
 
 
 def test_what_is_refused_there_is_refused_here() -> None:

@@ -11,7 +11,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from unitcad.cache import MemoryStore
@@ -19,6 +22,7 @@ from unitcad.cli import app
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.build import build
 from unitcad.report import page, read_results, write_report
+from unitcad.report.html_page import compressed
 from unitcad.report.pool import REFERENCE, Pool
 from unitcad.report.viewer_models import model, model_key
 from unitcad.validation import load, templates
@@ -52,6 +56,15 @@ def test_pool_says_everything_once() -> None:
     assert resolved(other, pool.entries) == {"a": long, "b": 2}
     assert json.dumps([first, again, other, pool.entries]).count("x" * 500) == 1
     assert pool.put("short") == "short"
+
+
+@given(st.lists(st.tuples(st.binary(max_size=2000), st.text(max_size=50))))
+def test_what_is_in_base_64_is_packed_as_small_as_gzip_would(parts: list[tuple[bytes, str]]) -> None:
+    rng = np.random.default_rng(1)
+    content = b"".join(base64.b64encode(rng.bytes(len(one)) + one) + text.encode() for one, text in parts)
+    packed = base64.b64decode(compressed(content))
+    assert gzip.decompress(packed) == content
+    assert len(packed) < 1.02 * len(gzip.compress(content, 6)) + 40 * (len(parts) + 1)
 
 
 def test_a_page_holds_what_the_folder_holds(built: Path) -> None:

@@ -65,7 +65,7 @@ def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running: Any
     run(sweep, tmp_path / "walls", options, SerialExecutor(), workers=1)
     assert not list((tmp_path / "walls").glob("single-*"))
     with serving(tmp_path, str(tmp_path / "walls")) as own:
-        folder = next(row[0] for row in page_data(tmp_path / "walls", with_models=False)[0]["table"]["rows"])
+        folder = next(row[0] for row in page_data(tmp_path / "walls", modelled=None)[0]["table"]["rows"])
         for wrong in ("single-embedded-000000000000", f"other-{folder[-12:]}", folder[-12:-1], "-"):
             assert own.send(f"/variant/{wrong}")[0] == 404
         visit = Live(running, own)

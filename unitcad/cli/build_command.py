@@ -131,11 +131,9 @@ def _built(
                 else:
                     results.append(made())
                 if page or (page is None and only is None) or (results[-1].folder / PAGE).is_file():
-                    from unitcad.report import write_report
-
                     say("page")
                     with held(results[-1].folder):
-                        write_report(results[-1].folder, warn)
+                        _write_page(results[-1].folder, spec, beside)
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:
@@ -146,6 +144,19 @@ def _built(
                 warn(f"{spec.name}: {line}")
             typer.echo(str(result.folder))
     return all(result.ok for result in results)
+
+
+def _write_page(folder: Path, of: Made, beside: Beside) -> None:
+    """Write the page of a result; what it shows of a unit's geometry is made beside the rest of it."""
+    from unitcad.report import write_report
+    from unitcad.report.viewer_models import model
+    from unitcad.spec import Spec, with_formats
+
+    if not isinstance(of, Spec):
+        write_report(folder, warn)
+        return
+    built, given = with_formats(of), beside.call(model, of)
+    write_report(folder, warn, lambda there: given() if with_formats(there) == built else model(there))
 
 
 def _loaded(source: str, changes: Changes) -> Made:

@@ -115,6 +115,17 @@ class Beside:
 
         return made
 
+    def call(self, function: Callable[..., Any], spec: Spec) -> Callable[[], Any]:
+        """Ask for what a function of a module gives for a spec; return what gives it, as `estimate`."""
+        from unitcad.spec import to_json
+        from unitcad.spec.custom_code import is_custom
+
+        process = self._rest or self._step
+        if process is None or is_custom(spec.design):
+            return lambda: function(spec)
+        asked = process.answer(("call", (function, to_json(spec))))
+        return lambda: _given(asked, lambda: function(spec))
+
 
 def _given(asked: Future[Any], here: Callable[[], Any]) -> Any:
     """Return the process's answer; what `here` makes where it has not begun, is lost or could not."""

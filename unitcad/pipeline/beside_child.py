@@ -41,6 +41,9 @@ def begin() -> Callable[[tuple[str, Any]], object]:
                     return _step(*of)
                 case "estimate":
                     return _estimate(of)
+                case "call":
+                    function, spec = of
+                    return function(from_json(spec))
                 case _:
                     geometry, name = of
                     return pictures(geometry).picture(name)

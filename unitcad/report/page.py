@@ -32,10 +32,15 @@ MOST_DAMAGED = 20
 STYLES = ("vendor/uplot.min.css", "app/page.css", "app/print.css")
 
 
-def write_report(folder: Path, warn: Callable[[str], None] = lambda line: None) -> Path:
+def write_report(
+    folder: Path,
+    warn: Callable[[str], None] = lambda line: None,
+    modelled: Callable[[Spec], dict[str, Any]] = model,
+) -> Path:
     """Write `folder`/report.html for the variant or the batch in `folder`; returns its path.
 
-    `warn` gets lines that say which results are damaged, and why. Raises UnitcadError where the folder holds none.
+    `warn` gets lines that say which results are damaged, and why; `modelled` gives the models of a unit's geometry.
+    Raises UnitcadError where the folder holds none.
     """
     if read_results.is_array_folder(folder):
         from unitcad.report.array_page import write_array_page
@@ -47,7 +52,7 @@ def write_report(folder: Path, warn: Callable[[str], None] = lambda line: None) 
         return write_array_page(folder, warn)
     if folder.is_dir() and read_results.is_variant(folder):
         _write_bench(folder, warn)
-    data, title, damage = page_data(folder)
+    data, title, damage = page_data(folder, modelled)
     target = folder / PAGE
     if damage:
         of = max(len(data["variants"]), len(data["table"]["rows"]) if data["table"] else 0)
@@ -68,10 +73,12 @@ def _write_bench(folder: Path, warn: Callable[[str], None]) -> None:
         warn(f"warning: no {BENCH}: {error}")
 
 
-def page_data(folder: Path, with_models: bool = True) -> tuple[dict[str, Any], str, dict[str, str]]:
+def page_data(
+    folder: Path, modelled: Callable[[Spec], dict[str, Any]] | None = model
+) -> tuple[dict[str, Any], str, dict[str, str]]:
     """Collect the page's data, its title, and why a result is damaged by its folder's name.
 
-    Geometries are made only `with_models`. Raises UnitcadError where the folder holds no result.
+    Geometries are made by `modelled`, none without it. Raises UnitcadError where the folder holds no result.
     """
     if not folder.is_dir():
         raise UnitcadError(f"{folder}: is not a folder")
@@ -101,7 +108,7 @@ def page_data(folder: Path, with_models: bool = True) -> tuple[dict[str, Any], s
         of_variants = {name: why for name, why in damaged.items() if name != "batch.json"}
         table = read_results.results_table(batch, records, of_variants, stored=read_results.keeps_store(folder))
         title = f"{(batch or {}).get('name') or folder.resolve().name}: {counted(len(table.rows), 'variant')}"
-    models = _models(records, specs) if with_models else {}
+    models = _models(records, specs, modelled) if modelled else {}
     pool = Pool()
     data = {
         "title": title,
@@ -144,14 +151,16 @@ def _typical(scores: Any) -> float | None:
     return typical if isinstance(typical, float) else None
 
 
-def _models(records: list[VariantRecord], specs: Iterable[Spec | None]) -> dict[str, Any]:
+def _models(
+    records: list[VariantRecord], specs: Iterable[Spec | None], modelled: Callable[[Spec], dict[str, Any]]
+) -> dict[str, Any]:
     """Return each geometry once, by its key; a record whose geometry can't be made gets the reason."""
     models: dict[str, Any] = {}
     for record, spec in zip(records, specs, strict=True):
         if spec is None or record.model is None or record.model in models:
             continue
         try:
-            models[record.model] = model(spec)
+            models[record.model] = modelled(spec)
         except UnitcadError as error:
             record.model, record.no_model = None, str(error)
     return models

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +10,7 @@ from unitcad.pipeline.artifacts import GEOMETRIC
 from unitcad.pipeline.bodies import glb_content
 from unitcad.pipeline.geometry import build_key
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
-from unitcad.report.html_page import EFFORT
+from unitcad.report.html_page import compressed
 from unitcad.spec import Spec, read_toml, with_formats
 from unitcad.validation import from_data
 
@@ -48,8 +46,3 @@ def cells(moulds: MouldSet) -> list[list[float]]:
     """Return where the unit's layers stand in the moulds: x, y (mm) and quarter turns about z, a cell each."""
     one_sided = moulds.dimensions.sides == (1,)
     return [[cell.x, cell.y, 2 if one_sided and cell.sides == (-1,) else 0] for cell in moulds.plan.layout.cells]
-
-
-def compressed(content: bytes) -> str:
-    """Return a file's content compressed, in base 64."""
-    return base64.b64encode(gzip.compress(content, EFFORT, mtime=0)).decode()

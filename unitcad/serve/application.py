@@ -117,7 +117,7 @@ class Live:
             return self._keeping(RedirectResponse("/", 303))
         if setting.campaign:
             return await self._campaign(setting.campaign)
-        batch = page_data(setting.batch, with_models=False)[0] if setting.batch else None
+        batch = page_data(setting.batch, modelled=None)[0] if setting.batch else None
         html = live_page(setting.text, setting.name, str(setting.folder), setting.starts, batch)
         return self._html(html)
 

@@ -113,7 +113,7 @@ def _source(source: str | None) -> tuple[str | None, Path | None]:
     if is_variant(folder):
         return str(folder / (ARRAY if is_array_folder(folder) else "spec.toml")), None
     try:
-        page_data(folder, with_models=False)
+        page_data(folder, modelled=None)
     except UnitcadError as error:
         specs = sorted(path for path in folder.glob("*.toml") if _is_spec(path))
         if len(specs) == 1:
