@@ -7,7 +7,7 @@ import pytest
 from exact_pairs import counts
 from shapes import CUBE_CORNERS, CUBE_FACES
 
-from unitcad.check.geometry import self_crossing
+from unitcad.check.geometry import self_crossing, small_shells
 from unitcad.check.geometry.arranged import arranged
 from unitcad.check.geometry.stars import stars_of
 from unitcad.check.geometry.topology import topology_of
@@ -16,7 +16,7 @@ from unitcad.check.rules.f_limits import Deadline
 from unitcad.geometry import boxes
 
 KINDS = ["lattice", "lattice of tenths", "random", "one tilted plane", "sheared lattice", "slivers", "about a vertex",
-         "two heights", "boxes", "turned boxes", "far away"]  # fmt: skip
+         "two heights", "boxes", "turned boxes", "block of boxes", "block of boxes and sheets", "far away"]  # fmt: skip
 
 
 def _soup(kind: str, rng: np.random.Generator) -> np.ndarray:
@@ -39,6 +39,11 @@ def _soup(kind: str, rng: np.random.Generator) -> np.ndarray:
         return lattice
     if kind == "two heights":
         return np.abs(lattice) * [1, 1, 0.5]
+    if "block" in kind:
+        sizes = [1.0, 1.0, 0.0] if "sheets" in kind else [1.0, 1.0, 0.5]
+        places = rng.integers(0, 3, (5, 3)).astype(float)
+        boxes = [CUBE_CORNERS * (rng.choice(sizes, 3) if i % 2 else 1) + at for i, at in enumerate(places)]
+        return np.concatenate([box[CUBE_FACES[:, :: rng.choice([1, -1])]] for box in boxes])
     if "boxes" in kind:
         boxes = [CUBE_CORNERS * rng.choice([0.5, 1, 2], 3) + rng.choice([0, 0.5, 1], 3) for _ in range(2)]
         if kind == "turned boxes":
@@ -62,15 +67,25 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
     faces, labels = top.stored[solid], top.shells[solid]
     if len(faces) < 2:
         return 0, 0, 0
-    found = self_crossing.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick)
     crossings, overlaps, touching = counts(vertices, faces)
+    shells = {tuple(sorted((int(labels[i]), int(labels[j])))) for i, j in touching if labels[i] != labels[j]}
+    for least in (small_shells.LEAST_SHELLS, 1):  # by a tree over all faces, and shell by shell
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(small_shells, "LEAST_SHELLS", least)
+            patch.setattr(small_shells, "_MOST_FACES", 100)
+            patch.setattr(small_shells, "_MOST_PAIRS", 1000)
+            found = self_crossing.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick)
+        assert (found.meeting is not None) == (least == 1 and top.stored is top.mesh.faces)
+        _agree(found, kind, crossings, overlaps)
+        assert {tuple(pair) for pair in found.touching().tolist()} == shells
+    return crossings, len(self_crossing.joined(found.covering)), len(shells)
+
+
+def _agree(found: self_crossing.Crossings, kind: str, crossings: int, overlaps: tuple[int, int]) -> None:
     assert len(self_crossing.joined(found.crossing)) == crossings
     # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.
     covers = len(self_crossing.joined(found.covering))
     assert (0 if kind == "slivers" else overlaps[0]) <= covers <= overlaps[1]
-    shells = {tuple(sorted((int(labels[i]), int(labels[j])))) for i, j in touching if labels[i] != labels[j]}
-    assert {tuple(pair) for pair in found.touching().tolist()} == shells
-    return crossings, covers, len(shells)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -195,13 +195,19 @@ def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
     corners = np.concatenate([low, high])
     steps = frame_of(corners).steps(corners)
     order = morton_order(steps, np.arange(n))
-    blocks = [np.empty((0, 2), np.int64)]
+    sides = [(np.ascontiguousarray(low[:, axis]), np.ascontiguousarray(high[:, axis])) for axis in range(3)]
+    half, keys = np.uint64(32), [np.empty(0, np.uint64)]
     for i, j in meeting_pairs(boxes_of(steps, order, order + n), tick):
-        pair = np.sort(np.stack([order[i], order[j]], axis=1), axis=1).astype(np.int64)
-        one, other = pair.T
-        blocks.append(pair[((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)])
-    pairs = np.concatenate(blocks)
-    return pairs[np.lexsort(pairs.T[::-1])]
+        i, j = order.take(i), order.take(j)
+        meet = np.ones(len(i), bool)
+        for least, most in sides:
+            meet &= least.take(i) <= most.take(j)
+            meet &= least.take(j) <= most.take(i)
+        i, j = i[meet], j[meet]
+        keys.append(np.minimum(i, j).astype(np.uint64) << half | np.maximum(i, j).astype(np.uint64))
+    key = np.concatenate(keys)
+    key.sort()
+    return np.stack([key >> half, key & np.uint64(0xFFFFFFFF)], axis=1).astype(np.int64)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from unitcad.check.geometry.arranged import Arranged
 from unitcad.check.geometry.common_corners import CommonCorners, common_corners
 from unitcad.check.geometry.contact import Contacts, FaceBoxes, face_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
+from unitcad.check.geometry.small_shells import small_shells
 from unitcad.check.geometry.stars import Stars
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import MANY, same_place
@@ -85,8 +86,9 @@ def _sieve(faces: Faces, some: Ints | None = None) -> Sieve:
 class Crossings:
     """Pairs of `faces` that meet, collected over the blocks; `stopped`: why not all were looked at, None if they were.
 
-    `crossing` pass through each other, `covering` overlap in one plane; `contact` has pairs of shells that meet. Those
-    of one of several `parts` of the walk have no `faces` of their own.
+    `crossing` pass through each other, `covering` overlap in one plane; `contact` has pairs of shells that meet, and
+    `meeting` (k, 2) those whose boxes do, sorted, where they were needed. Those of one of several `parts` of the walk
+    have no `faces` of their own.
     """
 
     faces: Faces | None = None
@@ -97,6 +99,7 @@ class Crossings:
     kept: int = 0
     looked_at: int = 0
     parts: int = 1
+    meeting: Ints | None = None
     stopped: Interrupted | None = None
 
     @property
@@ -120,7 +123,15 @@ def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, 
     tick()
     faces, slabs = _prepared(topology, ready, stars), ready.slabs
     crossings = Crossings(faces, Contacts(topology.n_shells, every=every))
-    walks = meeting_parts(ready.steps, _PARTS if len(ready.order) >= MANY else 1, tick)
+    parts = _PARTS if len(ready.order) >= MANY else 1
+    small = None
+    if not every:
+        small = small_shells(topology, faces.shell, faces.columns, faces.corners, faces.places, ready.steps, tick)
+    if small is not None:
+        walks, crossings.meeting = small.parts(parts, tick), small.meeting
+        crossings.contact.add(small.keys, small.touching)
+    else:
+        walks = meeting_parts(ready.steps, parts, tick)
 
     def part(k: int) -> Crossings:
         # Each begins with nothing known: which process does it has no say in what is found.

@@ -97,7 +97,8 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     depth, overlaps = np.zeros(n, int), list[tuple[int, int]]()
     try:
         if n > 1:
-            _relate(topology, np.asarray(sound), crossings.touching(), depth, overlaps, part.tick)
+            meeting = box_pairs(low, high, part.tick) if crossings.meeting is None else crossings.meeting
+            _relate(topology, np.asarray(sound), meeting, crossings.touching(), depth, overlaps, part.tick)
     except Interrupted:
         yield from _overlapping(topology, overlaps)
         raise
@@ -138,22 +139,30 @@ def _overlapping(topology: Topology, overlaps: list[tuple[int, int]]) -> list[Fi
 
 
 def _relate(
-    topology: Topology, sound: Bools, touching: Ints, depth: Ints, overlaps: list[tuple[int, int]], tick: Tick
+    topology: Topology,
+    sound: Bools,
+    pairs: Ints,
+    touching: Ints,
+    depth: Ints,
+    overlaps: list[tuple[int, int]],
+    tick: Tick,
 ) -> None:
     """Add to `depth` how many sound shells each one lies in, and to `overlaps` the pairs that touch and share volume.
 
-    Shells that touch are given to manifold3d, unless their boxes have too little room in common.
+    `pairs` are those whose boxes meet, sorted. Shells that touch are given to manifold3d, unless their boxes have too
+    little room in common.
     """
     vertices, faces, volumes = topology.mesh.vertices, topology.mesh.faces, topology.volumes
-    low, high, n = topology.low, topology.high, topology.n_shells
-    pairs = box_pairs(low, high, tick)
-    pairs = pairs[sound[pairs].all(axis=1)]
-    one, other = pairs.T
+    n = topology.n_shells
+    one, other = np.ascontiguousarray(pairs.T)
+    both = sound.take(one) & sound.take(other)
+    pairs, one, other = pairs[both], one[both], other[both]
     touch = among(one * n + other, touching[:, 0].astype(np.int64) * n + touching[:, 1])
     faces_of = _faces_by_shell(topology.shells, n)
-    sides = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
-    least = np.minimum(np.abs(volumes[one]), np.abs(volumes[other]))
-    close = np.flatnonzero(touch & (sides.prod(axis=1) > _SHARE * least))
+    room, inside, outside = _common_room(topology, one, other)
+    size = np.abs(volumes)
+    least = np.minimum(size.take(one), size.take(other))
+    close = np.flatnonzero(touch & (room > _SHARE * least))
     solids: dict[int, Manifold] = {}
     before = -1
     for at in close.tolist():
@@ -166,12 +175,26 @@ def _relate(
             overlaps.append((a, b))
         elif common > (1 - _SHARE) * least[at]:  # a cavity that touches the wall
             depth[a if abs(volumes[a]) < abs(volumes[b]) else b] += 1
-    for inner, outer in ((one, other), (other, one)):
-        within = (low[inner] >= low[outer]).all(axis=1) & (high[inner] <= high[outer]).all(axis=1)
+    for inner, outer, within in ((one, other, inside), (other, one, outside)):
         for at in np.flatnonzero(within & ~touch).tolist():
             tick()
             point = vertices[faces[faces_of(inner[at])[0], 0]]
             depth[inner[at]] += winding_number(vertices, faces[faces_of(outer[at])], point) != 0
+
+
+def _common_room(topology: Topology, one: Ints, other: Ints) -> tuple[Floats, Bools, Bools]:
+    """Return what the boxes of pairs of shells have in common, mm3, which of `one` lie in the other's, and the reverse.
+
+    By columns, which is several times faster than by rows.
+    """
+    room, (inside, outside) = np.ones(len(one)), np.ones((2, len(one)), bool)
+    for axis in range(3):
+        low, high = np.ascontiguousarray(topology.low[:, axis]), np.ascontiguousarray(topology.high[:, axis])
+        low_one, high_one, low_other, high_other = (side.take(i) for i in (one, other) for side in (low, high))
+        room *= np.minimum(high_one, high_other) - np.maximum(low_one, low_other)
+        inside &= (low_one >= low_other) & (high_one <= high_other)
+        outside &= (low_one <= low_other) & (high_one >= high_other)
+    return room, inside, outside
 
 
 def _where(topology: Topology, *shells: int) -> Location:
