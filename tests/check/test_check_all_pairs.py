@@ -41,7 +41,7 @@ def _soup(kind: str, rng: np.random.Generator) -> np.ndarray:
         return np.abs(lattice) * [1, 1, 0.5]
     if "block" in kind:
         sizes = [1.0, 1.0, 0.0] if "sheets" in kind else [1.0, 1.0, 0.5]
-        places = rng.integers(0, 3, (5, 3)).astype(float)
+        places = rng.integers(0, 3, (4, 3)).astype(float)
         boxes = [CUBE_CORNERS * (rng.choice(sizes, 3) if i % 2 else 1) + at for i, at in enumerate(places)]
         return np.concatenate([box[CUBE_FACES[:, :: rng.choice([1, -1])]] for box in boxes])
     if "boxes" in kind:

@@ -56,6 +56,8 @@ def test_pool_says_everything_once() -> None:
     assert resolved(other, pool.entries) == {"a": long, "b": 2}
     assert json.dumps([first, again, other, pool.entries]).count("x" * 500) == 1
     assert pool.put("short") == "short"
+    no_text = "\udc80" * 200
+    assert resolved(pool.put([no_text, no_text]), pool.entries) == [no_text, no_text]
 
 
 @given(st.lists(st.tuples(st.binary(max_size=2000), st.text(max_size=50))))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from unitcad.pipeline.build import Built
     from unitcad.pipeline.manifest_records import Manifest
     from unitcad.pipeline.subjects import Made
+    from unitcad.spec import Spec
     from unitcad.validation import Changes
 
 
@@ -107,6 +108,7 @@ def _built(
         from unitcad.pipeline.folder import PAGE, held
 
         keep_freed_memory()
+        paged = only is None if page is None else page
         changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
         allow_code(code)
         # Every spec is validated before the first one is built.
@@ -123,6 +125,8 @@ def _built(
                 check_slicing(unit_of(spec), chosen)
         for i, spec in enumerate(wanted):
             with progress(spec.name) as say:
+                # Asked for first where that keeps no STEP waiting: pictures that it delays are drawn here.
+                modelled = _modelled(spec, beside) if paged and beside.estimates else None
                 made = partial(_builder(spec), out, only=chosen, check=not no_check, say=say, beside=beside)
                 if slicing:
                     with begin(unit_of(spec), out / subject_of(spec).folder_name, say) as pieces:
@@ -130,10 +134,12 @@ def _built(
                         printing[i] = finish(pieces, results[-1].folder, results[-1].manifest)
                 else:
                     results.append(made())
-                if page or (page is None and only is None) or (results[-1].folder / PAGE).is_file():
+                if paged or (results[-1].folder / PAGE).is_file():
                     say("page")
                     with held(results[-1].folder):
-                        _write_page(results[-1].folder, spec, beside)
+                        from unitcad.report import write_report
+
+                        write_report(results[-1].folder, warn, modelled or _modelled(spec, beside))
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:
@@ -146,17 +152,15 @@ def _built(
     return all(result.ok for result in results)
 
 
-def _write_page(folder: Path, of: Made, beside: Beside) -> None:
-    """Write the page of a result; what it shows of a unit's geometry is made beside the rest of it."""
-    from unitcad.report import write_report
+def _modelled(of: Made, beside: Beside) -> Callable[[Spec], dict[str, Any]]:
+    """Ask for what the page shows of a unit's geometry, beside the rest; return what gives it for the spec built."""
     from unitcad.report.viewer_models import model
     from unitcad.spec import Spec, with_formats
 
     if not isinstance(of, Spec):
-        write_report(folder, warn)
-        return
+        return model
     built, given = with_formats(of), beside.call(model, of)
-    write_report(folder, warn, lambda there: given() if with_formats(there) == built else model(there))
+    return lambda there: given() if with_formats(there) == built else model(there)
 
 
 def _loaded(source: str, changes: Changes) -> Made:

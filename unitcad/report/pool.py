@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import msgspec
+
 REFERENCE = "\0"
 """The key of a reference, {REFERENCE: index in the pool}: no spec or result has it, since TOML and JSON names of ours
 are text without a NUL."""
 LEAST = 160
-"""Characters of JSON below which a part is not worth a reference."""
+"""Bytes of JSON below which a part is not worth a reference."""
+_ENCODER = msgspec.json.Encoder()
 
 
 class Pool:
@@ -17,13 +20,13 @@ class Pool:
 
     def __init__(self) -> None:
         self.entries: list[Any] = []
-        self._index: dict[str, int] = {}
+        self._index: dict[bytes, int] = {}
 
     def put(self, data: Any) -> Any:
         """Return `data` (what JSON can hold) with every larger part replaced by a reference."""
         if not isinstance(data, dict | list | tuple | str):
             return data
-        text = json.dumps(data, allow_nan=False, ensure_ascii=False)
+        text = _encoded(data)
         if len(text) < LEAST:
             return data
         if text not in self._index:
@@ -34,3 +37,11 @@ class Pool:
             self._index[text] = len(self.entries)
             self.entries.append(data)
         return {REFERENCE: self._index[text]}
+
+
+def _encoded(data: Any) -> bytes:
+    """Return data as JSON, by the encoder that is ten times as fast as Python's where it can write all of it."""
+    try:
+        return _ENCODER.encode(data)
+    except UnicodeEncodeError:  # names of files that are no text
+        return json.dumps(data).encode()

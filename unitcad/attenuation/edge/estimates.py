@@ -109,7 +109,13 @@ def estimate(
     # The units of a lab's fit may have other lengths than the paper's.
     lead = answer(data, expected) if fit else answer(data, expected, unlike_measured(variant), held)
     whole = {"variant": data.pop("variant"), "answer": lead, **data}
-    return {name: block if name == "layered" else rounded(block) for name, block in whole.items()}
+    # The solver's block and every table_error are rounded already.
+    models_rounded = {
+        model: {key: part if key == "table_error" else rounded(part) for key, part in block.items()}
+        for model, block in blocks.items()
+    }
+    done = {"models": models_rounded, "layered": data["layered"], "table_error": data["table_error"]}
+    return {name: done[name] if name in done else rounded(block) for name, block in whole.items()}
 
 
 def not_of_this_drive(variant: EstimateInput, models: Sequence[str]) -> list[str]:
@@ -193,7 +199,7 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
 
 @lru_cache
 def table_error(moduli: Moduli = "dynamic") -> dict[str, Any]:
-    """Return every model's errors against the measured table by such moduli, and the null model's.
+    """Return every model's errors against the measured table by such moduli, and the null model's, to nine digits.
 
     `order`: by the score with a unit left out, the best first. `sign_flip`: p of each pair, the better one first.
     `chosen_without`: the score when the form is chosen without the unit too.
@@ -206,7 +212,7 @@ def table_error(moduli: Moduli = "dynamic") -> dict[str, Any]:
         p = best.get(name)
         by_model[name]["against_best"] = {"model": order[0], "p": p, "told_apart": p is not None and p <= SAME_P}
     chosen = choice(moduli)
-    return {
+    table = {
         **by_model,
         "what": TABLE_NOTE + ("; by moduli of a slow pull" if moduli == "quasi-static" else ""),
         "moduli": moduli,
@@ -224,6 +230,7 @@ def table_error(moduli: Moduli = "dynamic") -> dict[str, Any]:
             "chosen": list(chosen.chosen),
         },
     }
+    return rounded(table)
 
 
 def assessment_block(assessment: Assessment) -> dict[str, Any]:
