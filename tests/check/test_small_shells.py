@@ -9,7 +9,7 @@ import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.check import Options, check_mesh
-from unitcad.check.geometry import self_crossing, small_shells
+from unitcad.check.geometry import self_crossing
 
 Built = tuple[np.ndarray, np.ndarray]
 
@@ -53,9 +53,9 @@ def test_findings_are_those_of_a_tree_over_all_faces(
 
     by_shell = counts()
     assert used == [True]
-    monkeypatch.setattr(small_shells, "LEAST_SHELLS", 10**9)
+    monkeypatch.setattr(self_crossing, "LEAST_SHELLS", 10**9)
     assert counts() == by_shell
-    assert used == [True, False]
+    assert used == [True]
     assert by_shell.keys() >= {"G003", "G004"}
     assert ("G001" in by_shell) == (draw is not voxels)
 

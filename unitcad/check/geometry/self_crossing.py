@@ -19,12 +19,12 @@ from unitcad.check.geometry.arranged import Arranged
 from unitcad.check.geometry.common_corners import CommonCorners, common_corners
 from unitcad.check.geometry.contact import Contacts, FaceBoxes, face_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
-from unitcad.check.geometry.small_shells import small_shells
+from unitcad.check.geometry.small_shells import LEAST_SHELLS, small_shells
 from unitcad.check.geometry.stars import Stars
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import MANY, same_place
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct
-from unitcad.geometry.boxes import Slabs, meeting_parts
+from unitcad.geometry.boxes import Slabs, box_pairs, meeting_parts
 from unitcad.geometry.ticks import Interrupted, Tick
 from unitcad.sharing import shared
 
@@ -125,13 +125,14 @@ def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, 
     crossings = Crossings(faces, Contacts(topology.n_shells, every=every))
     parts = _PARTS if len(ready.order) >= MANY else 1
     small = None
-    if not every:
-        small = small_shells(topology, faces.shell, faces.columns, faces.corners, faces.places, ready.steps, tick)
-    if small is not None:
-        walks, crossings.meeting = small.parts(parts, tick), small.meeting
-        crossings.contact.add(small.keys, small.touching)
-    else:
+    if topology.n_shells >= LEAST_SHELLS and not every:
+        crossings.meeting = meeting = box_pairs(topology.low, topology.high, tick)
+        small = small_shells(topology, meeting, faces.shell, faces.columns, faces.corners, faces.places, ready.steps)
+    if small is None:
         walks = meeting_parts(ready.steps, parts, tick)
+    else:
+        walks = small.parts(parts, tick)
+        crossings.contact.add(small.keys, small.touching)
 
     def part(k: int) -> Crossings:
         # Each begins with nothing known: which process does it has no say in what is found.

@@ -2,8 +2,8 @@
 
 Boxes of two shells that end where the other begins share a part of a plane square to an axis, a part of a line or a
 point. Their faces can do no more than touch, and cover each other only where both lie in that plane. So of two such
-shells that share a corner, which is enough to touch, other faces need no look: of cubes that fill a block that is all
-but a fiftieth of the pairs of faces whose boxes meet.
+shells that share a corner, which is enough to touch, other faces need no look. Of cubes that fill a block that leaves
+about one in sixty pairs of faces of two cubes whose boxes meet.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import numpy as np
 
 from unitcad.check.geometry.topology import Topology
 from unitcad.geometry.arrays import Floats, Ints, among, distinct, sorted_with_order
-from unitcad.geometry.boxes import box_pairs
 from unitcad.geometry.ticks import Tick
 
 LEAST_SHELLS = 200
@@ -26,29 +25,26 @@ _BLOCK = 1 << 16  # pairs of faces at a time
 
 @dataclass(frozen=True)
 class SmallShells:
-    """What is to be looked at of the faces of small shells.
+    """What is to be compared of the faces of small shells.
 
-    `meeting` (k, 2) are pairs of shells whose boxes meet; `touching` (j, 2), one pair of faces for each two shells that
-    share a corner, of the pairs of shells `keys`, smaller number times the number of shells plus the larger. Faces i of
-    `ours` and j of `theirs` are to be compared where `products` (p, 4) has their first ones and their numbers; so are
-    the faces of each shell with each other, of which `first` and `count` say where in `by_shell` they are. `boxes`
-    (m, 6) are those of the faces in steps.
+    `keys` (j,) are pairs of shells that share a corner, as `Contacts` numbers them, `touching` (j, 2) two faces of each
+    with that corner. `faces` lists faces by shell, of which shell s has `count[s]` from `first[s]` on, and behind them
+    those that lie in a side of their shell's box. The faces of a shell are compared with each other, and rows of
+    `faces` with other rows: of each where they begin and how many they are, `products` (p, 4). `boxes` (m, 6) are those
+    of the faces, in steps.
     """
 
-    meeting: Ints
     keys: Ints
     touching: Ints
-    by_shell: Ints
+    faces: Ints
     first: Ints
     count: Ints
-    listed: Ints
     products: Ints
     boxes: Ints
 
     def parts(self, n: int, tick: Tick) -> list[Iterator[tuple[Ints, Ints]]]:
         """Return `n` iterators that yield the pairs of faces between them, each pair once."""
-        ends = np.linspace(0, len(self.by_shell), n + 1)
-        shells = np.searchsorted(self.first, ends)
+        shells = np.searchsorted(self.first, np.linspace(0, len(self.boxes), n + 1))
         products = np.array_split(self.products, n)
         return [self._part(shells[k], shells[k + 1], products[k], tick) for k in range(n)]
 
@@ -56,7 +52,7 @@ class SmallShells:
         for i, j in self._within(np.arange(begin, end)):
             tick()
             yield self._near(i, j)
-        for i, j in _product(self.listed, products):
+        for i, j in _product(self.faces, products):
             tick()
             yield self._near(i, j)
 
@@ -69,7 +65,7 @@ class SmallShells:
             at_once = max(_BLOCK // len(one), 1)
             for start in range(0, len(some), at_once):
                 first = self.first[some[start : start + at_once], None]
-                yield self.by_shell[first + one].ravel(), self.by_shell[first + other].ravel()
+                yield self.faces[first + one].ravel(), self.faces[first + other].ravel()
 
     def _near(self, i: Ints, j: Ints) -> tuple[Ints, Ints]:
         """Return the pairs of faces whose boxes meet."""
@@ -81,15 +77,16 @@ class SmallShells:
 
 
 def small_shells(
-    topology: Topology, shell: Ints, columns: Floats, corners: Ints, places: Ints, boxes: Ints, tick: Tick
+    topology: Topology, meeting: Ints, shell: Ints, columns: Floats, corners: Ints, places: Ints, boxes: Ints
 ) -> SmallShells | None:
     """Return what is to be looked at of faces that lie in many small shells; None where they do not.
 
-    shell (m,): of each face; columns (3, n): the vertices by axis; corners (3, m): of the faces, `places` the first
-    vertices in the places of these; boxes (m, 6): of the faces, in steps.
+    meeting (k, 2): pairs of shells whose boxes meet; shell (m,): of each face; columns (3, n): the vertices by axis;
+    corners (3, m): of the faces, `places` the first vertices in the places of these; boxes (m, 6): of the faces, in
+    steps.
     """
     n = topology.n_shells
-    if n < LEAST_SHELLS or topology.stored is not topology.mesh.faces:
+    if topology.stored is not topology.mesh.faces:
         return None
     count = np.bincount(shell, minlength=n)
     if count.max() > _MOST_FACES:
@@ -100,8 +97,6 @@ def small_shells(
     if shared is None:
         return None
     keys, touching = shared
-    tick()
-    meeting = box_pairs(topology.low, topology.high, tick)
     one, other = np.ascontiguousarray(meeting.T)
     flat, axis, rises = np.zeros((3, len(one)), np.int8)
     for k in range(3):
@@ -129,8 +124,8 @@ def small_shells(
     products = products[(products[:, 1] * products[:, 3]) > 0]
     if (products[:, 1] * products[:, 3]).sum() > _MOST_PAIRS * m:
         return None
-    listed = np.concatenate([by_shell, side_faces])
-    return SmallShells(meeting, keys, touching, by_shell, first, count, listed, products, boxes)
+    faces = np.concatenate([by_shell, side_faces])
+    return SmallShells(keys, touching, faces, first, count, products, boxes)
 
 
 def _on_sides(topology: Topology, shell: Ints, columns: Floats, corners: Ints) -> tuple[Ints, Ints, Ints]:
@@ -171,9 +166,9 @@ def _sharing(places: Ints, shell: Ints, n: int) -> tuple[Ints, Ints] | None:
         return None
     within = np.arange(len(place)) - np.repeat(begin, size)
     left = np.repeat(size, size) - within
-    keys, pairs = [], []
+    keys, pairs, some = [], [], np.arange(len(place))
     for apart in range(1, int(size.max(initial=1))):
-        some = np.flatnonzero(left > apart)
+        some = some[left[some] > apart]
         keys.append(of[some] * n + of[some + apart])  # within a place they are in the order of their numbers
         pairs.append(np.stack([face[some], face[some + apart]], axis=1))
     if not keys:
@@ -184,8 +179,8 @@ def _sharing(places: Ints, shell: Ints, n: int) -> tuple[Ints, Ints] | None:
     return ordered[fresh].astype(np.int64), np.concatenate(pairs)[order[fresh]]
 
 
-def _product(listed: Ints, products: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Yield all pairs of two rows of faces in `listed` for each of `products` (first, number, first, number)."""
+def _product(faces: Ints, products: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """Yield all pairs of a row of `faces` and another for each of `products`, in blocks."""
     size = products[:, 1] * products[:, 3]
     ends = np.cumsum(size)
     start = 0
@@ -197,5 +192,5 @@ def _product(listed: Ints, products: Ints) -> Iterator[tuple[Ints, Ints]]:
             ends[start:stop] - size[start:stop] - before, size[start:stop]
         )
         row, column = np.divmod(at, wide)
-        yield listed[first + row], listed[second + column]
+        yield faces[first + row], faces[second + column]
         start = stop
