@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from unitcad.pipeline.build import Built
     from unitcad.pipeline.manifest_records import Manifest
     from unitcad.pipeline.subjects import Made
-    from unitcad.spec import Spec
+    from unitcad.report.viewer_models import Modelled
     from unitcad.validation import Changes
 
 
@@ -135,10 +135,10 @@ def _built(
                 else:
                     results.append(made())
                 if paged or (results[-1].folder / PAGE).is_file():
+                    from unitcad.report import write_report
+
                     say("page")
                     with held(results[-1].folder):
-                        from unitcad.report import write_report
-
                         write_report(results[-1].folder, warn, modelled or _modelled(spec, beside))
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
@@ -152,7 +152,7 @@ def _built(
     return all(result.ok for result in results)
 
 
-def _modelled(of: Made, beside: Beside) -> Callable[[Spec], dict[str, Any]]:
+def _modelled(of: Made, beside: Beside) -> Modelled:
     """Ask for what the page shows of a unit's geometry, beside the rest; return what gives it for the spec built."""
     from unitcad.report.viewer_models import model
     from unitcad.spec import Spec, with_formats

@@ -19,7 +19,7 @@ from unitcad.report.bench_page import write_bench
 from unitcad.report.html_page import asset, html_page
 from unitcad.report.pool import Pool
 from unitcad.report.records import VariantRecord
-from unitcad.report.viewer_models import model
+from unitcad.report.viewer_models import Modelled, model
 from unitcad.spec import Spec
 
 VENDORED = ("three.min.js", "uplot.min.js")
@@ -35,7 +35,7 @@ STYLES = ("vendor/uplot.min.css", "app/page.css", "app/print.css")
 def write_report(
     folder: Path,
     warn: Callable[[str], None] = lambda line: None,
-    modelled: Callable[[Spec], dict[str, Any]] = model,
+    modelled: Modelled = model,
 ) -> Path:
     """Write `folder`/report.html for the variant or the batch in `folder`; returns its path.
 
@@ -73,9 +73,7 @@ def _write_bench(folder: Path, warn: Callable[[str], None]) -> None:
         warn(f"warning: no {BENCH}: {error}")
 
 
-def page_data(
-    folder: Path, modelled: Callable[[Spec], dict[str, Any]] | None = model
-) -> tuple[dict[str, Any], str, dict[str, str]]:
+def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str, Any], str, dict[str, str]]:
     """Collect the page's data, its title, and why a result is damaged by its folder's name.
 
     Geometries are made by `modelled`, none without it. Raises UnitcadError where the folder holds no result.
@@ -151,9 +149,7 @@ def _typical(scores: Any) -> float | None:
     return typical if isinstance(typical, float) else None
 
 
-def _models(
-    records: list[VariantRecord], specs: Iterable[Spec | None], modelled: Callable[[Spec], dict[str, Any]]
-) -> dict[str, Any]:
+def _models(records: list[VariantRecord], specs: Iterable[Spec | None], modelled: Modelled) -> dict[str, Any]:
     """Return each geometry once, by its key; a record whose geometry can't be made gets the reason."""
     models: dict[str, Any] = {}
     for record, spec in zip(records, specs, strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
 from unitcad.report.html_page import compressed
 from unitcad.spec import Spec, read_toml, with_formats
 from unitcad.validation import from_data
+
+Modelled = Callable[[Spec], dict[str, Any]]
+"""Gives what `model` does for a spec."""
 
 
 def spec_in(folder: Path) -> Spec:
