@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import unitcad
+from unitcad.children import cores
 from unitcad.designs import shipped
 from unitcad.validation import default_template, templates
 
@@ -211,7 +212,9 @@ def test_no_piece_is_recognised_by_its_name() -> None:
     ids=lambda run: run[0],
 )
 def test_nothing_needless_is_loaded(run: list[str], tmp_path: Path) -> None:
-    needless = CAD + (NEEDLESS if run[0] in ("build", "check") else ())
+    # With one core the build makes its estimate itself, and scipy loads what is needless to the rest.
+    alone = run[0] == "build" and cores() < 2
+    needless = CAD + (NEEDLESS if run[0] in ("build", "check") and not alone else ())
     corners = ["0 0 0", "9 0 0", "0 9 0", "0 0 9"]
     facets = [
         "facet normal 0 0 0\nouter loop\n" + "".join(f"vertex {corners[k]}\n" for k in face) + "endloop\nendfacet\n"
