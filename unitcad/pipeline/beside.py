@@ -88,13 +88,7 @@ class Beside:
 
     def estimate(self, spec: Spec, here: Callable[[], dict[str, Any]]) -> Callable[[], dict[str, Any]]:
         """Ask for a spec's estimate; return what gives it, by `here` where the process has not begun or is lost."""
-        from unitcad.spec import to_json
-        from unitcad.spec.custom_code import is_custom
-
-        if self._rest is None or is_custom(spec.design):
-            return here
-        asked = self._rest.answer(("estimate", to_json(spec)))
-        return lambda: _given(asked, here)
+        return _asked(self._rest, spec, lambda text: ("estimate", text), here)
 
     def pictures(
         self, moulds: MouldSet, names: Sequence[str], here: Callable[[str], bytes]
@@ -117,14 +111,20 @@ class Beside:
 
     def call(self, function: Callable[..., Any], spec: Spec) -> Callable[[], Any]:
         """Ask for what a function of a module gives for a spec; return what gives it, as `estimate`."""
-        from unitcad.spec import to_json
-        from unitcad.spec.custom_code import is_custom
+        return _asked(self._rest or self._step, spec, lambda text: ("call", (function, text)), lambda: function(spec))
 
-        process = self._rest or self._step
-        if process is None or is_custom(spec.design):
-            return lambda: function(spec)
-        asked = process.answer(("call", (function, to_json(spec))))
-        return lambda: _given(asked, lambda: function(spec))
+
+def _asked(
+    process: Answering | None, spec: Spec, request: Callable[[str], object], here: Callable[[], Any]
+) -> Callable[[], Any]:
+    """Ask a process, where there is one, for what reads a spec, given as JSON; return what gives it."""
+    from unitcad.spec import to_json
+    from unitcad.spec.custom_code import is_custom
+
+    if process is None or is_custom(spec.design):
+        return here
+    asked = process.answer(request(to_json(spec)))
+    return lambda: _given(asked, here)
 
 
 def _given(asked: Future[Any], here: Callable[[], Any]) -> Any:

@@ -50,16 +50,9 @@ def cast(topology: Topology, floors: tuple[float, float], least: float, tick: Ti
     normal = side * topology.areas / np.maximum(double, 1e-300)[:, None]
     floor = np.where(lying(topology), level, upright) * SLACK
     reach = np.maximum(floor, least)
-    thickness, behind = np.full((2, len(points)), np.inf)
-    across = np.full(len(points), -1)
     solid = np.flatnonzero(sound)
-    if len(solid):
-        seeing = _seeing(corners, normal, solid, reach, len(points), tick)
-        cast = np.flatnonzero(seeing[owner])
-        thickness[cast], behind[cast], across[cast] = _behind(
-            corners, normal, solid, points[cast], owner[cast], reach[owner[cast]], tick
-        )
-    return Rays(points, owner, floor[owner], thickness, behind, across)
+    seeing = _seeing(corners, normal, solid, reach, len(points), tick)
+    return Rays(points, owner, floor[owner], *_behind(corners, normal, solid, points, owner, reach, seeing, tick))
 
 
 def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float) -> tuple[Floats, Ints]:
@@ -89,6 +82,8 @@ def _seeing(corners: Floats, normal: Floats, solid: Ints, reach: Floats, points:
     Most see none. All of them where the boxes of so many meet that the rays of all `points` are cast in less time.
     """
     seeing = np.zeros(len(corners), bool)
+    if not len(solid):
+        return seeing
     blocks = _BLOCKS + points // _POINTS
 
     def counted() -> None:
@@ -119,25 +114,36 @@ def _seeing(corners: Floats, normal: Floats, solid: Ints, reach: Floats, points:
 
 
 def _behind(
-    corners: Floats, normal: Floats, solid: Ints, points: Floats, owner: Ints, reach: Floats, tick: Tick
+    corners: Floats,
+    normal: Floats,
+    solid: Ints,
+    points: Floats,
+    owner: Ints,
+    reach: Floats,
+    seeing: Bools,
+    tick: Tick,
 ) -> tuple[Floats, Floats, Ints]:
-    """Return distances from each point, against its normal, and the face across, as `Rays` has them."""
+    """Return distances from each point of the faces `seeing`, against its normal, and the face across, as `Rays` has.
+
+    reach (m,): of each face.
+    """
     thickness, behind = np.full((2, len(points)), np.inf)
     across = np.full(len(points), -1)
-    ends = points - normal[owner] * reach[:, None]
-    if not len(points):
+    which = np.flatnonzero(seeing[owner])
+    if not len(which):
         return thickness, behind, across
-    places = np.concatenate([points, ends, corners[solid].reshape(-1, 3)])
+    ends = points[which] - (normal * reach[:, None])[owner[which]]
+    places = np.concatenate([points[which], ends, corners[solid].reshape(-1, 3)])
     steps = frame_of(places).steps(places)
-    n, m = len(points), len(solid)
+    n, m = len(which), len(solid)
     order = morton_order(steps, np.arange(n))
-    rays = boxes_of(steps, order, order + n)
+    rays, by_curve = boxes_of(steps, order, order + n), which[order]
     first = 2 * n + 3 * np.arange(m)
     order_faces = morton_order(steps, first)
     first, by_place = first[order_faces], solid[order_faces]
     faces = boxes_of(steps, first, first + 1, first + 2)
     for i, j in meeting_between(rays, faces, tick):
-        ray, face = order[i], by_place[j]
+        ray, face = by_curve[i], by_place[j]
         facing = np.einsum("ij,ij->i", normal[owner[ray]], normal[face])
         opposed = facing < -OPPOSED
         ray, face, facing = ray[opposed], face[opposed], facing[opposed]

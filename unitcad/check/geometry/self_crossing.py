@@ -132,7 +132,7 @@ def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, 
         walks = meeting_parts(ready.steps, parts, tick)
     else:
         walks = small.parts(parts, tick)
-        crossings.contact.add(small.keys, small.touching)
+        crossings.contact.noted += small.sharing.noted
 
     def part(k: int) -> Crossings:
         # Each begins with nothing known: which process does it has no say in what is found.

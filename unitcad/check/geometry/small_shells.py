@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from unitcad.check.geometry.contact import Contacts
 from unitcad.check.geometry.topology import Topology
-from unitcad.geometry.arrays import Floats, Ints, among, distinct, sorted_with_order
+from unitcad.geometry.arrays import Floats, Ints, among, distinct, grouped, sorted_with_order
 from unitcad.geometry.ticks import Tick
 
 LEAST_SHELLS = 200
@@ -27,15 +28,13 @@ _BLOCK = 1 << 16  # pairs of faces at a time
 class SmallShells:
     """What is to be compared of the faces of small shells.
 
-    `keys` (j,) are pairs of shells that share a corner, as `Contacts` numbers them, `touching` (j, 2) two faces of each
-    with that corner. `faces` lists faces by shell, of which shell s has `count[s]` from `first[s]` on, and behind them
-    those that lie in a side of their shell's box. The faces of a shell are compared with each other, and rows of
-    `faces` with other rows: of each where they begin and how many they are, `products` (p, 4). `boxes` (m, 6) are those
-    of the faces, in steps.
+    `sharing` are the pairs of shells that share a corner, each with two faces that do. `faces` lists faces by shell, of
+    which shell s has `count[s]` from `first[s]` on, and behind them those that lie in a side of their shell's box. The
+    faces of a shell are compared with each other, and rows of `faces` with other rows: of each where they begin and how
+    many they are, `products` (p, 4). `boxes` (m, 6) are those of the faces, in steps.
     """
 
-    keys: Ints
-    touching: Ints
+    sharing: Contacts
     faces: Ints
     first: Ints
     count: Ints
@@ -88,15 +87,12 @@ def small_shells(
     n = topology.n_shells
     if topology.stored is not topology.mesh.faces:
         return None
-    count = np.bincount(shell, minlength=n)
+    by_shell, first, count = grouped(shell, n)
     if count.max() > _MOST_FACES:
         return None
-    by_shell = np.argsort(shell, kind="stable").astype(np.int32)
-    first = np.cumsum(count) - count
-    shared = _sharing(places, shell, n)
-    if shared is None:
+    sharing = _sharing(places, shell, n)
+    if sharing is None:
         return None
-    keys, touching = shared
     one, other = np.ascontiguousarray(meeting.T)
     flat, axis, rises = np.zeros((3, len(one)), np.int8)
     for k in range(3):
@@ -105,7 +101,7 @@ def small_shells(
         ends = after | (high.take(other) == low.take(one))
         flat += ends
         axis[ends], rises[ends] = k, after[ends]
-    known = among(one * n + other, keys) & (flat > 0)
+    known = among(sharing.keys(one, other), sharing.pairs()[0]) & (flat > 0)
     whole, level = np.flatnonzero(~known), np.flatnonzero(known & (flat == 1))
     axis, rises = axis[level].astype(np.int64), rises[level].astype(np.int64)
     side_faces, side_first, side_count = _on_sides(topology, shell, columns, corners)
@@ -125,7 +121,7 @@ def small_shells(
     if (products[:, 1] * products[:, 3]).sum() > _MOST_PAIRS * m:
         return None
     faces = np.concatenate([by_shell, side_faces])
-    return SmallShells(keys, touching, faces, first, count, products, boxes)
+    return SmallShells(sharing, faces, first, count, products, boxes)
 
 
 def _on_sides(topology: Topology, shell: Ints, columns: Floats, corners: Ints) -> tuple[Ints, Ints, Ints]:
@@ -142,14 +138,12 @@ def _on_sides(topology: Topology, shell: Ints, columns: Floats, corners: Ints) -
             there = at == end[of, axis]
             faces.append(level[there])
             sides.append(of[there] * 6 + (axis * 2 + upper))
-    side = np.concatenate(sides)
-    order = np.argsort(side, kind="stable")
-    count = np.bincount(side, minlength=6 * topology.n_shells)
-    return np.concatenate(faces)[order].astype(np.int32), np.cumsum(count) - count, count
+    order, first, count = grouped(np.concatenate(sides), 6 * topology.n_shells)
+    return np.concatenate(faces)[order], first, count
 
 
-def _sharing(places: Ints, shell: Ints, n: int) -> tuple[Ints, Ints] | None:
-    """Return the keys of shells that share a corner, sorted, and a pair of faces (k, 2) of each with that corner.
+def _sharing(places: Ints, shell: Ints, n: int) -> Contacts | None:
+    """Return the pairs of shells that share a corner, each with two faces that do.
 
     None where so many shells share one that there would be too many pairs.
     """
@@ -166,17 +160,11 @@ def _sharing(places: Ints, shell: Ints, n: int) -> tuple[Ints, Ints] | None:
         return None
     within = np.arange(len(place)) - np.repeat(begin, size)
     left = np.repeat(size, size) - within
-    keys, pairs, some = [], [], np.arange(len(place))
+    found, some = Contacts(n), np.arange(len(place))
     for apart in range(1, int(size.max(initial=1))):
         some = some[left[some] > apart]
-        keys.append(of[some] * n + of[some + apart])  # within a place they are in the order of their numbers
-        pairs.append(np.stack([face[some], face[some + apart]], axis=1))
-    if not keys:
-        return np.empty(0, np.int64), np.empty((0, 2), np.int32)
-    found = np.concatenate(keys)
-    ordered, order = sorted_with_order(found.astype(np.uint64), max(n * n - 1, 1).bit_length())
-    fresh = distinct(ordered)
-    return ordered[fresh].astype(np.int64), np.concatenate(pairs)[order[fresh]]
+        found.noted.append((found.keys(of[some], of[some + apart]), np.stack([face[some], face[some + apart]], axis=1)))
+    return found
 
 
 def _product(faces: Ints, products: Ints) -> Iterator[tuple[Ints, Ints]]:

@@ -14,7 +14,7 @@ from unitcad.check.geometry.volumes import winding_number
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
-from unitcad.geometry.arrays import Bools, Floats, Ints, among
+from unitcad.geometry.arrays import Bools, Floats, Ints, among, grouped
 from unitcad.geometry.boxes import box_pairs
 from unitcad.geometry.ticks import Interrupted, Tick
 
@@ -206,9 +206,8 @@ def _where(topology: Topology, *shells: int) -> Location:
 
 def _faces_by_shell(labels: Ints, n: int) -> Callable[[int], Ints]:
     """Return a function that gives the faces of a shell."""
-    order = np.argsort(labels, kind="stable")
-    ends = np.cumsum(np.bincount(labels, minlength=n))
-    return lambda shell: order[ends[shell - 1] if shell else 0 : ends[shell]]
+    order, first, count = grouped(labels, n)
+    return lambda shell: order[first[shell] : first[shell] + count[shell]]
 
 
 def _shared(topology: Topology, faces_of: Callable[[int], Ints], a: int, b: int, solids: dict[int, Manifold]) -> float:
