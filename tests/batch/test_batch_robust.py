@@ -81,7 +81,7 @@ def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path: Path) -> None:
     ("function", "more", "reason"),
     [
         ("crashes", [], "the worker died (SIGABRT)"),
-        ("hangs", ["--timeout", "10"], "timed out after 10 s"),
+        ("hangs", ["--timeout", "6"], "timed out after 6 s"),
         ("fails", [], "design ring.py:fails (line 32): ValueError: never"),
     ],
 )

@@ -234,7 +234,9 @@ def test_a_count_is_swept_by_whole_numbers(running: Any, tmp_path: Path) -> None
 
 def test_a_bed_refusal_stands_at_the_changed_count_and_goes_with_a_newer_answer(running: Any, tmp_path: Path) -> None:
     columns = 'input[name="layout.columns"]'
-    with serving(tmp_path, "forearm-patch") as patch:
+    two_rows = array_templates()["forearm-patch"].read_text("utf-8").replace("rows = 3", "rows = 2")
+    (tmp_path / "patch.toml").write_text(two_rows, "utf-8")
+    with serving(tmp_path, "patch.toml") as patch:
         live = Live(running, patch)
         live.choose('input[name="layout.pitch_mm"]', "18")
         live.choose(columns, "12")

@@ -60,7 +60,7 @@ def run(quick: bool, say: Say) -> Result:
                 name: partial(_call, folder / SCRIPTS[name], lengths, out / name, formats) for name in scripts(formats)
             }
             calls[FULL] = partial(_build, out / f"build-{formats}", "stl" if formats == "stl" else "step,stl")
-            return interleaved(calls, rounds)
+            return interleaved(calls, rounds, warm=not quick)
 
         def warmed(formats: str) -> dict[str, Timing]:
             say(f"warm, {formats}")
