@@ -9,7 +9,7 @@ import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.check import Options, check_mesh
-from unitcad.check.geometry import self_crossing
+from unitcad.check.geometry import self_crossing, small_shells
 
 Built = tuple[np.ndarray, np.ndarray]
 
@@ -62,14 +62,14 @@ def test_findings_are_those_of_a_tree_over_all_faces(
 
 def _watched(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Return a list that gets whether a mesh was looked at shell by shell."""
-    real, used = self_crossing.small_shells, list[bool]()
+    real, used = small_shells.small_shells, list[bool]()
 
     def watched(*given: object) -> object:
         made = real(*given)
         used.append(made is not None)
         return made
 
-    monkeypatch.setattr(self_crossing, "small_shells", watched)
+    monkeypatch.setattr(small_shells, "small_shells", watched)
     return used
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from unitcad.catalogue import Printer
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CheckedMesh:
     """One mesh's findings and facts; `inspection` is None where the mesh could not be inspected."""
 

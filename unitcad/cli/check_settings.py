@@ -95,11 +95,13 @@ def _table(path: Path, data: Mapping[str, Any]) -> str:
 
 def _read(path: Path) -> Configuration | None:
     """Read the settings of a file; None without such a table. A unit's spec named unitcad.toml has none."""
+    shown, text = seen_from(path.absolute()), files.read_text(path)
+    if path.name == "pyproject.toml" and "unitcad" not in text and "\\" not in text:  # with escapes it may be meant
+        return None
     import tomllib
 
-    shown = seen_from(path.absolute())
     try:
-        data = tomllib.loads(files.read_text(path))
+        data = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise UnitcadError(f"{shown}: not TOML: {error}") from None
     table = _table(path, data)

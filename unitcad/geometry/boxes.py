@@ -28,7 +28,7 @@ _FACES = 1 << 14  # faces whose corners stay in the processor's cache
 _BITS = 14  # of each axis in a Morton key
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """The origin of steps, and steps per mm of each axis."""
 
@@ -123,7 +123,7 @@ def boxes_of(steps: list[Ints], *corners: Ints) -> Ints:
     return boxes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Slabs:
     """The steps along each diagonal of space between which faces lie: words of four low ones, of four high ones."""
 
@@ -210,7 +210,7 @@ def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
     return np.stack([key >> half, key & np.uint64(0xFFFFFFFF)], axis=1).astype(np.int64)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Tree:
     """The nodes of each level but the uppermost, which has `roots`, four to a row (`_packed`), leaves first."""
 

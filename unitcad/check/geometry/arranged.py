@@ -12,7 +12,7 @@ from unitcad.geometry.arrays import Floats, Ints, columns_of
 from unitcad.geometry.boxes import Slabs, box_order, boxes_of, frame_of, ranks_of, slabs_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Arranged:
     """Faces that have an area, in the order `order`: `columns` (3, n) of their vertices, `corners` (3, m) into them.
 

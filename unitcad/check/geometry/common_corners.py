@@ -21,7 +21,7 @@ _TURN, _BACK = np.uint64(_BITS), np.uint64(2 * _BITS)
 _WHOLE = np.uint64((1 << 3 * _BITS) - 1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CommonCorners:
     """The corners of faces by their vertices, `every` one and those `counted`.
 

@@ -18,7 +18,7 @@ _FACES = 1 << 14  # faces whose corners stay in the processor's cache
 _RECENT = 1 << 16  # pairs of shells remembered: those found again are near each other in the order of the faces
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FaceBoxes:
     """Boxes of faces by the ranks of their sides, rows of three axes: what can only touch is told by one comparison.
 
@@ -80,7 +80,7 @@ def ranked_boxes(ranks: Sequence[NDArray[np.unsignedinteger]], ids: Ints) -> Fac
     return FaceBoxes(low, high)
 
 
-@dataclass
+@dataclass(eq=False)
 class Contacts:
     """Pairs of shells that meet, each with the first pair of faces found, or with `every` one.
 

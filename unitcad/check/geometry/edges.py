@@ -27,7 +27,7 @@ _BLOCK = 1 << 14  # faces that stay in the processor's cache
 _SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Edges:
     """Half-edges of `faces` sorted by their undirected edge. `first` and `size` describe the groups in `order`.
 
@@ -50,7 +50,7 @@ class Edges:
         return 2 * np.diff(count, prepend=np.int32(0)) == self.size
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Turns:
     """The half-edges of the edges `many` by edge and angle, and what is known of each.
 

@@ -22,7 +22,7 @@ _TINY = 1e-270  # more than underflow takes from coordinates that fit single pre
 _FACES = 1 << 14  # faces whose corners stay in the processor's cache
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Planes:
     """Faces by their corners and planes.
 

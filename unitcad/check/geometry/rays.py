@@ -21,7 +21,7 @@ _ROUNDING_MM = 1e-6
 _BLOCKS, _POINTS = 4, 2048  # a look at the faces may take so many blocks of box pairs, and one for so many points
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rays:
     """Points inside the faces, the face of each, and how much material (for gaps, air) lies behind it, mm.
 

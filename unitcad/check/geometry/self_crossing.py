@@ -19,7 +19,6 @@ from unitcad.check.geometry.arranged import Arranged
 from unitcad.check.geometry.common_corners import CommonCorners, common_corners
 from unitcad.check.geometry.contact import Contacts, FaceBoxes, face_boxes
 from unitcad.check.geometry.planes import Planes, planes_of
-from unitcad.check.geometry.small_shells import LEAST_SHELLS, small_shells
 from unitcad.check.geometry.stars import Stars
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import MANY, same_place
@@ -28,6 +27,7 @@ from unitcad.geometry.boxes import Slabs, box_pairs, meeting_parts
 from unitcad.geometry.ticks import Interrupted, Tick
 from unitcad.sharing import shared
 
+LEAST_SHELLS = 200  # compared shell by shell, where they are small
 _BLOCK = 1 << 17
 _PARTS = 24  # of the walk over MANY faces or more
 _PAIRS = 1 << 15  # pairs looked at together: enough to outweigh the calls, few enough for the cache
@@ -37,7 +37,7 @@ _OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothi
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Faces:
     """Faces in the order of a space-filling curve and what the sieves need of them.
 
@@ -65,7 +65,7 @@ class Faces:
         return _sieve(self)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sieve:
     """Planes and boxes of faces, all or some."""
 
@@ -82,7 +82,7 @@ def _sieve(faces: Faces, some: Ints | None = None) -> Sieve:
     return Sieve(planes_of(faces.columns, places, normal), boxes)
 
 
-@dataclass
+@dataclass(eq=False)
 class Crossings:
     """Pairs of `faces` that meet, collected over the blocks; `stopped`: why not all were looked at, None if they were.
 
@@ -126,6 +126,8 @@ def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, 
     parts = _PARTS if len(ready.order) >= MANY else 1
     small = None
     if topology.n_shells >= LEAST_SHELLS and not every:
+        from unitcad.check.geometry.small_shells import small_shells
+
         crossings.meeting = meeting = box_pairs(topology.low, topology.high, tick)
         small = small_shells(topology, meeting, faces.shell, faces.columns, faces.corners, faces.places, ready.steps)
     if small is None:

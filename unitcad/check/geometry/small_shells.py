@@ -18,13 +18,12 @@ from unitcad.check.geometry.topology import Topology
 from unitcad.geometry.arrays import Floats, Ints, among, distinct, grouped, sorted_with_order
 from unitcad.geometry.ticks import Tick
 
-LEAST_SHELLS = 200
 _MOST_FACES = 48  # of a shell
 _MOST_PAIRS = 32  # for each face: with more of them a tree over the faces takes less
 _BLOCK = 1 << 16  # pairs of faces at a time
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SmallShells:
     """What is to be compared of the faces of small shells.
 

@@ -12,7 +12,7 @@ from unitcad.geometry.arrays import Ints
 _NO_INDEX = np.empty(0, np.int64)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Source:
     """The places of a mesh's triangles (m) in its file, by polygon (p); what is None or empty is not known.
 

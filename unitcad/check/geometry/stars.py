@@ -24,7 +24,7 @@ _DIAGONALS = (((1, 1, 0), 2), ((1, -1, 0), 2), ((1, 0, 1), 1), ((1, 0, -1), 1), 
 """Ways to look along, and an axis square to each."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stars:
     """Vertices of a surface, `smooth` (n,) where their stars are height fields.
 

@@ -20,7 +20,7 @@ Found = tuple[Any, ...]
 """Some of what a `Topology` has beside its surface."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OpenEdges:
     """Edges of one face, before vertices were welded and after it.
 
@@ -35,7 +35,7 @@ class OpenEdges:
     split: Bools
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """A mesh without degenerate faces whose open edges are welded.
 
@@ -61,7 +61,7 @@ class Surface:
         return area_vectors(self.mesh.vertices, self.stored)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Topology(Surface):
     """A surface, and what follows from its edges.
 

@@ -29,7 +29,7 @@ MANY = 50_000
 _BLOCK = 1 << 15  # points that stay in the processor's cache
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """Vertices (n, 3) float64 mm, faces (m, 3) int32 into them; `normals` (m, 3) as stored, where the format has them.
 

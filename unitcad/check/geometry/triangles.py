@@ -17,7 +17,7 @@ from unitcad.geometry.arrays import Bools, Floats, Ints, cross
 _BLOCK = 1 << 13  # pairs whose corners stay in the processor's cache
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Meeting:
     """Relation of the triangles of each pair.
 

@@ -21,8 +21,8 @@ def text(reports: Sequence[FileReport]) -> str:
             lines.append(line(report, finding))
         if report.verdict == "pass" and (size := _size(report.facts)):
             lines.append(f"{printable(report.path)}: passed: {size}")
-    fixes = [f"  {code} {rule.title}: {rule.fix}" for code, rule in rules().items() if code in codes]
-    if fixes:
+    if codes:  # else the rules that no file needed are not loaded
+        fixes = [f"  {code} {rule.title}: {rule.fix}" for code, rule in rules().items() if code in codes]
         lines += ["How to fix:", *fixes, _EXPLAIN]
     return "\n".join([*lines, summary(reports)]) + "\n"
 

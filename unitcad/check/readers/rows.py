@@ -39,7 +39,7 @@ _IN_NUMBERS = table_of(b"0123456789+-.eEnNaAiIfFtTyY \t\n\v\f\r")
 _IN_INTEGERS = table_of(b"0123456789+- \t\n\v\f\r")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rows:
     """Numbers of the lines that have any: row r is values[starts[r] : starts[r + 1]], on line lines[r] (from 1)."""
 

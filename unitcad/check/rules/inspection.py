@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from unitcad.check.geometry.rays import Rays
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Inspection:
     """A mesh with finite vertices, as the file has it, with its topology.
 
