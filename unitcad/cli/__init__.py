@@ -7,7 +7,6 @@ a user.
 from __future__ import annotations
 
 import contextlib
-import gc
 import os
 import sys
 import threading
@@ -15,9 +14,9 @@ from typing import Any, NoReturn
 
 from unitcad.cli.output import form_of, say_error, speak_anywhere, warn
 from unitcad.errors import UnitcadError
+from unitcad.heap import seek_cycles_seldom
 
 INTERRUPTED = 130
-_ALLOCATIONS = 50_000  # between two searches for cycles: the default of 700 searches ninety times while modules load
 
 
 def __getattr__(name: str) -> Any:
@@ -97,7 +96,7 @@ def program() -> NoReturn:
 
     That would be a tenth of the time that a small mesh takes to check.
     """
-    gc.set_threshold(_ALLOCATIONS)
+    seek_cycles_seldom()
     try:
         main()
     except SystemExit as left:

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from unitcad.casting.bench_pictures import BenchPictures
 from unitcad.children import answer_requests
 from unitcad.errors import UnitcadError
-from unitcad.heap import keep_freed_memory
+from unitcad.heap import keep_freed_memory, seek_cycles_seldom
 from unitcad.lean_import import postpone_tools
-from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape.body import Body
-from unitcad.spec import from_json
+
+if TYPE_CHECKING:
+    from unitcad.casting.bench_pictures import BenchPictures
+    from unitcad.shape.body import Body
 
 
 def begin() -> Callable[[tuple[str, Any]], object]:
     """Return what answers (what, of what); None for what is refused, which the caller then meets itself."""
+    seek_cycles_seldom()  # so everything else is loaded after it
     keep_freed_memory()
+    from unitcad.casting.bench_pictures import BenchPictures
+    from unitcad.moulds.mould_set import MouldSet
+    from unitcad.spec import from_json
+
     if "step" in sys.argv:
         from unitcad.export import step  # noqa: F401
     else:
@@ -65,6 +70,7 @@ def _step(bodies: Sequence[Body], name: str) -> bytes | str:
 
 def _estimate(spec: str) -> dict[str, Any]:
     from unitcad.estimating import estimate_spec
+    from unitcad.spec import from_json
 
     return estimate_spec(from_json(spec))
 
