@@ -1,4 +1,4 @@
-"""The heap keeps what is freed: pages that the system cleared are counted, with and without."""
+"""What is freed is kept and cycles are sought seldom: cleared pages and searches are counted, with and without."""
 
 from __future__ import annotations
 
@@ -36,3 +36,20 @@ def _pages(*words: str) -> int:
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc is Linux's")
 def test_memory_that_is_kept_is_not_cleared_again() -> None:
     assert _pages("keep") * 10 < _pages()
+
+
+def _searches(*before: str) -> int:
+    """Return how often Python sought cycles while a build's modules were loaded."""
+    lines = (*before, "import gc, unitcad.pipeline.build", "print(gc.get_stats()[0]['collections'])")
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=True)
+    return int(done.stdout)
+
+
+def test_modules_are_seldom_searched_for_cycles_while_they_load() -> None:
+    told = ("from unitcad.heap import seek_cycles_seldom", "seek_cycles_seldom()")
+    assert _searches(*told) * 5 < _searches()
+
+
+def test_the_process_beside_a_build_loads_its_modules_after_it_is_told() -> None:
+    code = "import sys, unitcad.pipeline.beside_child; print('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from unitcad.casting.bench_step import BenchStep
-from unitcad.moulds.dovetails import Seam, Split
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Plan
 from unitcad.text import listed, number
+
+if TYPE_CHECKING:
+    from unitcad.moulds.dovetails import Seam, Split
 
 JOIN_MIN = 3.0
 """To join two pieces and seal their seam (assumed)."""

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from unitcad.casting.bench_extras import TAPE, Extra
 from unitcad.moulds.base import PRY_HALF_WIDTH
-from unitcad.moulds.dovetails import Axis, Interval, Split
 from unitcad.moulds.layout import CORNER_RADIUS, MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape import Shape, box, union
+
+if TYPE_CHECKING:
+    from unitcad.moulds.dovetails import Axis, Interval, Split
 
 BESIDE = 3.0
 """From a filament's middle to tape, mm."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
 from unitcad.designs.tooling import Cell, Layout, Tooling
@@ -11,14 +12,16 @@ from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
 from unitcad.moulds import lid
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.concentric import concentric
-from unitcad.moulds.dovetails import Split
 from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved, set_label
-from unitcad.moulds.pins import Pins
 from unitcad.moulds.removal import Removal, customary
 from unitcad.shape import Shape, moved, turned, union
 from unitcad.shape.body import Body, Kind
 from unitcad.spec import Spec
 from unitcad.text import spaced
+
+if TYPE_CHECKING:
+    from unitcad.moulds.dovetails import Split
+    from unitcad.moulds.pins import Pins
 
 
 @dataclass(frozen=True)
