@@ -30,8 +30,8 @@ SCRIPTS = {
 OURS, CADQUERY, BUILD123D, BARE = SCRIPTS
 FULL = "unitcad build, the whole command"
 BARE_STEP = "bare OCCT, the same STEP"
-OTHERS = (("bench_check.py",), ("bench_attenuation.py",), ("bench_batch.py", "--rounds", "1", "--sizes", "100,1000"))
-"""Other scripts of benchmarks/ with their options; batches take long, so they run once."""
+OTHERS = (("bench_check.py",), ("bench_attenuation.py",), ("bench_batch.py", "--rounds", "3", "--sizes", "100,1000"))
+"""Other scripts of benchmarks/ with their options."""
 
 
 def run(quick: bool, say: Say) -> Result:
