@@ -51,6 +51,18 @@ def test_files_without_our_table_are_passed_over(folder: Path) -> None:
     assert run("hole.stl", cwd=folder / "sub").returncode == 0
 
 
+def test_a_pyproject_that_does_not_mention_us_may_be_broken(folder: Path) -> None:
+    """Also with an escape in it, with which our name may be written."""
+    (folder / "unitcad.toml").write_text('[check]\nignore = ["T"]\n')
+    broken = folder / "sub" / "pyproject.toml"
+    broken.write_text("[tool.other\nkey = 1\n")
+    assert json.loads(run("hole.stl", "--json", cwd=folder / "sub").stdout)["config"] == "../unitcad.toml"
+    broken.write_text("[tool.unitcad.check\n")
+    assert run("hole.stl", cwd=folder / "sub").returncode == 2
+    broken.write_text('[tool."\\u0075nitcad".check]\nselect = ["F"]\n')
+    assert json.loads(run("hole.stl", "--json", cwd=folder / "sub").stdout)["config"] == "pyproject.toml"
+
+
 def test_unitcad_toml_comes_before_pyproject(folder: Path) -> None:
     (folder / "unitcad.toml").write_text("[check]\n")
     (folder / "pyproject.toml").write_text('[tool.unitcad.check]\nfail-on = "warning"\n')
