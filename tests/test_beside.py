@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from unitcad.children import cores
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.beside import Beside, started
@@ -135,7 +136,7 @@ def test_who_asks_a_process_that_has_ended_makes_the_step_itself() -> None:
 
 
 def test_the_command_loads_no_scipy_itself(tmp_path: Path) -> None:
-    if len(os.sched_getaffinity(0)) < 2:
+    if cores() < 2:
         pytest.skip("one core: everything is made in one process")
     code = (
         "import sys; from unitcad.cli import app; "
@@ -157,7 +158,7 @@ def test_the_command_loads_no_occt_itself_and_leaves_no_process(tmp_path: Path) 
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True)
     folder, loaded = done.stdout.splitlines()
     assert "unit.step" in json.loads((Path(folder) / "manifest.json").read_text())["files"]
-    alone = len(os.sched_getaffinity(0)) < 2
+    alone = cores() < 2
     assert loaded == str(alone)
     if alone:  # it has no other process
         return

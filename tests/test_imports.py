@@ -45,6 +45,17 @@ LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 CAD = ("OCP", "build123d", "cadquery")
 NEEDLESS = ("numpy.ma", "unitcad.arrays.array_file")
 """What neither a unit's build nor a check needs, and takes longer to load than a small mesh takes to check."""
+OF_OTHERS = {
+    "check": (
+        "unitcad.check.rules.d_walls",
+        "unitcad.check.rules.m_manifest",
+        "unitcad.check.geometry.rays",
+        "unitcad.check.geometry.small_shells",
+        "tomllib",
+    ),
+    "build": ("unitcad.moulds.dovetails",),
+}
+"""What is for a printer, a manifest, many shells or settings, and for arrays: by the commands that load none of it."""
 
 
 def _edges() -> set[tuple[str, str, str]]:
@@ -197,19 +208,6 @@ def test_no_piece_is_recognised_by_its_name() -> None:
                 words = [n.value for n in ast.walk(node) if isinstance(n, ast.Constant)]
                 found += [f"{file.name}:{node.lineno}" for word in words if word in kinds]
     assert found == []
-
-
-OF_OTHERS = {
-    "check": (
-        "unitcad.check.rules.d_walls",
-        "unitcad.check.rules.m_manifest",
-        "unitcad.check.geometry.rays",
-        "unitcad.check.geometry.small_shells",
-        "tomllib",
-    ),
-    "build": ("unitcad.moulds.dovetails",),
-}
-"""What is for a printer, a manifest, many shells or settings, and for arrays: by the commands that load none of it."""
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ def keep_freed_memory() -> None:
     of a megabyte that come and go cost more in cleared pages than in sums. The process's peak is what it was.
     """
     if sys.platform == "linux":
-        import ctypes
+        import ctypes  # which a command without arrays does without
 
         mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
         if mallopt:  # musl has none

@@ -135,7 +135,7 @@ def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening: 
         )
         words = ("batch", str(sweep), "-o", str(tmp_path / "out"), "--scheduler", address)
         done = subprocess.run(
-            [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60, check=False
+            [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60, env=environment()
         )
         assert done.returncode == 2, done.stderr
         assert float(done.stdout) < 10

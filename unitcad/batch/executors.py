@@ -23,6 +23,7 @@ from importlib.resources import files
 from typing import IO, Any
 
 from unitcad.batch.cluster import FROM_DASK, Certificates, check_certificates, dask_executor
+from unitcad.children import cores
 from unitcad.errors import WrongArgument
 
 _START = "import sys; sys.path[:] = {path!r}; from unitcad.batch.worker import serve; serve({preload!r})"
@@ -166,15 +167,11 @@ class Workers:
                 raise WrongArgument("timeout", timeout, "only a worker process can be ended in time; with -j from 1 on")
             yield SerialExecutor(), 1
         else:
-            processes = ProcessExecutor(self.jobs or _cores())
+            processes = ProcessExecutor(self.jobs or cores())
             try:
-                yield processes, self.jobs or _cores()
+                yield processes, self.jobs or cores()
             finally:
                 processes.kill()
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _cause_of_end(child: subprocess.Popen[bytes], log: IO[bytes]) -> str:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def begin() -> Callable[[tuple[str, Any]], object]:
     """Return what answers (what, of what); None for what is refused, which the caller then meets itself."""
-    seek_cycles_seldom()  # so everything else is loaded after it
+    seek_cycles_seldom()  # before anything heavy is loaded
     keep_freed_memory()
     from unitcad.casting.bench_pictures import BenchPictures
     from unitcad.moulds.mould_set import MouldSet
@@ -45,7 +45,9 @@ def begin() -> Callable[[tuple[str, Any]], object]:
                 case "step":
                     return _step(*of)
                 case "estimate":
-                    return _estimate(of)
+                    from unitcad.estimating import estimate_spec
+
+                    return estimate_spec(from_json(of))
                 case "call":
                     function, spec = of
                     return function(from_json(spec))
@@ -66,13 +68,6 @@ def _step(bodies: Sequence[Body], name: str) -> bytes | str:
         return step.content(bodies, name)
     except UnitcadError as error:
         return str(error)
-
-
-def _estimate(spec: str) -> dict[str, Any]:
-    from unitcad.estimating import estimate_spec
-    from unitcad.spec import from_json
-
-    return estimate_spec(from_json(spec))
 
 
 if __name__ == "__main__":
