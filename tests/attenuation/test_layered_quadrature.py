@@ -50,8 +50,39 @@ def test_the_kernel_of_a_long_panel_is_read_off_at_its_pieces(load, low, high):
     found = evaluate(seen, panels, _kernel(k.ravel()).reshape(2, *k.shape), PHASE)
     exact = np.array([_exact(seen, *panels[i, :2].real) for i in range(2)])
     size = np.max(np.abs(exact), axis=(0, 2))[:, None]
-    assert np.all(np.abs(found.parts - exact) <= found.errors + 1e-12 * size)
+    assert np.all(np.abs(found.each.parts - exact) <= found.errors + 1e-12 * size)
     assert np.all(found.errors < 1e-6 * size)
+
+
+@pytest.mark.parametrize("chunk", [200_000, 1, 3_000])
+def test_all_panels_together_are_the_sum_of_each(monkeypatch, chunk):
+    """Some in pieces, one off the axis or none, at once or in chunks."""
+    monkeypatch.setattr("unitcad.attenuation.layered.quadrature._CHUNK", chunk)
+    seen = Seen(UniformDisc(3.5e-3), np.array([0.5e-3, 7e-3, 45e-3]))
+    level = [[0, 500, 0, 0], [500, 1000, 0, 0], [1e3, 4e3, 0, 0]]
+    for panels in (np.array(level, dtype=complex), np.array([*level, [4e3, 4e3 + 300 + 80j, 0, 0]])):
+        k, _ = nodes(panels)
+        kernel = _kernel(k.ravel()).reshape(2, *k.shape)
+        found = evaluate(seen, panels, kernel, PHASE)
+        assert found.each.parts.shape == (len(panels), 2, 3)
+        assert np.allclose(found.total, found.each.parts.sum(axis=0), rtol=1e-13, atol=0.0)
+        assert np.allclose(found.error, found.errors.sum(axis=0), rtol=1e-12, atol=0.0)
+        assert np.allclose(found.size, found.each.sizes.sum(axis=0), rtol=1e-13, atol=0.0)
+        alone = [evaluate(seen, panels[i : i + 1], kernel[:, i : i + 1], PHASE) for i in range(len(panels))]
+        assert np.allclose(found.each.parts, [one.total for one in alone], rtol=1e-12, atol=0.0)
+        assert np.allclose(found.errors, [one.error for one in alone], rtol=1e-6, atol=0.0)  # last coefficients
+        assert np.allclose(found.gains, [one.gains[0] for one in alone], rtol=1e-6, atol=0.0)
+
+
+def test_panels_near_0_grow_fourfold_beyond_the_least_wave():
+    """The half-space's wave ends at 0.1 /m: the first panel is shorter, its pole lies in panels of a factor of two."""
+    soft, hard = w.Material(1e4 + 1e3j, 0.01, 400.0**2 + 0j), w.Material(1e9 + 1e7j, 1.0, 0.1**2 - 1e-4j)
+    panels = from_origin(1200.0, 1500.0, 1e-3, (soft, hard))[:, :2].real
+    near = panels[panels[:, 1] <= 100.0]
+    assert near[0, 1] < 0.1 <= 2.0 * near[0, 1] * 2.0
+    assert near[1:, 1] / near[1:, 0] == pytest.approx([2.0, 2.0, 2.0, 4.0, 4.0, 4.0, 4.0])
+    assert panels[len(near) - 1, 1] == pytest.approx(100.0)
+    assert np.all(panels[1:, 0] == panels[:-1, 1])
 
 
 def test_a_tight_tolerance_far_out_takes_few_wavenumbers():

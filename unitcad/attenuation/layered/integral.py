@@ -16,11 +16,12 @@ import numpy as np
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.detours import Poles, around
+from unitcad.attenuation.layered.kept import kept
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, from_origin, halved_towards, onwards, pieced
 from unitcad.attenuation.layered.quadrature import Evaluated, evaluate, panel_poles
 from unitcad.attenuation.layered.stack import Stack
-from unitcad.attenuation.layered.statics import Direction, static_kernel, static_kernels
+from unitcad.attenuation.layered.statics import static_kernels
 from unitcad.attenuation.layered.tail import grid, joined, measure_tail
 from unitcad.attenuation.layered.weights import nodes
 from unitcad.errors import UnitcadError
@@ -83,8 +84,9 @@ class Problem:
     def kernel(self, k: w.Array) -> w.Array:
         """Return k C(k), less the static one, a row an order of each load; the loads' transform is not in it."""
         chunks = [k[first : first + _MOST_SAMPLES] for first in range(0, k.size, _MOST_SAMPLES)]
-        rows = [np.concatenate([self._compliance(body, chunk) for chunk in chunks], axis=1) for body in self.bodies]
-        return self.less_static(k * np.concatenate(rows))
+        rows = [_joined([self._compliance(body, chunk) for chunk in chunks], axis=1) for body in self.bodies]
+        kernel = k * _joined(rows, axis=0)
+        return self.less_static(kernel) if self.bodies[0].reference else kernel
 
     def less_static(self, kernel: w.Array) -> w.Array:
         """Return a kernel of which nothing was taken out, shape (rows, n), less the static one."""
@@ -107,24 +109,23 @@ class Problem:
     @cached_property
     def taken_out(self) -> w.Array:
         """The static kernel that was taken out, shape (rows,)."""
-        directions: list[Direction] = [load.direction for load in self.loads]
+        directions = tuple(load.direction for load in self.loads)
         none = np.zeros(len(self.orders))
         kernels = [static_kernels(body.reference, directions) if body.reference else none for body in self.bodies]
-        return np.concatenate(kernels)
+        return _joined(kernels, axis=0)
 
     def static_part(self) -> tuple[np.ndarray, np.ndarray]:
         """Return what was taken out, shape (rows, n), and a bound of its rounding."""
-        parts = [
-            load.static_part(static_kernel(body.reference, load.direction), self.r)
-            for body in self.bodies
-            if body.reference
-            for load in self.loads
-        ]
-        if not parts:
-            none = np.zeros((len(self.bodies) * len(self.orders), self.r.size))
+        if not self.bodies[0].reference:
+            none = np.zeros((len(self.taken_out), self.r.size))
             return none.astype(np.complex128), none
-        known, rounded = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return known, rounded
+        known, rounded, first = [], [], 0
+        for load in self.loads * len(self.bodies):
+            kernel = self.taken_out[first : first + len(load.orders)]
+            known.append(kernel[:, None] * load.static(self.r))
+            rounded.append(float(np.max(np.abs(kernel))) * load.static_rounding(self.r))
+            first += len(load.orders)
+        return _joined(known, axis=0), _joined(rounded, axis=0)
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,11 @@ class Integrals:
     exhausted: bool
 
 
+def _joined(arrays: list[w.Array], axis: int) -> w.Array:
+    """Concatenate arrays; one alone is returned as it is."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays, axis=axis)
+
+
 def overflow(omega: float) -> UnitcadError:
     return UnitcadError(f"no finite answer at omega = {omega:g} rad/s: a number overflows on the way")
 
@@ -156,61 +162,63 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     materials = tuple(material for some in each for material in some)
     span = float(r.max()) + load.reach + 2.0 * z
     far = PHASE / span * MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
-    beyond = grid(load, r, z, end)
-    stop = _first_stop(beyond, end, rtol, PHASE / span)
-    pending = from_origin(end, stop, span, materials)
-    k, slope = nodes(pending)
-    raw = bare.kernel(np.concatenate([beyond, k.ravel()]))
-    by_body = np.split(raw[:, : beyond.size], len(each))
+    opening = _opening(load, r, z, end, rtol, span, materials)
+    beyond, pending, slope, stop = opening.beyond, opening.panels, opening.slope, float(opening.stop[0])
+    raw = bare.kernel(opening.k)
+    by_body = raw[:, : beyond.size].reshape(len(each), -1, beyond.size)
     tail = joined(
         [
             measure_tail(beyond, rows, some, bare.loads, r, z, far, rtol, largest)
             for rows, some in zip(by_body, each, strict=True)
         ]
     )
-    least = float(tail.bounds[-1].max())
+    least = float(tail.bounds[..., -1].max())
 
     def tolerance(size: float) -> float:
         return max(rtol * min(size, largest), 0.3 * least)  # what the tail leaves anyway is worth no halving
 
     bodies = (replace(body, reference=one) for body, one in zip(bare.bodies, tail.references, strict=True))
     problem = replace(bare, bodies=tuple(bodies))
-    kernel = problem.less_static(raw[:, beyond.size :]).reshape(-1, *k.shape) * slope
+    kernel = problem.less_static(raw[:, beyond.size :]).reshape(-1, *slope.shape) * slope
     phase = PHASE * min(1.0, (rtol / _PHASE_RTOL) ** (1 / 32))
     known, rounded = problem.static_part()
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
     skipped = np.zeros(known.shape)  # by the detours
     count, done, exhausted, gained = beyond.size, 0, False, 0.0
+    settled: list[Evaluated] = []
     put_off = _PutOff.none(len(pending), known.shape)
     for left in range(_MAX_ROUNDS, -1, -1):
         found = evaluate(problem, pending, kernel, phase)
-        if not np.all(np.isfinite(found.parts)):
+        if not np.all(np.isfinite(found.total)):
             raise overflow(bare.bodies[0].omega)
-        count += k.size
-        parts, errors = found.parts.sum(0), found.errors.sum(0)
-        whole, off = np.abs(known + total + parts), quadrature + errors
+        count += slope.size
+        whole, off = np.abs(known + total + found.total), quadrature + found.error
         wanted = tolerance(float(np.max(whole)) or 1.0)
-        done += pending.shape[0]
-        limit = _PANELS_SHARE * wanted / max(done, 1)
-        bad = found.gains > limit
-        if left == 0 or np.max(off) <= _PANELS_SHARE * wanted:
-            bad[:] = False
-        due = put_off.due(found, bad)
-        dropped = np.isin(put_off.of, due) if due.size else np.zeros_like(bad)
-        bad &= ~dropped
-        room = (MAX_PANELS - done) // 4  # quarters of them are what is left
-        exhausted = exhausted or bool(np.count_nonzero(bad) > room)
-        bad = _worst(found.gains, bad, room)
-        good = ~(bad | dropped)
-        whole_round = bool(np.all(good))
-        kept = slice(None) if whole_round else good
-        if not whole_round:
-            parts, errors = found.parts[kept].sum(0), found.errors[kept].sum(0)
-        total = total + parts
-        quadrature += errors
-        gained += float(found.gains[kept].sum())
-        size += found.sizes[kept].sum(0)
-        if not whole_round:
+        done += len(pending)
+        limit = _PANELS_SHARE * wanted / done
+        good_enough = left == 0 or np.max(off) <= _PANELS_SHARE * wanted
+        cuts = None if good_enough else _cuts(found, put_off, limit, MAX_PANELS - done)
+        exhausted = exhausted or (cuts is not None and cuts.short)
+        if cuts is None or np.all(cuts.good):
+            total = total + found.total
+            quadrature += found.error
+            size += found.size
+            settled.append(found)
+            further = tail.start(tolerance(float(np.max(np.abs(known + total)))))
+            # Panels that do not suffice for halving may still do for a tail that leaves more.
+            spent = done > MAX_PANELS or (exhausted and tail.bound(stop).max() <= (quadrature + skipped).max())
+            exhausted = exhausted or bool(further > stop and spent)
+            if further <= stop or spent or left == 0:
+                break
+            pending = onwards(stop, further, span)
+            put_off = _PutOff.none(len(pending), known.shape)
+            stop = further
+        else:
+            bad, good, due = cuts.bad, cuts.good, cuts.due
+            total = total + found.each.parts[good].sum(0)
+            quadrature += found.errors[good].sum(0)
+            size += found.each.sizes[good].sum(0)
+            gained += float(found.gains[good].sum())
             sure = tolerance(float(np.max(whole - off - skipped)))  # beside a pole |u| is at first far too large
             left_out = _DETOURS_SHARE * sure - float(skipped.max())
             now, later, pieces = _detours(problem, pending, found, bad, limit, left_out, span)
@@ -223,23 +231,41 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             of = np.where(later, np.cumsum(later) - 1, -1)[halves][origin]
             pending = np.concatenate([cut, turned])
             put_off = _PutOff(np.append(of, np.full(len(turned), -1)), pieces[later], found.hidden[later])
-        else:
-            further = tail.start(tolerance(float(np.max(np.abs(known + total)))))
-            # Panels that do not suffice for halving may still do for a tail that leaves more.
-            spent = done > MAX_PANELS or (exhausted and tail.bound(stop).max() <= (quadrature + skipped).max())
-            exhausted = exhausted or bool(further > stop and spent)
-            if further <= stop or spent or left == 0:
-                break
-            pending = onwards(stop, further, span)
-            put_off = _PutOff.none(len(pending), known.shape)
-            stop = further
         k, slope = nodes(pending)
         kernel = problem.kernel(k.ravel()).reshape(-1, *k.shape) * slope
     rest = tail.bound(stop)
     error = quadrature + skipped + rest + 4e-15 * size + rounded
-    to_gain = gained + float(skipped.max() + rest.max()) - least
-    cut_short = to_gain < _WORTH * float(np.max(error))
-    return Integrals(known + total, error, count, cut_short, exhausted)
+    total = known + total
+    cut_short = False
+    if not np.max(error) <= rtol * np.max(np.abs(total)):  # where it is reached, nobody asks
+        gained += sum(float(found.gains.sum()) for found in settled)
+        cut_short = gained + float(skipped.max() + rest.max()) - least < _WORTH * float(np.max(error))
+    return Integrals(total, error, count, cut_short, exhausted)
+
+
+class _Opening(NamedTuple):
+    """What a path begins with: where its tail is sampled, its first panels, and where they end.
+
+    beyond (n,), the wavenumbers (1/m) of the tail's samples; panels; k, these wavenumbers and those of the panels'
+    nodes; slope (panels, nodes); stop, of shape (1,).
+    """
+
+    beyond: np.ndarray
+    panels: w.Array
+    k: w.Array
+    slope: w.Array
+    stop: np.ndarray
+
+
+@kept
+def _opening(
+    load: Load, r: np.ndarray, z: float, end: float, rtol: float, span: float, materials: tuple[w.Material, ...]
+) -> _Opening:
+    beyond = grid(load, r, z, end)
+    stop = _first_stop(beyond, end, rtol, PHASE / span)
+    panels = from_origin(end, stop, span, materials)
+    k, slope = nodes(panels)
+    return _Opening(beyond, panels, np.concatenate([beyond, k.ravel()]), slope, np.array([stop]))
 
 
 def _first_stop(beyond: np.ndarray, end: float, rtol: float, longest: float) -> float:
@@ -272,6 +298,29 @@ def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
     worst = np.zeros_like(bad)
     worst[np.argsort(np.where(bad, -errors, 0.0))[: max(room, 0)]] = True
     return worst
+
+
+class _Cuts(NamedTuple):
+    """Which panels are bad, which are good, and which detours are due; short: whether some bad ones are taken as good.
+
+    A panel in whose place a detour is due is neither.
+    """
+
+    bad: np.ndarray
+    good: np.ndarray
+    due: np.ndarray
+    short: bool
+
+
+def _cuts(found: Evaluated, put_off: _PutOff, limit: float, panels: int) -> _Cuts:
+    """Choose the panels that gain more than `limit` by being cut, as far as `panels` in all suffice."""
+    bad = found.gains > limit
+    due = put_off.due(found, bad)
+    dropped = np.isin(put_off.of, due) if due.size else np.zeros_like(bad)
+    bad &= ~dropped
+    room = panels // 4  # quarters of them are what is left
+    some = _worst(found.gains, bad, room)
+    return _Cuts(some, ~(some | dropped), due, bool(np.count_nonzero(bad) > room))
 
 
 class _PutOff(NamedTuple):

@@ -19,6 +19,7 @@ from typing import Any, get_args
 import numpy as np
 
 from unitcad.attenuation.layered.bessel import bessel, bessel_bounds, moment
+from unitcad.attenuation.layered.kept import kept
 from unitcad.attenuation.layered.rheology import MOST, finite
 from unitcad.attenuation.layered.statics import Direction, disc_integrals, static_rounding
 from unitcad.errors import Refusal, unknown_name
@@ -85,10 +86,9 @@ class Point:
             raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
         return np.broadcast_to(1.0 / (2.0 * np.pi * r), (len(self.orders), *np.shape(r)))
 
-    def static_part(self, kernel: Any, r: Any) -> tuple[Any, Any]:
-        """Return static displacement by `statics.static_kernel` and a bound of its rounding, a row an order."""
-        integrals = self.static(r)
-        return kernel[:, None] * integrals, static_rounding(kernel, integrals)
+    def static_rounding(self, r: Any) -> Any:
+        """Return a bound of the rounding of `statics.static_kernel` times `static`, over the kernel's largest row."""
+        return static_rounding(self.static(r))
 
 
 @dataclass(frozen=True)
@@ -137,13 +137,17 @@ class UniformDisc:
 
     def static(self, r: Any) -> Any:
         """Return the integrals of q(k) J_n(kr) dk in m, a row an order, r in m."""
-        return self.radius * disc_integrals(np.asarray(r, dtype=float) / self.radius, self.direction)
+        return self._static(np.asarray(r, dtype=float))[0]
 
-    def static_part(self, kernel: Any, r: Any) -> tuple[Any, Any]:
-        """Return static displacement by `statics.static_kernel` and a bound of its rounding, a row an order."""
-        s = np.asarray(r, dtype=float) / self.radius
+    def static_rounding(self, r: Any) -> Any:
+        """Return a bound of the rounding of `statics.static_kernel` times `static`, over the kernel's largest row."""
+        return self._static(np.asarray(r, dtype=float))[1]
+
+    @kept
+    def _static(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        s = r / self.radius
         integrals = disc_integrals(s, self.direction)
-        return self.radius * kernel[:, None] * integrals, self.radius * static_rounding(kernel, integrals, s)
+        return self.radius * integrals, self.radius * static_rounding(integrals, s)
 
 
 Load = Point | UniformDisc

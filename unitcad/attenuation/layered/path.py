@@ -23,6 +23,8 @@ Panels there are as long as a third of the path to the last pole: of 200 random 
 for it at rtol 1e-3, and two at 1e-6.
 """
 _MAX_HALVINGS = 40
+_CLOSE = 4
+"""Halvings between the first panel and those beyond the least wavenumber's pole, each a panel."""
 
 
 def wavenumbers(panels: w.Array, s: w.Array) -> tuple[w.Array, w.Array]:
@@ -38,8 +40,8 @@ def from_origin(end: float, stop: float, span: float, materials: tuple[w.Materia
 
     They are of one length up to `end`, but longer beyond the waves of all materials. The one at k = 0 is halved towards
     0 until it is shorter than the least wavenumber of a material: a stiff half-space's branch points and pole lie
-    there, too small a feature for a long panel's last coefficients. No tolerance is in it: panels of a tighter one are
-    to be pieces of those of a looser one.
+    there, too small a feature for a long panel's last coefficients. Beyond them two of these halves are one panel. No
+    tolerance is in it: panels of a tighter one are to be pieces of those of a looser one.
     """
     longest = PHASE / span
     line = np.linspace(0.0, end, max(_LEAST_PANELS, int(np.ceil(end / longest))) + 1)
@@ -48,7 +50,9 @@ def from_origin(end: float, stop: float, span: float, materials: tuple[w.Materia
     shortest = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
     if 0.0 < shortest < line[1]:
         halvings = min(int(np.ceil(np.log2(line[1] / shortest))) + 1, _MAX_HALVINGS)
-        line = np.concatenate([[0.0], line[1] * 2.0 ** -np.arange(halvings, -1.0, -1.0), line[2:]])
+        close = np.arange(halvings, max(halvings - _CLOSE, 0), -1)
+        times = np.concatenate([close, np.arange(close[-1] - 2, 0, -2), [0]])
+        line = np.concatenate([[0.0], line[1] * 0.5**times, line[2:]])
     return _turned(line, _branch_points(materials[-1]), 1.0 / span)
 
 

@@ -7,16 +7,17 @@ sampled as it varies, not as the waves do.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, poles
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.weights import COUNT, NODES, TO_LEGENDRE, closeness, turns, weights
+from unitcad.attenuation.layered.weights import COUNT, NODES, TO_LEGENDRE, Pieces, Weights, closeness, pieces, weights
 
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
@@ -49,22 +50,53 @@ class Seen(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Evaluated:
-    """Of each panel, row and radius: the integral, a bound of its error, its absolute size, that of the waves alone.
+class Each(NamedTuple):
+    """Of each panel, row and radius: the integral, its absolute size, that of the waves alone, the rule's error.
 
-    gains: of each panel, by how much halving it lessens the largest part of its error; kernel (with dk/ds): what was
-    integrated; closeness: the wavenumber over half of what a panel covers of it. Poles are looked for when asked: where
-    no panel is bad, nobody does.
+    Shape (panels, rows, radii).
     """
 
-    parts: np.ndarray
-    errors: np.ndarray
+    parts: w.Array
     sizes: np.ndarray
     covered: np.ndarray
-    gains: np.ndarray
+    swing: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """Integrals over panels, of all together and, when asked, of each.
+
+    total, error, size (rows, radii): the integral over all panels, a bound of its error, its absolute size; kernel
+    (with dk/ds): what was integrated; closeness: the wavenumber over half of what a panel covers of it; rest (rows,
+    panels): of the kernel, a bound of what its Legendre series leaves out; rounding: what of it may be rounding's;
+    known: what was taken out of each row. What is of each panel is worked out when asked: where no panel is bad,
+    nobody does.
+    """
+
+    total: w.Array
+    error: np.ndarray
+    size: np.ndarray
     kernel: w.Array
     closeness: np.ndarray
+    rest: np.ndarray
+    rounding: np.ndarray
+    known: np.ndarray
+    by_panel: Callable[[], Each]
+
+    @cached_property
+    def each(self) -> Each:
+        return self.by_panel()
+
+    @cached_property
+    def errors(self) -> np.ndarray:
+        """A bound of the error of each panel's part."""
+        return self.rest.T[..., None] * self.each.covered + self.each.swing
+
+    @cached_property
+    def gains(self) -> np.ndarray:
+        """By how much halving a panel lessens the largest part of its error, shape (panels,)."""
+        halved = 2.0 * (2.0 * self.rounding.T + _CANCELLED * np.abs(self.known))[..., None] * self.each.covered
+        return np.maximum(self.errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0)
 
     @cached_property
     def poles(self) -> Poles:
@@ -74,7 +106,7 @@ class Evaluated:
     @cached_property
     def hidden(self) -> np.ndarray:
         """What a detour around each panel's pole may leave out, shape (panels, rows, radii)."""
-        return HIDDEN * self.poles.rest.T[..., None] * self.covered
+        return HIDDEN * self.poles.rest.T[..., None] * self.each.covered
 
     @property
     def blurred(self) -> np.ndarray:
@@ -101,57 +133,37 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
     all that is left of the last coefficients: halving doubles it. Where the kernel is little beside what it is less by,
     their difference's rounding is left, and stays.
     """
-    rest = 2.0 * np.abs(kernel @ TO_LEGENDRE[-2:].T).sum(axis=-1).T
-    close, turned, off_axis = turns(seen.load, seen.r, panels)
-    rounding = (ROUNDING * close * np.abs(kernel).max(axis=-1)).T
-    pieces = np.maximum(np.ceil(turned / phase), 1.0).astype(int)
-    if not np.any(off_axis):
-        sums = _summed(seen, panels, kernel, pieces)
+    cut = pieces(seen.load, seen.r, panels, phase)
+    rounding = ROUNDING * cut.closeness * np.abs(kernel).max(axis=-1)
+    series = np.abs(kernel @ TO_LEGENDRE.T)
+    rest = 2.0 * np.maximum(2.0 * series[..., -2:].sum(axis=-1), rounding)
+    whole = len(cut.of) == len(panels)
+    values = kernel if whole else _at_pieces(cut, kernel)
+    if np.any(cut.off_axis) or values.size * seen.r.size > _CHUNK:
+        each = _in_chunks(seen, cut, values)
+        total, sizes = each.parts.sum(axis=0), each.sizes.sum(axis=0)
+        error = (rest.T[..., None] * each.covered + each.swing).sum(axis=0)
+
+        def by_panel() -> Each:
+            return each
     else:
-        shape = (len(panels), len(kernel), seen.r.size)
-        sums = np.empty(shape, dtype=np.complex128), *np.empty((3, *shape))
-        for which in (np.flatnonzero(~off_axis), np.flatnonzero(off_axis)):
-            if which.size:
-                summed = _summed(seen, panels[which], kernel[:, which], pieces[which])
-                for whole, part in zip(sums, summed, strict=True):
-                    whole[which] = part
-    parts, sizes, covered, swing = sums
-    errors = 2.0 * np.maximum(rest, rounding)[..., None] * covered + swing
-    halved = 2.0 * (2.0 * rounding + _CANCELLED * np.abs(seen.taken_out))[..., None] * covered
-    gains = np.maximum(errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0)
-    return Evaluated(parts, errors, sizes, covered, gains, kernel, close)
+        met = weights(seen.load, seen.orders, seen.r, cut.panels)
+        series = series if whole else np.abs(values @ TO_LEGENDRE.T)
+        total, error, sizes = _together(met, values, series, rest if whole else rest[:, cut.of])
+
+        def by_panel() -> Each:
+            return _integrated(met, values, cut.count)
+
+    return Evaluated(total, error, sizes, kernel, cut.closeness, rest, rounding, seen.taken_out, by_panel)
 
 
-def _summed(seen: Seen, panels: w.Array, kernel: w.Array, pieces: np.ndarray) -> tuple[w.Array, ...]:
-    """Return of each panel, all on the axis or all off it, the sums of what `_integrated` returns of its `pieces`."""
-    ends = np.cumsum(pieces)
-    cut, values = (panels, kernel) if ends[-1] == len(panels) else _cut(panels, kernel, pieces)
-    step = max(1, _CHUNK // (COUNT * seen.r.size * len(kernel)))
-    first, sums = 0, list[tuple[w.Array, ...]]()
-    while first < len(panels):
-        low = ends[first] - pieces[first]
-        last = max(int(np.searchsorted(ends, low + step, side="right")), first + 1)
-        some = slice(low, ends[last - 1])
-        found = _integrated(seen, cut[some], values[:, some])
-        if some.stop - low > last - first:
-            found = tuple(np.add.reduceat(one, (ends - pieces)[first:last] - low, axis=0) for one in found)
-        sums.append(found)
-        first = last
-    return sums[0] if len(sums) == 1 else tuple(np.concatenate(part) for part in zip(*sums, strict=True))
-
-
-def _cut(panels: w.Array, kernel: w.Array, pieces: np.ndarray) -> tuple[w.Array, w.Array]:
-    """Cut each panel into equal pieces; return them, and the kernel at their nodes, shape (rows, pieces, nodes)."""
-    of = np.repeat(np.arange(len(panels)), pieces)
-    cut, values, count = panels[of], kernel[:, of], pieces[of]
-    place = np.arange(len(of)) - (np.cumsum(pieces) - pieces)[of]
-    for side in (0, 1):
-        share = (place + side) / count
-        cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
-    for number in np.unique(pieces[pieces > 1]):
-        re, im = np.moveaxis(_pair(kernel[:, pieces == number]) @ _spread(int(number)), -2, 0)  # as `products` does
+def _at_pieces(cut: Pieces, kernel: w.Array) -> w.Array:
+    """Return the kernel at the nodes of the pieces, shape (rows, pieces, nodes)."""
+    values, count = kernel[:, cut.of], cut.count[cut.of]
+    for number in np.unique(cut.count[cut.count > 1]):
+        re, im = np.moveaxis(_pair(kernel[:, cut.count == number]) @ _spread(int(number)), -2, 0)  # as `products` does
         values[:, count == number] = (re + 1j * im).reshape(len(kernel), -1, COUNT)
-    return cut, values
+    return values
 
 
 @lru_cache(maxsize=64)
@@ -162,25 +174,53 @@ def _spread(count: int) -> np.ndarray:
     return (np.polynomial.legendre.legvander(at, COUNT - 1) @ TO_LEGENDRE).T
 
 
-def _integrated(seen: Seen, panels: w.Array, kernel: w.Array) -> tuple[w.Array, np.ndarray, np.ndarray, np.ndarray]:
-    """Return of each panel, row and radius the integral, its absolute size, that of the waves alone, the rule's error.
+def _together(
+    met: Weights, kernel: w.Array, series: np.ndarray, rest: np.ndarray
+) -> tuple[w.Array, np.ndarray, np.ndarray]:
+    """Return the integral over all pieces, a bound of its error and its absolute size, shape (rows, radii).
 
-    The last by `weights.weights`.
+    series (rows, pieces, degrees): the kernel's coefficients, absolute; rest (rows, pieces): what they leave out.
     """
-    met = weights(seen.load, seen.orders, seen.r, panels)
+    orders, *_, radii = met.values.shape
+    flat = kernel.reshape(-1, orders, kernel[0].size)
+    total = products(flat, met.values.reshape(orders, -1, radii))
+    size = np.abs(flat)[..., None, :] @ met.sizes.reshape(orders, -1, radii)
+    by_body = series.reshape(-1, orders, *series.shape[1:])
+    swing = (by_body * met.swing).sum(axis=-1)[..., None, :]
+    error = swing @ met.most + rest.reshape(swing.shape) @ met.covered
+    return total.reshape(-1, radii), error.reshape(-1, radii), size.reshape(-1, radii)
+
+
+def _integrated(met: Weights, kernel: w.Array, count: np.ndarray) -> Each:
+    """Return the integrals over each panel of `count` (panels,) pieces, all on the axis or all off it."""
     by_body = kernel.reshape(-1, *met.values.shape[:3])
     sizes = (np.abs(by_body)[..., None, :] @ met.sizes)[..., 0, :]
-    swing = (np.abs(by_body @ TO_LEGENDRE.T) * met.swing).sum(axis=-1)
     quantities = (
         products(by_body, met.values),
         sizes,
         np.broadcast_to(met.covered, sizes.shape),
-        swing[..., None] * met.most,
+        (np.abs(by_body @ TO_LEGENDRE.T) * met.swing).sum(axis=-1)[..., None] * met.most,
     )
-    parts, sizes, covered, oscillation = (
-        one.reshape(len(kernel), len(panels), -1).swapaxes(0, 1) for one in quantities
-    )
-    return parts, sizes, covered, oscillation
+    found = Each(*(one.reshape(*kernel.shape[:2], -1).swapaxes(0, 1) for one in quantities))
+    first = np.cumsum(count) - count
+    return found if len(count) == kernel.shape[1] else Each(*(np.add.reduceat(one, first) for one in found))
+
+
+def _in_chunks(seen: Seen, cut: Pieces, kernel: w.Array) -> Each:
+    """Return the integrals over each panel, some of them at once that are all on the axis or all off it."""
+    shape = (len(cut.count), len(kernel), seen.r.size)
+    sums = Each(np.empty(shape, dtype=np.complex128), *np.empty((3, *shape)))
+    step = max(1, _CHUNK // (COUNT * seen.r.size * len(kernel)))
+    for which in (np.flatnonzero(~cut.off_axis), np.flatnonzero(cut.off_axis)):
+        ends = np.cumsum(cut.count[which])
+        for chunk in np.split(which, np.flatnonzero(np.diff(ends // step)) + 1):
+            if chunk.size:
+                at = np.isin(cut.of, chunk)
+                met = weights(seen.load, seen.orders, seen.r, cut.panels[at])
+                found = _integrated(met, kernel[:, at], cut.count[chunk])
+                for whole, part in zip(sums, found, strict=True):
+                    whole[chunk] = part
+    return sums
 
 
 def products(kernel: w.Array, waves: w.Array) -> w.Array:

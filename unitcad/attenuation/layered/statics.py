@@ -8,15 +8,13 @@ Rows are those of a load's kernel, with its `orders`: (u_r, u_z) under an axisym
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Literal
 
 import numpy as np
 from scipy import special
 
 from unitcad.attenuation.layered import waves as w
-from unitcad.attenuation.layered.kept import kept
 
 Direction = Literal["normal", "radial", "tangential"]
 _CATALAN = 0.915965594177219015
@@ -35,9 +33,12 @@ def static_kernel(material: w.Material, direction: Direction) -> w.Array:
     return np.array([across, along] if direction == "normal" else [along, across])
 
 
-def static_kernels(material: w.Material, directions: Sequence[Direction]) -> w.Array:
-    """Return the rows of `static_kernel` of each direction, one after the other."""
-    return np.concatenate([static_kernel(material, direction) for direction in directions])
+@lru_cache(maxsize=64)
+def static_kernels(material: w.Material, directions: tuple[Direction, ...]) -> w.Array:
+    """Return the rows of `static_kernel` of each direction, one after the other, read-only."""
+    rows = np.concatenate([static_kernel(material, direction) for direction in directions])
+    rows.flags.writeable = False
+    return rows
 
 
 def disc_integrals(s: Any, direction: Direction) -> Any:
@@ -45,34 +46,30 @@ def disc_integrals(s: Any, direction: Direction) -> Any:
 
     q(k) = J1(k) / k but of a radial load: Weber and Schafheitlin's integrals of J1(k) J_n(ks) / k.
     """
-    return _disc_integrals(np.asarray(s, dtype=float), direction)[0]
-
-
-@kept
-def _disc_integrals(s: np.ndarray, direction: Direction) -> tuple[np.ndarray]:
+    s = np.asarray(s, dtype=float)
     if direction == "radial":
-        return (np.array([_radial(s), np.where(s < 1, 1.0 - s, 0.0)]),)
+        return np.array([_radial(s), np.where(s < 1, 1.0 - s, 0.0)])
     zeroth, first = _zeroth(s), np.where(s <= 1, s / 2.0, 0.5 / np.maximum(s, 1.0))
-    return (np.array([first, zeroth] if direction == "normal" else [zeroth, _second(s), first]),)
+    return np.array([first, zeroth] if direction == "normal" else [zeroth, _second(s), first])
 
 
 _UNIT = 2.0**-53
 """Of one rounding, relative."""
 
 
-def static_rounding(kernel: w.Array, integrals: Any, s: Any = None) -> Any:
+def static_rounding(integrals: Any, s: Any = None) -> Any:
     """Bound the rounding of `static_kernel` times the integrals of a load, shape (rows, n); s: radii over the disc's.
 
-    In units of 2^-53, of the kernel's largest row (the rows of a compliance come from one solution, and what is taken
-    out of the integrand leaves the compliance's rounding in the integral: that of 1 / k all over, which adds up
-    to the closed form again) times the integral:
+    It is over the kernel's largest row: the rows of a compliance come from one solution, and what is taken out of the
+    integrand leaves the compliance's rounding in the integral: that of 1 / k all over, which adds up to the closed form
+    again. In units of 2^-53, times the integral:
 
     - 16: the moduli with their damping and eps 3 each, the solution for the compliance 6, the kernel 2, the product
       and the sum 2;
     - 24: the integral itself. That is what the second order needs, at m next to `_ELLIPTIC`, where its terms are seven
       times their sum; the others are within 8, a point's within 4.
 
-    And of the kernel's largest row: s is rounded, once, and the integral follows by s times its slope. That is at most
+    And beside it: s is rounded, once, and the integral follows by s times its slope. That is at most
     three times the integral and min(s, 1 / s) (1 - ln |1 - s|): the slope is logarithmic at the rim, and a radial
     load's 1 - s goes to 0 there.
     """
@@ -81,7 +78,7 @@ def static_rounding(kernel: w.Array, integrals: Any, s: Any = None) -> Any:
         with np.errstate(divide="ignore"):
             near = np.minimum(s, 1.0 / s) * (1.0 - np.log(np.clip(np.abs(1.0 - s), _UNIT, 1.0)))
         size = size + 3.0 * np.abs(integrals) + near
-    return _UNIT * float(np.max(np.abs(kernel))) * size
+    return _UNIT * size
 
 
 def _zeroth(s: Any) -> Any:

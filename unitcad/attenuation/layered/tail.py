@@ -13,9 +13,9 @@ from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.bessel import bessel_bounds
 from unitcad.attenuation.layered.kept import kept
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.statics import Direction, static_kernels
+from unitcad.attenuation.layered.statics import static_kernels
 
-_PER_DECADE = 16
+_PER_DECADE = 8
 _MARGIN = 1.5
 _SOON = 10.0
 """Over the first wavenumber: where a tail may stop by the top layer's half-space, no other one is tried."""
@@ -23,9 +23,10 @@ _SOON = 10.0
 
 @dataclass(frozen=True)
 class Tail:
-    """bounds[i]: the integrals of the kernel's rows from k[i] to infinity are at most that (m per pascal or newton).
+    """bounds[..., i]: the integrals of the kernel's rows from k[i] to infinity are at most that.
 
-    Shape (wavenumbers, rows, radii). references: the static half-space to be taken out of each body's rows.
+    In m per pascal or newton, shape (rows, radii, wavenumbers). references: the static half-space to be taken out of
+    the rows of each body.
     """
 
     k: np.ndarray
@@ -35,16 +36,16 @@ class Tail:
 
     @cached_property
     def _most(self) -> np.ndarray:
-        return self.bounds.max(axis=(1, 2))
+        return self.bounds.max(axis=(0, 1))
 
     def start(self, tolerance: float) -> float:
         """Return the least wavenumber (1/m) beyond which less than 0.4 of the tolerance is missing, or the last one."""
-        good = np.nonzero(self._most <= 0.4 * tolerance)[0]
-        return float(self.k[good[0]] if good.size else self.k[-1])
+        good = self._most <= 0.4 * tolerance
+        return float(self.k[np.argmax(good)] if good.any() else self.k[-1])
 
     def bound(self, stop: float) -> np.ndarray:
         """Return the bounds from a `stop` (1/m) on, not before the first of `k`; shape (rows, radii)."""
-        return self.bounds[np.searchsorted(self.k, stop, side="right") - 1]
+        return self.bounds[..., np.searchsorted(self.k, stop, side="right") - 1]
 
 
 def grid(load: Load, r: np.ndarray, z: float, end: float) -> np.ndarray:
@@ -58,7 +59,9 @@ def grid(load: Load, r: np.ndarray, z: float, end: float) -> np.ndarray:
 
 def joined(tails: Sequence[Tail]) -> Tail:
     """Return the tail of several bodies, measured on one grid."""
-    bounds = np.concatenate([tail.bounds for tail in tails], axis=1)
+    if len(tails) == 1:
+        return tails[0]
+    bounds = np.concatenate([tail.bounds for tail in tails])
     references = tuple(reference for tail in tails for reference in tail.references)
     return Tail(tails[0].k, bounds, references, max(tail.scale for tail in tails))
 
@@ -82,19 +85,19 @@ def measure_tail(
     """
     within = max(1, int(np.searchsorted(k, far)))
     if z > 0:
-        bounds = _bounds(k, raw[None], loads, r)[0, :within]
-        return Tail(k[:within], bounds, (None,), min(float(bounds[0].max()), largest))
+        bounds = _bounds(k, raw, loads, r)[..., :within]
+        return Tail(k[:within], bounds, (None,), min(float(bounds[..., 0].max()), largest))
     # As on a half-space of the compliance at the wavenumber of the load's size: a film is not what the disc rests on.
     at = min(int(np.searchsorted(k, 1.0 / max(loads[0].reach, float(r.min())))), k.size - 1)
-    static = np.concatenate([load.static(r) for load in loads])
+    static = loads[0].static(r) if len(loads) == 1 else np.concatenate([load.static(r) for load in loads])
     scale = min(float(np.max(np.abs(static).T * np.abs(raw[:, at]))), largest)
-    directions: list[Direction] = [load.direction for load in loads]
+    directions = tuple(load.direction for load in loads)
 
     def less(material: w.Material) -> w.Array:
         return raw - static_kernels(material, directions)[:, None]
 
     def tail(material: w.Material) -> Tail:
-        return Tail(k[:within], _bounds(k, less(material)[None], loads, r)[0, :within], (material,), scale)
+        return Tail(k[:within], _bounds(k, less(material), loads, r)[..., :within], (material,), scale)
 
     choice = [material for material in dict.fromkeys(reversed(materials)) if material.shear != 0]
     top = tail(materials[0])
@@ -102,7 +105,7 @@ def measure_tail(
         return top
     few = np.array([r.min(), r[np.argmin(np.abs(r - loads[0].reach))], r.max()])
     bounds = _bounds(k, np.array([less(material) for material in choice]), loads, few)
-    left = [_left(Tail(k[:within], bound[:within], (), scale), rtol) for bound in bounds]
+    left = [_left(Tail(k[:within], bound[..., :within], (), scale), rtol) for bound in bounds]
     return tail(choice[left.index(min(left))])
 
 
@@ -117,43 +120,53 @@ def _left(tail: Tail, rtol: float) -> tuple[float, float, float]:
 
 
 class _Waves(NamedTuple):
-    """Bounds of the load's transform times the Bessel functions, shape (wavenumbers, rows, radii).
+    """Bounds of the load's transform times the Bessel functions, shape (rows, radii, wavenumbers).
 
-    by_parts: the same, over a fourth of the distance from the edge; oscillating (wavenumbers, 1, radii): where that
-    bounds an integral.
+    weighted: the same times the width that each wavenumber stands for by the trapezoidal rule, and `before` that of
+    the half before it; by_parts: times four over the distance from the edge where the waves oscillate, so that it
+    bounds an integral, and `_NONE` elsewhere.
     """
 
     envelope: np.ndarray
+    weighted: np.ndarray
+    before: np.ndarray
     by_parts: np.ndarray
-    oscillating: np.ndarray
+
+
+_NONE = 1e250
+"""In place of infinity, which times 0 is no number."""
 
 
 @kept
 def _waves(load: Load, orders: tuple[int, ...], r: np.ndarray, k: np.ndarray) -> _Waves:
-    phase = k[:, None] * r
-    envelope = load.envelope(k)[:, None, None] * bessel_bounds(orders, phase).swapaxes(0, 1)
+    phase = r[:, None] * k
+    envelope = _MARGIN * load.envelope(k) * bessel_bounds(orders, phase)
+    before = np.concatenate([[0.0], np.diff(k)]) / 2.0
+    after = np.concatenate([np.diff(k), [0.0]]) / 2.0
     distance = np.maximum(np.abs(r - load.reach), 1e-12 * (r + load.reach) + 1e-300)
-    oscillating = (phase > 3.0) & ((k * load.reach > 3.0) | (load.reach == 0.0))[:, None]
-    return _Waves(envelope, envelope * (4.0 / distance), oscillating[:, None])
+    oscillating = (phase > 3.0) & ((k * load.reach > 3.0) | (load.reach == 0.0))
+    by_parts = np.where(oscillating, envelope * (4.0 / distance)[:, None], _NONE)
+    return _Waves(envelope, envelope * (before + after), envelope * before, by_parts)
 
 
 def _bounds(k: np.ndarray, kernels: w.Array, loads: Sequence[Load], r: np.ndarray) -> np.ndarray:
-    """Return the bounds from each wavenumber on, shape (kernels, wavenumbers, rows, radii); kernels (.., rows, k)."""
-    kernels = np.swapaxes(kernels, 1, 2)
+    """Return the bounds from each wavenumber on, shape (.., rows, radii, wavenumbers); kernels (.., rows, k)."""
     waves = _waves(loads[0], tuple(order for one in loads for order in one.orders), r, k)
-    size = np.abs(kernels)[..., None]
-    by_envelope = _from_right(k, size * waves.envelope)
+    size = np.abs(kernels)
     variation = size.copy()
-    variation[:, :-1] += np.cumsum(np.abs(np.diff(kernels, axis=1))[:, ::-1], axis=1)[:, ::-1, :, None]
-    by_parts = variation * waves.by_parts
-    return _MARGIN * np.minimum(by_envelope, np.where(waves.oscillating, by_parts, np.inf))
+    variation[..., :-1] += _summed_from_right(np.abs(kernels[..., 1:] - kernels[..., :-1]))
+    size = size[..., None, :]
+    by_envelope = _summed_from_right(size * waves.weighted) - size * waves.before
+    by_envelope += _beyond(k, size[..., -8::7] * waves.envelope[..., -8::7])
+    return np.minimum(by_envelope, variation[..., None, :] * waves.by_parts)
 
 
-def _from_right(k: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """Integrate by trapezoids from each k (second axis) to the last; beyond it as k^-1.5 or as fast as f fell."""
-    pieces = (f[:, 1:] + f[:, :-1]) * (np.diff(k) / 2.0)[:, None, None]
-    last = np.maximum(f[:, -1], 1e-300)
-    power = np.log(np.maximum(f[:, -8], 1e-300) / last) / np.log(k[-1] / k[-8])
-    out = np.zeros_like(f)
-    out[:, :-1] = np.cumsum(pieces[:, ::-1], axis=1)[:, ::-1]
-    return out + (f[:, -1] * k[-1] / np.maximum(power - 1.0, 1e-3))[:, None]
+def _summed_from_right(f: np.ndarray) -> np.ndarray:
+    return f[..., ::-1].cumsum(axis=-1)[..., ::-1]
+
+
+def _beyond(k: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Integrate what goes on as k^-1.5, or as fast as it fell from the last wavenumber but seven to the last one."""
+    least = np.maximum(ends, 1e-300)
+    power = np.log(least[..., :1] / least[..., 1:]) / np.log(k[-1] / k[-8])
+    return ends[..., 1:] * (k[-1] / np.maximum(power - 1.0, 1e-3))

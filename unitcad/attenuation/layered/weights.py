@@ -23,15 +23,18 @@ _DEGREES = np.arange(2 * COUNT, COUNT, -1)
 _ODD_FACTORIALS = np.array([float(factorial2(2 * m - 1)) for m in _DEGREES])
 
 
-class Turns(NamedTuple):
-    """Of each panel, shape (panels,): its wavenumber over half of what it covers, and its phase at the outermost wave.
+class Pieces(NamedTuple):
+    """How panels are cut where the waves turn faster over them than may be.
 
-    off_axis: which leave the real axis.
+    Of each panel, shape (panels,): closeness, its wavenumber over half of what it covers; off_axis, whether it leaves
+    the real axis; count, its pieces. Of each piece: of (pieces,), its panel; panels (pieces, 4), the piece itself.
     """
 
     closeness: np.ndarray
-    phase: np.ndarray
     off_axis: np.ndarray
+    count: np.ndarray
+    of: np.ndarray
+    panels: w.Array
 
 
 class Weights(NamedTuple):
@@ -66,11 +69,18 @@ def _span(load: Load, r: np.ndarray) -> float:
 
 
 @kept
-def turns(load: Load, r: np.ndarray, panels: w.Array) -> Turns:
-    """Return how far each panel's waves turn; r: radii (m), shape (n,)."""
+def pieces(load: Load, r: np.ndarray, panels: w.Array, phase: float) -> Pieces:
+    """Cut panels into equal pieces over which the waves at radii r (m), shape (n,), turn by no more than `phase`."""
     slope = wavenumbers(panels, panels[:, :2])[1]
     turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(load, r)
-    return Turns(closeness(panels), turn, np.any(panels[:, :2].imag, axis=1))
+    count = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
+    of = np.repeat(np.arange(len(panels)), count)
+    cut = panels[of]
+    place = np.arange(len(of)) - (np.cumsum(count) - count)[of]
+    for side in (0, 1):
+        share = (place + side) / count[of]
+        cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
+    return Pieces(closeness(panels), np.any(panels[:, :2].imag, axis=1), count, of, cut)
 
 
 @kept
