@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -17,12 +18,13 @@ from unitcad.batch.batch_call import make
 from unitcad.batch.batch_records import BatchHead, JournalEntry
 from unitcad.batch.executors import Workers
 from unitcad.batch.merging import merge
-from unitcad.batch.parquet_table import read_parquet
 from unitcad.batch.result_folders import export_variants
 from unitcad.batch.results import write_results
 from unitcad.batch.shards import Shard, shard_folders, shard_of
-from unitcad.cache import DiskStore, shared_store
+from unitcad.cache import DiskStore, objects, shared_store
 from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.report import write_report
+from unitcad.report.batch_table import read_parquet
 
 
 def made(sweep: Path, out: Path, **options: Any) -> Summary:
@@ -110,10 +112,14 @@ def test_shards_that_do_not_fit_together(tmp_path: Path) -> None:
     with pytest.raises(UnitcadError, match="there are no shards"):
         merge(out, [], BatchOptions())
     made(sweep, out, shard=Shard(1, 2))
-    with pytest.raises(UnitcadError, match="of 2 shards 1 is missing: 2/2"):
+    with pytest.raises(UnitcadError, match="1 of 2 shards is missing: 2/2; run it with"):
         merge(out, shard_folders(out), BatchOptions())
     with pytest.raises(UnitcadError, match=r"is not a shard of a batch \(no shard.json\)"):
         merge(out, [out], BatchOptions())
+    with pytest.raises(UnitcadError, match="nowhere: there is no such folder"):
+        merge(out, [tmp_path / "nowhere"], BatchOptions())
+    with pytest.raises(UnitcadError, match="holds shards, which unitcad batch merge joins"):
+        made(sweep, out)
     first = out / "shard-1-of-2"
     with pytest.raises(UnitcadError, match="is shard 1/2, as is"):
         merge(out, [first, first], BatchOptions())
@@ -129,7 +135,7 @@ def test_shards_that_do_not_fit_together(tmp_path: Path) -> None:
         merge(out, shard_folders(out), BatchOptions())
     assert not (out / "batch.json").exists()
     assert not (out / "journal.jsonl").exists()
-    with pytest.raises(UnitcadError, match="holds another batch"):  # another shard in a shard's folder
+    with pytest.raises(UnitcadError, match="shard-2-of-2 is of another batch"):  # another shard in a shard's folder
         made(ring_sweep(tmp_path / "s", heights=[2.0, 5.0], materials=2), out, shard=Shard(1, 2))
 
 
@@ -146,6 +152,69 @@ def test_a_shard_is_refused_where_no_merge_could_take_it(tmp_path: Path) -> None
     made(sweep, out, shard=Shard(2, 2))
     merge(out, shard_folders(out), BatchOptions(folders=False))
     assert made(sweep, out, shard=Shard(2, 2)).resumed == 2  # beside the batch that was merged of it
+
+
+def test_a_shard_of_another_batch_is_refused_before_it_is_made(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    made(sweep, out, shard=Shard(1, 2))
+    for other, options in ((ring_sweep(tmp_path / "t", heights=[2.0, 5.0], materials=2), {}), (sweep, {"limit": 3})):
+        with pytest.raises(UnitcadError, match=r"shard-1-of-2 is of another batch \(sweep, --set"):
+            made(other, out, shard=Shard(2, 2), **options)
+    assert [path.name for path in shard_folders(out)] == ["shard-1-of-2"]
+    (out / "shard-1-of-2" / "shard.json").write_text("{")  # a merge says so
+    assert made(sweep, out, shard=Shard(2, 2)).ok == 2
+    with pytest.raises(UnitcadError, match=r"shard\.json: damaged"):
+        merge(out, shard_folders(out), BatchOptions())
+
+
+def test_shards_have_one_store(tmp_path: Path) -> None:
+    """Of two stores a merge made a batch that no variant could be exported from."""
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    made(sweep, out, shard=Shard(1, 2), store=str(tmp_path / "a"))
+    with pytest.raises(UnitcadError, match=r"shard-1-of-2 has its results in the store .*/a, so this shard"):
+        made(sweep, out, shard=Shard(2, 2), store=str(tmp_path / "b"))
+    assert made(sweep, out, shard=Shard(2, 2)).ok == 2  # in the first one's
+    assert not (out / "store").exists()
+    assert merge(out, shard_folders(out), BatchOptions(folders=False)).ok == 4
+    assert export_variant(out, rows(out)[3]["folder"], tmp_path / "one", DiskStore(tmp_path / "fresh")).is_dir()
+    # Where shards were made in several folders there may be several stores all the same.
+    made(sweep, tmp_path / "else", shard=Shard(2, 2), store=str(tmp_path / "b"))
+    both = [out / "shard-1-of-2", tmp_path / "else" / "shard-2-of-2"]
+    with pytest.raises(UnitcadError, match=r"have their results in 2 stores, .* merge with --folders"):
+        merge(tmp_path / "all", both, BatchOptions(folders=False))
+    assert not (tmp_path / "all").exists()
+    assert merge(tmp_path / "all", both, BatchOptions(cache=tmp_path / "fresh", folders=True)).ok == 4
+    assert len(list((tmp_path / "all").glob("ring-*"))) == 4
+
+
+def test_a_batch_goes_on_in_the_store_that_it_has(tmp_path: Path) -> None:
+    """Without --store it was made again beside itself, and store.json named the old store."""
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0]), tmp_path / "out"
+    made(sweep, out, store=str(tmp_path / "a"), folders=False)
+    assert made(sweep, out, folders=False).resumed == 2
+    assert not (out / "store").exists()
+    assert made(sweep, out, store=str(tmp_path / "b"), folders=False).resumed == 0  # asked for
+    assert json.loads((out / "store.json").read_text()) == {"store": str(tmp_path / "b")}
+
+
+def test_a_store_in_which_nobody_may_write_is_refused_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0])
+    made(sweep, tmp_path / "out", store=str(tmp_path / "a"))
+    closed = tmp_path / "a" / "packs"
+    asked = objects.os.access
+    monkeypatch.setattr(objects.os, "access", lambda path, mode: path != closed and asked(path, mode))  # root may all
+    with pytest.raises(UnitcadError, match="a/packs can't be read and written here"):
+        made(sweep, tmp_path / "other", store=str(tmp_path / "a"))
+    assert not (tmp_path / "other").exists()
+
+
+def test_a_merge_names_all_shards_whose_records_are_gone(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    for number in (1, 2):
+        made(sweep, out, shard=Shard(number, 2))
+    shutil.rmtree(out / "store" / "packs")
+    with pytest.raises(UnitcadError, match=r"variant 0: pack .* each of --shard 1/2 and 2/2 and --verify makes again"):
+        merge(out, shard_folders(out), BatchOptions())
 
 
 @pytest.mark.parametrize("lost", ["packs", "content", "unitcad-store"])
@@ -193,6 +262,7 @@ def test_a_merge_takes_no_option_that_it_does_not_read(tmp_path: Path) -> None:
         assert not (out / "journal.jsonl").exists()
     done = unitcad("batch", "merge", out, "--report", "--table", "csv")
     assert done.returncode == 0, done.stderr
+    assert "4 of 4 variants joined; 0 failed;" in done.stdout
     assert (out / "report.html").is_file()
 
 
@@ -203,7 +273,7 @@ def test_the_command_line_refuses_what_is_no_shard(tmp_path: Path) -> None:
             ("batch", sweep, "--shard", "17/16"),
             "--shard = 17/16: the shards of 16 are numbered 1 to 16; nearest accepted: 16/16",
         ),
-        (("batch", "merge", tmp_path / "nothing"), "is not a shard of a batch"),
+        (("batch", "merge", tmp_path / "nothing"), "there is no such folder"),
     ):
         done = unitcad(*words, cwd=tmp_path)
         assert done.returncode == 2, done.stdout
@@ -227,7 +297,7 @@ def test_without_folders_one_is_made_when_asked_for(tmp_path: Path, monkeypatch:
             export_variant(out, wrong, tmp_path / "some", cache)
     with pytest.raises(UnitcadError, match="is not in a store, its folder is its result"):
         export_variant(tmp_path / "plain", wanted[-12:], tmp_path / "some", cache)
-    with pytest.raises(UnitcadError, match="is it a batch"):
+    with pytest.raises(UnitcadError, match="--batch names the folder of a batch"):
         export_variant(tmp_path, wanted[-12:], tmp_path / "some", cache)
 
 
@@ -273,7 +343,7 @@ def test_parquet_has_the_rows_of_the_json(tmp_path: Path, monkeypatch: pytest.Mo
     parquet = pytest.importorskip("pyarrow.parquet")
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=3)
     made(sweep, tmp_path / "out", tables=("json", "parquet"))
-    rows_there = read_parquet(tmp_path / "out" / "variants.parquet")
+    rows_there = read_parquet(tmp_path / "out" / "variants.parquet")["variants"]
     assert [{key: value for key, value in row.items() if value is not None} for row in rows_there] == rows(
         tmp_path / "out"
     )
@@ -286,6 +356,10 @@ def test_parquet_has_the_rows_of_the_json(tmp_path: Path, monkeypatch: pytest.Mo
     made(sweep, tmp_path / "many")
     tables = [(tmp_path / "many" / name).is_file() for name in ("variants.csv", "batch.json", "variants.parquet")]
     assert tables == [False, False, True]
+    pages = [Path(write_report(tmp_path / name)).read_bytes() for name in ("many", "out")]
+    assert pages[0].replace(b">many", b">out") == pages[1].replace(b">many", b">out")
+    made(sweep, tmp_path / "parts", shard=Shard(1, 2))  # of the whole's table
+    assert (tmp_path / "parts" / "shard-1-of-2" / "variants.parquet").is_file()
     assert (tmp_path / "many" / "variants.parquet").read_bytes() == (tmp_path / "out" / "variants.parquet").read_bytes()
     made(sweep, tmp_path / "many", tables=("csv",))
     assert (tmp_path / "many" / "variants.csv").is_file()
@@ -300,7 +374,7 @@ def test_a_column_of_several_kinds_is_text(tmp_path: Path) -> None:
     ]
     columns = ["index", "status", "reason", "folder", "mixed", "number"]
     write_results(tmp_path, columns, lambda: entries, BatchHead(batch="a", name="b"), None, ("parquet",))
-    there = read_parquet(tmp_path / "variants.parquet")
+    there = read_parquet(tmp_path / "variants.parquet")["variants"]
     assert [row["mixed"] for row in there] == ["1", "2.5", None, "true", '"a"', "[1, 2]", str(1 << 70)]
     assert [row["number"] for row in there] == [0.0, 1.5, 2.0, 3.5, 4.0, 5.5, 6.0]
 

@@ -3,7 +3,6 @@
 # pyright: strict
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,15 +15,14 @@ from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import Summary
 from unitcad.batch.estimate_table import write_estimates
 from unitcad.batch.executors import Workers
-from unitcad.batch.parquet_table import read_parquet
 from unitcad.batch.results import TABLES
-from unitcad.batch.run import Watch, batch_head, run, trim
-from unitcad.batch.shards import expect_room, shard_of
+from unitcad.batch.run import Watch, batch_head, counted, run, trim
+from unitcad.batch.shards import shard_of, store_of
 from unitcad.batch.sweep import Sweep, load_sweep
-from unitcad.errors import WrongArgument, unknown_name
+from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.pipeline.artifacts import OUTPUTS
-from unitcad.pipeline.folder import STORE
 from unitcad.pipeline.product import checked_outputs
+from unitcad.report.batch_table import read_batch
 from unitcad.spec.asked import Format
 from unitcad.text import toml
 from unitcad.validation import Changes
@@ -47,11 +45,12 @@ class BatchResult:
     def rows(self) -> list[dict[str, Any]]:
         """A row a variant, as in batch.json: what was swept, volumes in mm3, masses in g, edge levels.
 
-        Raises OSError where the folder has gone.
+        Raises UnitcadError where the folder has gone, or has neither batch.json nor variants.parquet.
         """
-        if not (self.folder / TABLES["json"]).is_file() and (self.folder / TABLES["parquet"]).is_file():
-            return read_parquet(self.folder / TABLES["parquet"])
-        return json.loads((self.folder / "batch.json").read_text("utf-8"))["variants"]
+        table = read_batch(self.folder)
+        if table is None:
+            raise UnitcadError(f"{self.folder}: has neither batch.json nor variants.parquet")
+        return table["variants"]
 
     def __repr__(self) -> str:
         s = self.summary
@@ -92,8 +91,8 @@ def make(
         if options.only == ("estimate",):
             raise WrongArgument("shard", str(options.shard), "estimates alone are one table: leave it out")
         whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
-        expect_room(folder, options.shard, whole.batch)
-        store = options.store or str((folder / STORE).absolute())
+        variants = counted(sweep, options.limit)
+        store = store_of(folder, options.shard, whole.batch, variants, options.store)
         folder, options = folder / options.shard.folder, replace(options, store=store)
     if options.only == ("estimate",) and not sweep.of_arrays:
         return write_estimates(sweep, folder, options)
@@ -155,7 +154,7 @@ def batch(
         limit,
         where,
         store=stored,
-        folders=True if report else folders,
+        folders=True if report and folders is None else folders,
         tables=checked_tables(None if tables is None else texts("tables", tables), report),
         shard=None if shard is None else shard_of(shard),
     )

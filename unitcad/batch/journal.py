@@ -253,6 +253,8 @@ def _check_free(out: Path, head: BatchHead, beside: Collection[str]) -> None:
     """Refuse a folder that is not empty and has no journal, unless its table says that it is this batch's."""
     if all(path.name == LOCK or path.name in beside for path in out.iterdir()):
         return
+    if any(out.glob("shard-*-of-*")):
+        raise UnitcadError(f"{out}: holds shards, which unitcad batch merge joins; else choose another folder with -o")
     if not (out / LOCK).exists():
         raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")
     try:

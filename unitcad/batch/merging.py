@@ -10,15 +10,17 @@ from pathlib import Path
 from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import JournalEntry, Summary
 from unitcad.batch.journal import Journal
-from unitcad.batch.result_folders import folders_wanted, found_at, lost, make_folders, note_store
+from unitcad.batch.result_folders import folders_wanted, lost, make_folders
 from unitcad.batch.results import columns_of, write_results
 from unitcad.batch.run import count_entry
 from unitcad.batch.shards import ShardRecord, read_shards, shard_folders
+from unitcad.batch.store_address import found_at, note_store
 from unitcad.batch.unread_keys import swept_estimate
 from unitcad.batch.unread_keys import warnings as unread_warnings
 from unitcad.cache import DiskStore, MissingContent, SharedStore, default_root
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.folder import ADDRESS, STORE
+from unitcad.text import listed
 
 
 def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
@@ -34,6 +36,12 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     addresses = {folder: found_at(folder, record.store) for folder, record in shards}
     opened = {address: SharedStore(address) for address in set(addresses.values())}
     stores = {folder: opened[address] for folder, address in addresses.items()}
+    wanted = folders_wanted(options, first.variants)
+    if len(opened) > 1 and not wanted:
+        raise UnitcadError(
+            f"the shards have their results in {len(opened)} stores, {', '.join(sorted(opened))}, and a batch has one; "
+            "merge with --folders"
+        )
     _expect_finished(shards, stores)
     summary = Summary(first.variants)
     noted_before = (out / ADDRESS).exists()
@@ -50,7 +58,7 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
             count_entry(summary, entry.status, lambda entry=entry: entry)
         if len(opened) == 1:
             note_store(out, *opened)
-        if folders_wanted(options, first.variants):
+        if wanted:
             cache = DiskStore(options.cache or default_root())
             try:
                 for folder, record in shards:
@@ -80,13 +88,16 @@ def _opened(folder: Path, record: ShardRecord) -> Journal:
     return Journal(folder, record.shard_head, record.code, first=record.indices.start)
 
 
-def _maker(record: ShardRecord) -> str:
-    return f"the sweep with --shard {record.number}/{record.of} and"
+def _maker(*records: ShardRecord) -> str:
+    numbers = [f"{record.number}/{record.of}" for record in records]
+    each = "each of " if len(numbers) > 1 else ""
+    return f"the sweep with {each}--shard {listed(numbers)} and"
 
 
 def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping[Path, SharedStore]) -> None:
     """Raise UnitcadError for a shard in which a variant is missing or a batch is running, or whose records are gone."""
     packs: dict[str, dict[str, int]] = {}
+    gone: dict[int, tuple[JournalEntry, MissingContent]] = {}  # by shard: its first variant that is lost
     for folder, record in shards:
         store = stores[folder]
         missing = list[int]()
@@ -109,5 +120,7 @@ def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping
             packs[store.address] = store.sizes("packs")
         for pack, (first, end) in needed.items():
             if packs[store.address].get(pack, 0) < end:
-                gone = MissingContent(f"pack {pack[:12]} is not in {store.address}, or cut there")
-                raise lost(first, gone, _maker(record))
+                why = MissingContent(f"pack {pack[:12]} is not in {store.address}, or cut there")
+                gone.setdefault(record.number, (first, why))
+    if gone:
+        raise lost(*next(iter(gone.values())), _maker(*(record for _, record in shards if record.number in gone)))

@@ -12,11 +12,10 @@ from typing import Any
 from unitcad import files
 from unitcad.batch.batch_records import Values
 from unitcad.errors import Missing
+from unitcad.report.batch_table import HEAD
 
 GROUP = 1 << 15
 """Rows of a row group: as many are in memory while a table is written."""
-HEAD = b"unitcad"
-"""Key of the file's metadata that holds what batch.json has beside the rows, as JSON."""
 _INTEGERS = range(-(1 << 63), 1 << 63)
 
 
@@ -48,15 +47,6 @@ def write_parquet(path: Path, head: Values, columns: list[str], rows: Callable[[
         for group in _groups(iter(rows())):
             data = {column: [_cell(row.get(column), chosen[column]) for row in group] for column in columns}
             writer.write_table(pa.Table.from_pydict(data, schema))
-
-
-def read_parquet(path: Path) -> list[Values]:
-    """Return the rows of a table. Raises Missing without the extra, OSError."""
-    if not can_write():
-        raise Missing(f"{path}: needs an extra: pip install 'unitcad[parquet]'")
-    from pyarrow import parquet
-
-    return parquet.read_table(path).to_pylist()
 
 
 def _groups(rows: Iterator[Values]) -> Iterator[list[Values]]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache, partial
@@ -20,18 +18,25 @@ from unitcad.batch.destination import Destination, Folders, InStore, made
 from unitcad.batch.journal import JOURNAL
 from unitcad.batch.record_packs import export, read_record
 from unitcad.batch.remote import Receiver
+from unitcad.batch.store_address import note_store, store_noted
 from unitcad.cache import DiskStore, MissingContent, SharedStore, absolute
 from unitcad.errors import UnitcadError, WrongArgument
-from unitcad.pipeline.folder import ADDRESS, STORE, placing, whole
+from unitcad.pipeline.folder import STORE, placing, whole
 
 FOLDERS_BELOW = 1000
 """Variants below which each has a folder, unless asked otherwise."""
 
 
 def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskStore, remote: bool) -> Destination:
-    """Return where the results of a batch in `out` go. Raises UnitcadError for a store that can't be used."""
-    if options.store is not None:
-        address = absolute(options.store)
+    """Return where the results of a batch in `out` go. Raises UnitcadError for a store that can't be used.
+
+    Without folders a batch goes on in the store that an earlier run of it noted, unless another one is asked for.
+    """
+    address = options.store
+    if address is None and not folders_wanted(options, variants):
+        address = store_noted(out)
+    if address is not None:
+        address = absolute(address)
         store = InStore(SharedStore(address), options.verify, None, apart=remote)
         note_store(out, address)
         return store
@@ -48,22 +53,6 @@ def _kept(out: Path) -> SharedStore | None:
     with contextlib.suppress(UnitcadError):
         return _store_of(out)
     return None
-
-
-def note_store(out: Path, address: str) -> None:
-    """Write into a batch's folder where its store is. Raises OSError."""
-    files.write(out / ADDRESS, json.dumps({"store": noted(out, address)}).encode() + b"\n")
-
-
-def noted(out: Path, address: str) -> str:
-    """Return a store's address as a batch in `out` notes it: beside the batch or in it, so that both can be moved."""
-    near = {str((place / STORE).absolute()): way for place, way in ((out, STORE), (out.parent, f"../{STORE}"))}
-    return near.get(address, address)
-
-
-def found_at(out: Path, address: str) -> str:
-    """Return the address that a batch in `out` has `noted`."""
-    return absolute(address if "://" in address else os.path.normpath(out / address))
 
 
 def folders_wanted(options: BatchOptions, variants: int) -> bool:
@@ -150,9 +139,7 @@ def _stored(batch: Path, wanted: str) -> tuple[JournalEntry, RecordPlace]:
 
 def _store_of(batch: Path, address: str | None = None) -> SharedStore:
     """Return the store that a batch names, else the one at `address`, else its own."""
-    if address is None and (batch / ADDRESS).is_file():
-        address = found_at(batch, str(files.read_json(batch / ADDRESS)["store"]))
-    store = SharedStore(absolute(address or str(batch / STORE)))
+    store = SharedStore(absolute(address or store_noted(batch) or str(batch / STORE)))
     store.expect()
     return store
 
@@ -170,7 +157,8 @@ def _entry_of(batch: Path, wanted: str) -> JournalEntry:
                         entry = decode(line, type=JournalEntry)
                         found[entry.folder] = entry
     except OSError as error:
-        raise UnitcadError(f"{batch / JOURNAL}: {(error.strerror or 'unreadable').lower()}; is it a batch?") from None
+        why = (error.strerror or "unreadable").lower()
+        raise UnitcadError(f"{batch / JOURNAL}: {why}; --batch names the folder of a batch") from None
     if not found:
         raise WrongArgument("hash", wanted, f"no variant in {batch} has a hash that begins so")
     if len(found) > 1:

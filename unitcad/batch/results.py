@@ -18,9 +18,10 @@ from unitcad.batch.journal import Journal
 from unitcad.batch.parquet_table import can_write, write_parquet
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.unread_keys import SweptEstimate
+from unitcad.report.batch_table import CSV, JSON, PARQUET
 from unitcad.text import cell
 
-TABLES = {"csv": "variants.csv", "json": "batch.json", "parquet": "variants.parquet"}
+TABLES = {"csv": CSV, "json": JSON, "parquet": PARQUET}
 MOST_ROWS = 10_000
 """Rows from which on CSV and JSON are written only if asked for."""
 FIRST = ("index", "status", "reason", "folder")

@@ -20,9 +20,10 @@ from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import BatchHead, Failure, JournalEntry, Summary
 from unitcad.batch.destination import Destination, InStore
 from unitcad.batch.journal import JOURNAL, Journal
-from unitcad.batch.result_folders import destination_of, folders_wanted, make_folders, noted
+from unitcad.batch.result_folders import destination_of, folders_wanted, make_folders
 from unitcad.batch.results import columns_of, write_results, write_timings
 from unitcad.batch.shards import Shard, ShardRecord, write_shard
+from unitcad.batch.store_address import noted
 from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Task, VariantOutcome
 from unitcad.batch.unread_keys import swept_estimate
@@ -94,7 +95,7 @@ def run(
         found = swept_estimate(sweep, summary.variants) if estimated else None
         summary.warnings += unread_warnings(found)
         columns = columns_of(sweep, journal)
-        write_results(out, columns, journal.entries, head, found, options.tables, summary.variants)
+        write_results(out, columns, journal.entries, head, found, options.tables, count)  # those of a shard are parts
         summary.seconds = round(time.perf_counter() - start, 3)
         write_timings(out, summary, workers)
         watch(summary, None)

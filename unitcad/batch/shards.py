@@ -16,8 +16,11 @@ import msgspec
 from unitcad import files
 from unitcad.batch.batch_records import BatchHead
 from unitcad.batch.journal import batch_in
+from unitcad.batch.store_address import found_at
 from unitcad.batch.sweep import Sweep
+from unitcad.cache import absolute
 from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.pipeline.folder import STORE
 
 RECORD = "shard.json"
 MOST_SHARDS = 9999
@@ -89,14 +92,16 @@ def shard_folders(out: Path) -> list[Path]:
     return sorted(path for path in out.glob("shard-*-of-*") if _FOLDER.fullmatch(path.name) and path.is_dir())
 
 
-def expect_room(out: Path, shard: Shard, batch: str) -> None:
-    """Raise UnitcadError where `out` holds another batch than this one, or shards of another number, finished or not.
+def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | None) -> str:
+    """Return the address of the store of all shards in `out`: the one `asked` for, that of the others, or their own.
 
-    What a merge would refuse is refused before anything is made.
+    What a merge would refuse is refused before anything is made: raises UnitcadError where `out` holds another batch
+    than this one of so many variants, shards of another number, finished or not, or shards with another store.
     """
     held = batch_in(out)
     if held not in (None, batch):
         raise UnitcadError(f"{out}: holds another batch, so shards can not be merged there; choose another with -o")
+    kept = None
     for other in shard_folders(out):
         of = int(other.name.rpartition("-")[2])
         if of != shard.of:
@@ -104,6 +109,33 @@ def expect_room(out: Path, shard: Shard, batch: str) -> None:
                 f"{out}: holds shards of {of} ({other.name}), with which one of {shard.of} can't be merged; go on with "
                 f"--shard K/{of}, or choose another folder with -o"
             )
+        if other.name == shard.folder or (record := _record(other)) is None:
+            continue
+        if (record.head.batch, record.variants) != (batch, variants):
+            raise UnitcadError(
+                f"{out}: {other.name} is of another batch (sweep, --set, --only, --no-check or --limit), so this shard "
+                "can't be merged with it; run it as that one was, or choose another folder with -o"
+            )
+        kept = found_at(other, record.store)
+        if asked is not None and absolute(asked) != kept:
+            raise UnitcadError(
+                f"{out}: {other.name} has its results in the store {kept}, so this shard can't have them in "
+                f"{asked}; leave --store out, or choose another folder with -o"
+            )
+    return asked or kept or str((out / STORE).absolute())
+
+
+def _record(folder: Path) -> ShardRecord | None:
+    """Return a shard's record; None where there is none yet, or a damaged one, which a merge names."""
+    try:
+        return _read(folder)
+    except (UnitcadError, msgspec.MsgspecError):
+        return None
+
+
+def _read(folder: Path) -> ShardRecord:
+    content = files.read(folder / RECORD, largest=files.LARGEST_TABLE, links=False)
+    return msgspec.json.decode(content, type=ShardRecord)
 
 
 def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
@@ -116,11 +148,10 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     records: dict[int, tuple[Path, ShardRecord]] = {}
     for folder in folders:
         try:
-            record = msgspec.json.decode(
-                files.read(folder / RECORD, largest=files.LARGEST_TABLE, links=False), type=ShardRecord
-            )
+            record = _read(folder)
         except files.NotThere:
-            raise UnitcadError(f"{folder}: is not a shard of a batch (no {RECORD})") from None
+            why = f"is not a shard of a batch (no {RECORD})" if folder.is_dir() else "there is no such folder"
+            raise UnitcadError(f"{folder}: {why}") from None
         except msgspec.MsgspecError as error:
             raise UnitcadError(
                 f"{folder / RECORD}: damaged: {error}; the shard's own command writes it again"
@@ -129,7 +160,7 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
         if (record.head.batch, record.of, record.variants) != (first.head.batch, first.of, first.variants):
             raise UnitcadError(
                 f"{folder}: is a shard of another batch than {first_folder} (sweep, options or number of shards); "
-                "name the folders of the shards to merge"
+                "name the folders of the shards to merge, or remove the wrong one and run that shard anew"
             )
         if record.code != first.code:
             raise UnitcadError(f"{folder}: was made by unitcad {record.code}, {first_folder} by {first.code}")
@@ -141,5 +172,6 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     if missing:
         named = ", ".join(f"{number}/{of}" for number in missing[:5]) + (" ..." if len(missing) > 5 else "")
         are = "is" if len(missing) == 1 else "are"
-        raise UnitcadError(f"of {of} shards {len(missing)} {are} missing: {named}; run them with --shard, then merge")
+        them = "it" if len(missing) == 1 else "them"
+        raise UnitcadError(f"{len(missing)} of {of} shards {are} missing: {named}; run {them} with --shard, then merge")
     return [records[number] for number in sorted(records)]

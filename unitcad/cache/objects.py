@@ -15,6 +15,7 @@ from unitcad.files import write_new
 _IMPATIENT = {"s3": {"config_kwargs": {"connect_timeout": 5, "read_timeout": 60, "retries": {"max_attempts": 2}}}}
 """Options of file systems that else try for minutes to reach a server."""
 
+_ALL = os.R_OK | os.W_OK | os.X_OK
 _HALF = re.compile(r"([a-z][a-z0-9+.-]+):")
 
 
@@ -84,6 +85,11 @@ class FolderObjects:
                 with contextlib.suppress(FileNotFoundError):
                     found[f"{inside}/{name}"] = os.stat(os.path.join(here, name)).st_size
         return found
+
+    def closed(self) -> Path | None:
+        """Return the root or a folder right below it in which this process can't read and write; None without one."""
+        below = [path for path in self.root.iterdir() if path.is_dir()] if os.access(self.root, _ALL) else []
+        return next((path for path in (self.root, *below) if not os.access(path, _ALL)), None)
 
     def _fresh(self, name: str, content: bytes) -> Path:
         path = self.root / name

@@ -59,8 +59,12 @@ class SharedStore:
                     if others and self.objects.size(MARK) is None:
                         raise UnitcadError(f"{self.address}: is not a store of unitcad, and not empty; choose another")
                 _tried(lambda: self.objects.create(MARK, _MARKED), 2)
+            if isinstance(self.objects, FolderObjects) and (closed := self.objects.closed()):
+                raise UnitcadError(f"--store {self.address}: {closed} can't be read and written here")
         except (FileExistsError, NotADirectoryError):
             raise UnitcadError(f"{self.address}: is a file, not a folder; choose another for --store") from None
+        except PermissionError:
+            raise UnitcadError(f"--store {self.address}: can't be read and written here") from None
         except OSError as error:
             raise UnitcadError(f"--store {self.address}: can't be reached ({_line(error)})") from None
 

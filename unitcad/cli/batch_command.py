@@ -114,7 +114,7 @@ def batch(
     named = listed(table) if table is not None else None
     if sweep == "merge":
         _confirm_merges(ctx)
-        options = BatchOptions(folders=True if page else folders, cache=cache, tables=checked_tables(named, page))
+        options = BatchOptions(folders=_folders(page, folders), cache=cache, tables=checked_tables(named, page))
         _merge(shards or [], out, options, page, as_json)
         return
     if shards:
@@ -123,7 +123,7 @@ def batch(
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
     options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, store,
-        True if page else folders, checked_tables(named, page), None if shard is None else shard_of(shard))  # fmt: skip
+        _folders(page, folders), checked_tables(named, page), None if shard is None else shard_of(shard))  # fmt: skip
     if dry_run:
         size = preview(wanted, options)
         print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)
@@ -148,6 +148,11 @@ def batch(
         _print_summary(summary, made)
     if summary.failed or summary.stopped:
         sys.exit(1)
+
+
+def _folders(page: bool, asked: bool | None) -> bool | None:
+    """Return whether each variant has a folder: a page links to them, unless they are declined."""
+    return True if page and asked is None else asked
 
 
 _OF_MERGE = ("sweep", "shards", "out", "folders", "cache", "table", "page", "as_json")
@@ -177,12 +182,18 @@ def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: boo
 
     folders = [each for path in named for each in (shard_folders(path) or [path])]
     whole = out or (folders[0].parent if folders else Path())
-    summary = merge(whole, folders, options)
+    try:
+        summary = merge(whole, folders, options)
+    except KeyboardInterrupt:
+        typer.echo(
+            f"interrupted: the shards are as before, and so is what {whole} has; the same command goes on", err=True
+        )
+        sys.exit(130)
     _write_page(whole, page)
     if as_json:
         print_json({"folder": str(whole), **to_builtins(summary)})
     else:
-        _print_summary(summary, whole)
+        _print_summary(summary, whole, joined=True)
     if summary.failed:
         sys.exit(1)
 
@@ -200,7 +211,7 @@ def _write_page(folder: Path, asked: bool) -> None:
             write_report(folder, warn)
 
 
-def _print_summary(summary: Summary, folder: Path) -> None:
+def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> None:
     from unitcad.check.findings import counted
 
     for warning in summary.warnings:
@@ -214,15 +225,21 @@ def _print_summary(summary: Summary, folder: Path) -> None:
     before = f" ({summary.resumed} from before)" if summary.resumed else ""
     left = summary.variants - summary.done
     parts = [
-        f"{summary.ok} of {counted(summary.variants, 'variant')} made{before}",
+        f"{summary.ok} of {counted(summary.variants, 'variant')} {'joined' if joined else 'made'}{before}",
         f"{summary.failed} failed",
         *([f"{left} not tried"] if left else []),
-        f"{counted(summary.geometries, 'geometry', 'geometries')}, "
-        f"{counted(summary.reused, 'variant')} of known parts alone",
+        *([] if joined else [_parts(summary)]),
         f"{summary.seconds:.1f} s",
     ]
     typer.echo("; ".join(parts))
     typer.echo(str(folder))
+
+
+def _parts(summary: Summary) -> str:
+    from unitcad.check.findings import counted
+
+    known = f"{counted(summary.reused, 'variant')} of known parts alone"
+    return f"{counted(summary.geometries, 'geometry', 'geometries')}, {known}"
 
 
 def _print_preview(size: Preview) -> None:

@@ -14,7 +14,7 @@ from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.pipeline.folder import BENCH, PAGE
-from unitcad.report import read_results
+from unitcad.report import batch_table, read_results
 from unitcad.report.bench_page import write_bench
 from unitcad.report.html_page import asset, html_page
 from unitcad.report.pool import Pool
@@ -73,6 +73,9 @@ def _write_bench(folder: Path, warn: Callable[[str], None]) -> None:
         warn(f"warning: no {BENCH}: {error}")
 
 
+_TABLE_OF_PAGE = "the batch's command with --table json makes the table that the page is made of"
+
+
 def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str, Any], str, dict[str, str]]:
     """Collect the page's data, its title, and why a result is damaged by its folder's name.
 
@@ -89,11 +92,15 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
         records, specs, batch = [], [], None
         folders = read_results.variant_folders(folder)
         try:
-            batch = read_results.read_batch(folder)
+            batch = batch_table.read_batch(folder)
+            listed = None if batch else batch_table.rows_of_csv(folder)
+            if listed is not None and listed > len(folders):
+                some = f"{listed} variants, of which {len(folders)} have a folder"
+                damaged[batch_table.CSV] = f"{some}; {_TABLE_OF_PAGE}"
         except UnitcadError as error:
-            damaged["batch.json"] = str(error)
+            damaged[batch_table.name_in(folder)] = str(error)
         if not folders and not batch:
-            why = damaged.get("batch.json") or "no manifest.json in it or right below it"
+            why = "; ".join(damaged.values()) or "no manifest.json in it or right below it"
             raise UnitcadError(f"{folder}: holds no result of unitcad ({why})")
         for each in folders:
             try:
@@ -103,7 +110,7 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
                 continue
             records.append(record)
             specs.append(spec)
-        of_variants = {name: why for name, why in damaged.items() if name != "batch.json"}
+        of_variants = {name: why for name, why in damaged.items() if name not in batch_table.TABLES}
         table = read_results.results_table(batch, records, of_variants, stored=read_results.keeps_store(folder))
         title = f"{(batch or {}).get('name') or folder.resolve().name}: {counted(len(table.rows), 'variant')}"
     models = _models(records, specs, modelled) if modelled else {}

@@ -21,7 +21,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import TEMPORARY
 from unitcad.pipeline.folder import ADDRESS, ARRAY, PAGE, STORE
 from unitcad.pipeline.manifest_records import Manifest
-from unitcad.report.records import BatchFile, ResultsTable, VariantRecord, expect
+from unitcad.report.records import ResultsTable, VariantRecord, expect
 from unitcad.report.step_pictures import step_pictures
 from unitcad.report.viewer_models import model_key, spec_in
 from unitcad.spec import Spec, to_data
@@ -211,16 +211,6 @@ def _in_order(columns: list[str], swept: set[str]) -> list[str]:
         return 2 if name.startswith("edge_") else 3
 
     return sorted(columns, key=place)
-
-
-def read_batch(folder: Path) -> dict[str, Any] | None:
-    """Read batch.json of a folder; None without one. Raises UnitcadError where it can't be read."""
-    try:
-        batch = files.read_json(folder / "batch.json", largest=files.LARGEST_TABLE, links=False)
-    except files.NotThere:
-        return None
-    expect(batch, BatchFile, folder / "batch.json")
-    return batch
 
 
 def _row(record: VariantRecord) -> dict[str, Any]:

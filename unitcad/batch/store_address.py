@@ -1,0 +1,34 @@
+"""Where a batch's store is, as its folder notes it: by a way from the folder where both can be moved together."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from unitcad import files
+from unitcad.cache import absolute
+from unitcad.pipeline.folder import ADDRESS, STORE
+
+
+def note_store(out: Path, address: str) -> None:
+    """Write into a batch's folder where its store is. Raises OSError."""
+    files.write(out / ADDRESS, json.dumps({"store": noted(out, address)}).encode() + b"\n")
+
+
+def noted(out: Path, address: str) -> str:
+    """Return a store's address as a batch in `out` notes it: beside the batch or in it, so that both can be moved."""
+    near = {str((place / STORE).absolute()): way for place, way in ((out, STORE), (out.parent, f"../{STORE}"))}
+    return near.get(address, address)
+
+
+def found_at(out: Path, address: str) -> str:
+    """Return the address that a batch in `out` has `noted`."""
+    return absolute(address if "://" in address else os.path.normpath(out / address))
+
+
+def store_noted(out: Path) -> str | None:
+    """Return the address of the store that a batch's folder notes, None where it notes none. Raises UnitcadError."""
+    if not (out / ADDRESS).is_file():
+        return None
+    return found_at(out, str(files.read_json(out / ADDRESS)["store"]))
