@@ -21,6 +21,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -266,6 +267,7 @@ def judge(
         "puts_a_variant": round(sum(puts.values()) / last["variants"], 3),
         "puts": Counter(name.partition("/")[0] for name in puts.elements()),
         "parent_bytes_a_variant": round(parent.bytes_passed() / last["variants"]),
+        "parent_bytes_a_variant, aim, at most": 2000,
         "out_bytes_a_variant": round(int(size) / last["variants"]),
     }
 
@@ -309,6 +311,8 @@ def main() -> None:
     if asked.inside is None:
         if os.name != "posix" or os.geteuid() != 0 or not shutil.which("unshare") or not shutil.which("ip"):
             parser.error("needs root on Linux, unshare and ip")
+        if lacking := [name for name in ("distributed", "s3fs", "moto", "flask", "flask_cors") if not find_spec(name)]:
+            parser.error(f"needs {', '.join(lacking)}: pip install -c constraints.txt -e '.[dask,store,test]'")
         with tempfile.TemporaryDirectory(prefix="unitcad-nodes-") as scratch:
             words = [
                 "unshare",

@@ -189,14 +189,14 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     put_off = _PutOff.none(len(pending), known.shape)
     for left in range(_MAX_ROUNDS, -1, -1):
         found = evaluate(problem, pending, kernel, phase)
-        if not np.all(np.isfinite(found.total)):
+        if not np.isfinite(found.total).all():
             raise overflow(bare.bodies[0].omega)
         count += slope.size
         whole, off = np.abs(known + total + found.total), quadrature + found.error
-        wanted = tolerance(float(np.max(whole)) or 1.0)
+        wanted = tolerance(float(whole.max()) or 1.0)
         done += len(pending)
         limit = _PANELS_SHARE * wanted / done
-        good_enough = left == 0 or np.max(off) <= _PANELS_SHARE * wanted
+        good_enough = left == 0 or off.max() <= _PANELS_SHARE * wanted
         cuts = None if good_enough else _cuts(found, put_off, limit, MAX_PANELS - done)
         exhausted = exhausted or (cuts is not None and cuts.short)
         if cuts is None or np.all(cuts.good):
@@ -204,7 +204,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             quadrature += found.error
             size += found.size
             settled.append(found)
-            further = tail.start(tolerance(float(np.max(np.abs(known + total)))))
+            further = tail.start(tolerance(float(np.abs(known + total).max())))
             # Panels that do not suffice for halving may still do for a tail that leaves more.
             spent = done > MAX_PANELS or (exhausted and tail.bound(stop).max() <= (quadrature + skipped).max())
             exhausted = exhausted or bool(further > stop and spent)
@@ -237,7 +237,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     error = quadrature + skipped + rest + 4e-15 * size + rounded
     total = known + total
     cut_short = False
-    if not np.max(error) <= rtol * np.max(np.abs(total)):  # where it is reached, nobody asks
+    if not error.max() <= rtol * np.abs(total).max():  # where it is reached, nobody asks
         gained += sum(float(found.gains.sum()) for found in settled)
         cut_short = gained + float(skipped.max() + rest.max()) - least < _WORTH * float(np.max(error))
     return Integrals(total, error, count, cut_short, exhausted)

@@ -131,12 +131,14 @@ def _on_one_path(
         # Each component is made of at most two rows, and one of them is at least as large as each row.
         problem = Problem(tuple(bodies), tuple(loads), flat, z)
         integrals = _solve(problem, end, rtol / 2.0 if sideways else rtol)
-    if not (np.all(np.isfinite(integrals.total)) and np.all(np.isfinite(integrals.error))):
+    if not (np.isfinite(integrals.total).all() and np.isfinite(integrals.error).all()):
         raise overflow(bodies[0].omega)
-    every = [*loads] * len(bodies)
-    ends = np.cumsum([len(load.orders) for load in every])[:-1]
-    rows, errors = (np.split(part.reshape(-1, *radii.shape), ends) for part in (integrals.total, integrals.error))
-    found = [_of_rows(*one, integrals.wavenumbers) for one in zip(every, rows, errors, strict=True)]
+    found, first = list[Response](), 0
+    for load in [*loads] * len(bodies):
+        rows = slice(first, first + len(load.orders))
+        of_load = (part[rows].reshape(-1, *radii.shape) for part in (integrals.total, integrals.error))
+        found.append(_of_rows(load, *of_load, integrals.wavenumbers))
+        first = rows.stop
     return [found[first : first + len(loads)] for first in range(0, len(found), len(loads))]
 
 
