@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from batching import bytes_of, calls, ring_sweep, rows
+from batching import unitcad as run_unitcad
 from object_store import BUCKET, Faulty, s3_server
 
 import unitcad
@@ -282,6 +283,21 @@ def test_a_cluster_without_a_store_makes_folders_and_no_wish_for_none_is_ignored
     with pytest.raises(UnitcadError, match="estimates alone are one table"):
         make(load_sweep("thickness"), tmp_path / "out", BatchOptions(("estimate",), folders=True), Workers(jobs=0))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_page_needs_no_folders(tmp_path: Path) -> None:
+    """--report used to make them against --no-folders, and was refused for estimates alone, which have none."""
+    sweep = ring_sweep(tmp_path, heights=[2.0, 3.0])
+    made = unitcad.batch(sweep, tmp_path / "stored", only="unit", jobs=0, report=True, folders=False)
+    assert (made.folder / "report.html").is_file()
+    assert not list(made.folder.glob("ring-*"))
+    made = unitcad.batch("thickness", tmp_path / "levels", only="estimate", limit=2, report=True)
+    assert (made.folder / "report.html").is_file()
+    refused = run_unitcad("batch", "thickness", "--only", "estimate", "--folders", "-o", tmp_path / "none")
+    assert (refused.returncode, refused.stderr) == (
+        2,
+        "error: --folders: estimates alone are one table: leave it out\n",
+    )
 
 
 class Elsewhere(SerialExecutor):

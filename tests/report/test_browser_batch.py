@@ -295,13 +295,14 @@ def test_two_thousand_rows_come_in_pages(running: Any, tmp_path: Path) -> None:
     seen.close()
 
 
-def test_a_row_without_a_folder_says_how_to_make_it(running: Any, tmp_path: Path) -> None:
-    page = table_page(tmp_path, ["name"], [["ring-0123456789ab", "ring"], ["", "failed"]], stored_in="many")
+@pytest.mark.parametrize(("folder", "word"), [("many", "many"), ("Ann's rings", "'Ann'\\''s rings'")])
+def test_a_row_without_a_folder_says_how_to_make_it(running: Any, tmp_path: Path, folder: str, word: str) -> None:
+    page = table_page(tmp_path, ["name"], [["ring-0123456789ab", "ring"], ["", "failed"]], stored_in=folder)
     visit = Visit(running, page)
     note = visit.page.locator(".lacking")
     assert note.inner_text() == ""
     visit.page.click(".variants tbody a")
     visit.page.wait_for_function("() => document.querySelector('.lacking').textContent")
-    assert "unitcad cache export 0123456789ab --batch many && unitcad report many" in note.inner_text()
+    assert f"unitcad cache export 0123456789ab --batch {word} && unitcad report {word}" in note.inner_text()
     assert visit.errors == []
     visit.close()

@@ -154,7 +154,7 @@ def batch(
         limit,
         where,
         store=stored,
-        folders=True if report and folders is None else folders,
+        folders=folders_for(report, folders, tuple(texts("only", only))),
         tables=checked_tables(None if tables is None else texts("tables", tables), report),
         shard=None if shard is None else shard_of(shard),
     )
@@ -164,6 +164,11 @@ def batch(
 
         write_report(folder)
     return BatchResult(folder / options.shard.folder if options.shard else folder, summary)
+
+
+def folders_for(report: bool, asked: bool | None, only: Sequence[str] = OUTPUTS) -> bool | None:
+    """Return whether each variant has a folder: a page links to them, unless they are declined or have nothing in."""
+    return True if report and asked is None and tuple(only) != ("estimate",) else asked
 
 
 def checked_tables(names: Sequence[str] | None, report: bool = False) -> tuple[str, ...] | None:

@@ -102,7 +102,7 @@ def batch(
     from msgspec import to_builtins
 
     from unitcad.batch import BatchOptions, load_sweep
-    from unitcad.batch.batch_call import checked_tables, make
+    from unitcad.batch.batch_call import checked_tables, folders_for, make
     from unitcad.batch.cluster import Certificates
     from unitcad.batch.executors import Workers
     from unitcad.batch.preview import preview
@@ -114,7 +114,7 @@ def batch(
     named = listed(table) if table is not None else None
     if sweep == "merge":
         _confirm_merges(ctx)
-        options = BatchOptions(folders=_folders(page, folders), cache=cache, tables=checked_tables(named, page))
+        options = BatchOptions(folders=folders_for(page, folders), cache=cache, tables=checked_tables(named, page))
         _merge(shards or [], out, options, page, as_json)
         return
     if shards:
@@ -122,8 +122,9 @@ def batch(
     chosen = outputs(only)
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
+    part = None if shard is None else shard_of(shard)
     options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, store,
-        _folders(page, folders), checked_tables(named, page), None if shard is None else shard_of(shard))  # fmt: skip
+        folders_for(page, folders, chosen), checked_tables(named, page), part)  # fmt: skip
     if dry_run:
         size = preview(wanted, options)
         print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)
@@ -148,11 +149,6 @@ def batch(
         _print_summary(summary, made)
     if summary.failed or summary.stopped:
         sys.exit(1)
-
-
-def _folders(page: bool, asked: bool | None) -> bool | None:
-    """Return whether each variant has a folder: a page links to them, unless they are declined."""
-    return True if page and asked is None else asked
 
 
 _OF_MERGE = ("sweep", "shards", "out", "folders", "cache", "table", "page", "as_json")

@@ -146,7 +146,8 @@ def _built(
         for spec, result, prints in zip(wanted, results, printing, strict=True):
             _print_faults(result.manifest)
             # Standard output has the folder alone, for a script to take.
-            for line in (*_summary(spec, result), *([prints] if prints else ())):
+            lines = [*_summary(spec, result), *([prints] if prints else [])]
+            for line in sorted(lines, key=lambda line: line.startswith("open ")):  # what to open comes last
                 warn(f"{spec.name}: {line}")
             typer.echo(str(result.folder))
     return all(result.ok for result in results)

@@ -53,7 +53,10 @@ def _unicode(stream: Any) -> bool:
 def say_error(error: UnitcadError, form: Form) -> None:
     """Print an error: a line for each fault on standard error and, but for a person, JSON on standard output."""
     if isinstance(error, WrongArgument):
-        error = Refusal(_ARGUMENTS.get(error.field, f"--{error.field}"), error.value, error.limit, error.nearest)
+        name, value = _ARGUMENTS.get(error.field, f"--{error.field}"), error.value
+        if isinstance(value, bool):  # an option without a value
+            name, value = f"--{'' if value else 'no-'}{error.field}", None
+        error = Refusal(name, value, error.limit, error.nearest)
     if isinstance(error, Refusal):
         every = sorted((error, *error.others), key=lambda one: one.line or sys.maxsize)
         lines = [one.located for one in every]
