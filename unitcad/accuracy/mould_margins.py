@@ -15,7 +15,12 @@ from unitcad.mould_checks import mould_checks
 from unitcad.pipeline.manifest_records import FindingRecord
 from unitcad.pipeline.product import make
 from unitcad.pipeline.stages import Stages
-from unitcad.validation import from_data
+from unitcad.spec import Spec
+from unitcad.validation import from_data, load
+
+REPEATS = 8
+"""How often the set of `encapsulating` is checked; the first time does not count."""
+AIM_S = 0.3
 
 
 @dataclass
@@ -36,13 +41,12 @@ def run(quick: bool, say: Say) -> Result:
     seconds = []
     for seed in count():
         say(f"{len(seconds)} of {wanted}")
-        stages = Stages()
         try:
-            manifest = make(from_data(seeded_spec(seed)), ("unit", "moulds"), True, MemoryStore(), stages).manifest
+            took, laws = _seconds(from_data(seeded_spec(seed)))
         except Refusal:
             continue
-        seconds.append(stages.seconds["mould checks"])
-        for finding in manifest["laws"]:
+        seconds.append(took)
+        for finding in laws:
             margin = margins.setdefault(finding["code"], _Margin())
             margin.findings += 1
             margin.broken += not finding["ok"]
@@ -50,6 +54,8 @@ def run(quick: bool, say: Say) -> Result:
                 margin.share, margin.worst, margin.seed = share, finding, seed
         if len(seconds) == wanted:
             break
+    say("encapsulating")
+    shipped = [_seconds(load("encapsulating"))[0] for _ in range(REPEATS)][1:]
     ordered = sorted(margins.items())
     rows = tuple(
         (code, mould_checks()[code].demands, margin.findings, margin.broken, *_worst(margin.worst), margin.seed)
@@ -65,12 +71,23 @@ def run(quick: bool, say: Say) -> Result:
         ),
         tables=(
             Table("Worst value of each check", columns, rows),
-            Table("Time to check a set, warm", ("sets", "time"), ((wanted, str(timing(seconds))),)),
+            Table(
+                "Time to check a set, warm",
+                ("sets", "time", "aim, less than"),
+                ((wanted, str(timing(seconds)), None), ("encapsulating", str(timing(shipped)), f"{1000 * AIM_S:g} ms")),
+            ),
         ),
         promises=tuple(Promise(f"{code}: findings broken", margin.broken, 0) for code, margin in ordered),
         measured={**machine("manifold3d"), "specs": wanted},
         summary=Summary(worst=closest(rows)),
     )
+
+
+def _seconds(spec: Spec) -> tuple[float, list[FindingRecord]]:
+    """Return the seconds that the mould checks of a spec take, and what they found. Raises Refusal."""
+    stages = Stages()
+    manifest = make(spec, ("unit", "moulds"), True, MemoryStore(), stages).manifest
+    return stages.seconds["mould checks"], manifest["laws"]
 
 
 def closest(rows: Sequence[tuple]) -> str:
