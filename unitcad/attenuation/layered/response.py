@@ -136,8 +136,8 @@ def _on_one_path(
     found, first = list[Response](), 0
     for load in [*loads] * len(bodies):
         rows = slice(first, first + len(load.orders))
-        of_load = (part[rows].reshape(-1, *radii.shape) for part in (integrals.total, integrals.error))
-        found.append(_of_rows(load, *of_load, integrals.wavenumbers))
+        total, error = (part[rows].reshape(-1, *radii.shape) for part in (integrals.total, integrals.error))
+        found.append(_of_rows(load, total, error, integrals.wavenumbers))
         first = rows.stop
     return [found[first : first + len(loads)] for first in range(0, len(found), len(loads))]
 
