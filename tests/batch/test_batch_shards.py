@@ -171,6 +171,7 @@ def test_shards_have_one_store(tmp_path: Path) -> None:
     """Of two stores a merge made a batch that no variant could be exported from."""
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
     made(sweep, out, shard=Shard(1, 2), store=str(tmp_path / "a"))
+    assert made(sweep, out, shard=Shard(1, 2)).resumed == 2
     with pytest.raises(UnitcadError, match=r"shard-1-of-2 has its results in the store .*/a, so this shard"):
         made(sweep, out, shard=Shard(2, 2), store=str(tmp_path / "b"))
     assert made(sweep, out, shard=Shard(2, 2)).ok == 2  # in the first one's

@@ -93,7 +93,7 @@ def shard_folders(out: Path) -> list[Path]:
 
 
 def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | None) -> str:
-    """Return the address of the store of all shards in `out`: the one `asked` for, that of the others, or their own.
+    """Return the address of the store of all shards in `out`: the one `asked` for, the shard's or the others', or new.
 
     What a merge would refuse is refused before anything is made: raises UnitcadError where `out` holds another batch
     than this one of so many variants, shards of another number, finished or not, or shards with another store.
@@ -101,7 +101,9 @@ def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | No
     held = batch_in(out)
     if held not in (None, batch):
         raise UnitcadError(f"{out}: holds another batch, so shards can not be merged there; choose another with -o")
-    kept = None
+    kept, own = None, out / shard.folder
+    if asked is None and (begun := _record(own)) is not None:
+        asked = found_at(own, begun.store)
     for other in shard_folders(out):
         of = int(other.name.rpartition("-")[2])
         if of != shard.of:
@@ -109,7 +111,7 @@ def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | No
                 f"{out}: holds shards of {of} ({other.name}), with which one of {shard.of} can't be merged; go on with "
                 f"--shard K/{of}, or choose another folder with -o"
             )
-        if other.name == shard.folder or (record := _record(other)) is None:
+        if other == own or (record := _record(other)) is None:
             continue
         if (record.head.batch, record.variants) != (batch, variants):
             raise UnitcadError(
