@@ -16,10 +16,10 @@ from unitcad.pipeline.manifest_records import FindingRecord
 from unitcad.pipeline.product import make
 from unitcad.pipeline.stages import Stages
 from unitcad.spec import Spec
-from unitcad.validation import from_data, load
+from unitcad.validation import default_template, from_data, load
 
 REPEATS = 8
-"""How often the set of `encapsulating` is checked; the first time does not count."""
+"""How often the set of the default template is checked; the first time does not count."""
 AIM_S = 0.3
 
 
@@ -54,8 +54,9 @@ def run(quick: bool, say: Say) -> Result:
                 margin.share, margin.worst, margin.seed = share, finding, seed
         if len(seconds) == wanted:
             break
-    say("encapsulating")
-    shipped = [_seconds(load("encapsulating"))[0] for _ in range(REPEATS)][1:]
+    shipped = load(default_template())
+    say(shipped.name)
+    of_shipped = [_seconds(shipped)[0] for _ in range(REPEATS)][1:]
     ordered = sorted(margins.items())
     rows = tuple(
         (code, mould_checks()[code].demands, margin.findings, margin.broken, *_worst(margin.worst), margin.seed)
@@ -74,7 +75,7 @@ def run(quick: bool, say: Say) -> Result:
             Table(
                 "Time to check a set, warm",
                 ("sets", "time", "aim, less than"),
-                ((wanted, str(timing(seconds)), None), ("encapsulating", str(timing(shipped)), f"{1000 * AIM_S:g} ms")),
+                ((wanted, str(timing(seconds)), None), (shipped.name, str(timing(of_shipped)), f"{1000 * AIM_S:g} ms")),
             ),
         ),
         promises=tuple(Promise(f"{code}: findings broken", margin.broken, 0) for code, margin in ordered),
