@@ -146,15 +146,16 @@ def batch(
     folder = Path("out") / wanted.slug if out is None else Path(path("out", out))
     where = None if cache is None else Path(path("cache", cache))
     stored = None if store is None else os.fspath(store)
+    chosen_outputs = tuple(texts("only", only))
     options = BatchOptions(
-        tuple(texts("only", only)),
+        chosen_outputs,
         check,
         keep_going,
         timeout,
         limit,
         where,
         store=stored,
-        folders=folders_for(report, folders, tuple(texts("only", only))),
+        folders=folders_for(report, folders, chosen_outputs),
         tables=checked_tables(None if tables is None else texts("tables", tables), report),
         shard=None if shard is None else shard_of(shard),
     )

@@ -27,6 +27,8 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline.versions import code_version
 
 JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
+SHARDS = "shard-*-of-*"
+"""Folders of shards below that of their batch."""
 NOT_THERE = -1
 FORMAT = 2
 """Version of the lines. A journal of version 1, which had no checksums, is replaced."""
@@ -253,7 +255,7 @@ def _check_free(out: Path, head: BatchHead, beside: Collection[str]) -> None:
     """Refuse a folder that is not empty and has no journal, unless its table says that it is this batch's."""
     if all(path.name == LOCK or path.name in beside for path in out.iterdir()):
         return
-    if any(out.glob("shard-*-of-*")):
+    if any(out.glob(SHARDS)):
         raise UnitcadError(f"{out}: holds shards, which unitcad batch merge joins; else choose another folder with -o")
     if not (out / LOCK).exists():
         raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")

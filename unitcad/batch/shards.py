@@ -15,7 +15,7 @@ import msgspec
 
 from unitcad import files
 from unitcad.batch.batch_records import BatchHead
-from unitcad.batch.journal import batch_in
+from unitcad.batch.journal import SHARDS, batch_in
 from unitcad.batch.store_address import found_at
 from unitcad.batch.sweep import Sweep
 from unitcad.cache import absolute
@@ -89,7 +89,7 @@ def write_shard(folder: Path, record: ShardRecord) -> None:
 
 def shard_folders(out: Path) -> list[Path]:
     """List the shards' folders below a batch's folder."""
-    return sorted(path for path in out.glob("shard-*-of-*") if _FOLDER.fullmatch(path.name) and path.is_dir())
+    return sorted(path for path in out.glob(SHARDS) if _FOLDER.fullmatch(path.name) and path.is_dir())
 
 
 def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | None) -> str:

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import os
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -43,11 +42,11 @@ def read_parquet(path: Path) -> dict[str, Any]:
     Raises NotThere, Missing without the extra, UnitcadError for what is no such table.
     """
     content = files.read(path, largest=files.LARGEST_TABLE, links=False)
-    if find_spec("pyarrow") is None:
-        raise Missing(f"{path}: needs an extra: pip install 'unitcad[parquet]'")
-    import pyarrow as pa
-    from pyarrow import parquet
-
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        raise Missing(f"{path}: needs an extra: pip install 'unitcad[parquet]'") from None
     try:
         table = parquet.read_table(pa.BufferReader(content))
         return {**json.loads((table.schema.metadata or {})[HEAD]), "variants": table.to_pylist()}

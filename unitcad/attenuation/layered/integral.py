@@ -84,8 +84,8 @@ class Problem:
     def kernel(self, k: w.Array) -> w.Array:
         """Return k C(k), less the static one, a row an order of each load; the loads' transform is not in it."""
         chunks = [k[first : first + _MOST_SAMPLES] for first in range(0, k.size, _MOST_SAMPLES)]
-        rows = [_joined([self._compliance(body, chunk) for chunk in chunks], axis=1) for body in self.bodies]
-        kernel = k * _joined(rows, axis=0)
+        rows = [np.concatenate([self._compliance(body, chunk) for chunk in chunks], axis=1) for body in self.bodies]
+        kernel = k * np.concatenate(rows)
         return self.less_static(kernel) if self.bodies[0].reference else kernel
 
     def less_static(self, kernel: w.Array) -> w.Array:
@@ -112,7 +112,7 @@ class Problem:
         directions = tuple(load.direction for load in self.loads)
         none = np.zeros(len(self.orders))
         kernels = [static_kernels(body.reference, directions) if body.reference else none for body in self.bodies]
-        return _joined(kernels, axis=0)
+        return np.concatenate(kernels)
 
     def static_part(self) -> tuple[np.ndarray, np.ndarray]:
         """Return what was taken out, shape (rows, n), and a bound of its rounding."""
@@ -125,7 +125,7 @@ class Problem:
             known.append(kernel[:, None] * load.static(self.r))
             rounded.append(float(np.max(np.abs(kernel))) * load.static_rounding(self.r))
             first += len(load.orders)
-        return _joined(known, axis=0), _joined(rounded, axis=0)
+        return np.concatenate(known), np.concatenate(rounded)
 
 
 @dataclass(frozen=True)
@@ -141,11 +141,6 @@ class Integrals:
     wavenumbers: int
     cut_short: bool
     exhausted: bool
-
-
-def _joined(arrays: list[w.Array], axis: int) -> w.Array:
-    """Concatenate arrays; one alone is returned as it is."""
-    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays, axis=axis)
 
 
 def overflow(omega: float) -> UnitcadError:

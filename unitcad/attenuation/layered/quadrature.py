@@ -61,6 +61,10 @@ class Each(NamedTuple):
     covered: np.ndarray
     swing: np.ndarray
 
+    def errors(self, rest: np.ndarray) -> np.ndarray:
+        """Return bounds of the errors; rest (rows, panels): what the kernel's series leaves out."""
+        return rest.T[..., None] * self.covered + self.swing
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
@@ -90,7 +94,7 @@ class Evaluated:
     @cached_property
     def errors(self) -> np.ndarray:
         """A bound of the error of each panel's part."""
-        return self.rest.T[..., None] * self.each.covered + self.each.swing
+        return self.each.errors(self.rest)
 
     @cached_property
     def gains(self) -> np.ndarray:
@@ -142,7 +146,7 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
     if np.any(cut.off_axis) or values.size * seen.r.size > _CHUNK:
         each = _in_chunks(seen, cut, values)
         total, sizes = each.parts.sum(axis=0), each.sizes.sum(axis=0)
-        error = (rest.T[..., None] * each.covered + each.swing).sum(axis=0)
+        error = each.errors(rest).sum(axis=0)
 
         def by_panel() -> Each:
             return each

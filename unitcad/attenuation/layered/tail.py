@@ -89,7 +89,7 @@ def measure_tail(
         return Tail(k[:within], bounds, (None,), min(float(bounds[..., 0].max()), largest))
     # As on a half-space of the compliance at the wavenumber of the load's size: a film is not what the disc rests on.
     at = min(int(np.searchsorted(k, 1.0 / max(loads[0].reach, float(r.min())))), k.size - 1)
-    static = loads[0].static(r) if len(loads) == 1 else np.concatenate([load.static(r) for load in loads])
+    static = np.concatenate([load.static(r) for load in loads])
     scale = min(float(np.max(np.abs(static).T * np.abs(raw[:, at]))), largest)
     directions = tuple(load.direction for load in loads)
 

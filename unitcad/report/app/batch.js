@@ -47,11 +47,11 @@
     return svg && el("img", { className: "thumbnail", src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`, alt: "", loading: "lazy" });
   };
 
-  // {sections, chips, plot, ask}: `plot` draws once the sections are on a page; `ask(folder)` is for a variant that is not on it. why(folder, column) says why a level is missing,
-  // variant(folder) gives a record.
   // A word of a command, as a POSIX shell reads it.
   const quoted = (word) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 
+  // {sections, chips, plot, ask}: `plot` draws once the sections are on a page; `ask(folder)` is for a variant that is not on it. why(folder, column) says why a level is missing,
+  // variant(folder) gives a record.
   function batchOf(data, why, variant) {
     const { batch } = data;
     const table = U.readable(data.table, data.estimate);
