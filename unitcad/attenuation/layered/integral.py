@@ -18,7 +18,16 @@ from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.detours import Poles, around
 from unitcad.attenuation.layered.kept import kept
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, from_origin, halved_towards, onwards, pieced
+from unitcad.attenuation.layered.path import (
+    MAX_PANELS,
+    NODES,
+    PHASE,
+    first_nodes,
+    from_origin,
+    halved_towards,
+    onwards,
+    pieced,
+)
 from unitcad.attenuation.layered.quadrature import Evaluated, evaluate, panel_poles
 from unitcad.attenuation.layered.stack import Stack
 from unitcad.attenuation.layered.statics import static_kernels
@@ -84,8 +93,8 @@ class Problem:
     def kernel(self, k: w.Array) -> w.Array:
         """Return k C(k), less the static one, a row an order of each load; the loads' transform is not in it."""
         chunks = [k[first : first + _MOST_SAMPLES] for first in range(0, k.size, _MOST_SAMPLES)]
-        rows = [np.concatenate([self._compliance(body, chunk) for chunk in chunks], axis=1) for body in self.bodies]
-        kernel = k * np.concatenate(rows)
+        rows = [np.concatenate([self._compliance(body, some) for body in self.bodies]) for some in chunks]
+        kernel = k * np.concatenate(rows, axis=1)
         return self.less_static(kernel) if self.bodies[0].reference else kernel
 
     def less_static(self, kernel: w.Array) -> w.Array:
@@ -110,22 +119,15 @@ class Problem:
     def taken_out(self) -> w.Array:
         """The static kernel that was taken out, shape (rows,)."""
         directions = tuple(load.direction for load in self.loads)
-        none = np.zeros(len(self.orders))
-        kernels = [static_kernels(body.reference, directions) if body.reference else none for body in self.bodies]
-        return np.concatenate(kernels)
-
-    def static_part(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return what was taken out, shape (rows, n), and a bound of its rounding."""
         if not self.bodies[0].reference:
-            none = np.zeros((len(self.taken_out), self.r.size))
-            return none.astype(np.complex128), none
-        known, rounded, first = [], [], 0
-        for load in self.loads * len(self.bodies):
-            kernel = self.taken_out[first : first + len(load.orders)]
-            known.append(kernel[:, None] * load.static(self.r))
-            rounded.append(float(np.max(np.abs(kernel))) * load.static_rounding(self.r))
-            first += len(load.orders)
-        return np.concatenate(known), np.concatenate(rounded)
+            return np.zeros(len(self.orders) * len(self.bodies))
+        return np.concatenate([static_kernels(body.reference, directions) for body in self.bodies if body.reference])
+
+    def static_part(self, static: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what was taken out, shape (rows, n), and a bound of its rounding; both of a body's loads are given."""
+        kernel = self.taken_out.reshape(len(self.bodies), -1, 1)
+        rounded = np.abs(kernel).max(axis=1, keepdims=True) * rounding
+        return (kernel * static).reshape(-1, self.r.size), rounded.reshape(-1, self.r.size)
 
 
 @dataclass(frozen=True)
@@ -153,17 +155,17 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     |u|: of a row.
     """
     load, r, z = bare.load, bare.r, bare.z
-    each = [body.medium.materials(body.omega) for body in bare.bodies]
-    materials = tuple(material for some in each for material in some)
+    each = tuple(body.medium.materials(body.omega) for body in bare.bodies)
     span = float(r.max()) + load.reach + 2.0 * z
     far = PHASE / span * MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
-    opening = _opening(load, r, z, end, rtol, span, materials)
+    thinnest = min((layer.thickness for body in bare.bodies for layer in body.medium.layers), default=np.inf)
+    opening = _opening(bare.loads, r, z, end, rtol, span, each, thinnest, far)
     beyond, pending, slope, stop = opening.beyond, opening.panels, opening.slope, float(opening.stop[0])
     raw = bare.kernel(opening.k)
     by_body = raw[:, : beyond.size].reshape(len(each), -1, beyond.size)
     tail = joined(
         [
-            measure_tail(beyond, rows, some, bare.loads, r, z, far, rtol, largest)
+            measure_tail(beyond, rows, some, bare.loads, r, opening.static if z == 0.0 else None, far, rtol, largest)
             for rows, some in zip(by_body, each, strict=True)
         ]
     )
@@ -172,16 +174,17 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     def tolerance(size: float) -> float:
         return max(rtol * min(size, largest), 0.3 * least)  # what the tail leaves anyway is worth no halving
 
-    bodies = (replace(body, reference=one) for body, one in zip(bare.bodies, tail.references, strict=True))
-    problem = replace(bare, bodies=tuple(bodies))
+    referred = zip(bare.bodies, tail.references, strict=True)
+    bodies = tuple(Body(body.medium, body.omega, reference) for body, reference in referred)
+    problem = Problem(bodies, bare.loads, r, z)
     kernel = problem.less_static(raw[:, beyond.size :]).reshape(-1, *slope.shape) * slope
     phase = PHASE * min(1.0, (rtol / _PHASE_RTOL) ** (1 / 32))
-    known, rounded = problem.static_part()
+    known, rounded = problem.static_part(opening.static, opening.rounding)
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
     skipped = np.zeros(known.shape)  # by the detours
     count, done, exhausted, gained = beyond.size, 0, False, 0.0
     settled: list[Evaluated] = []
-    put_off = _PutOff.none(len(pending), known.shape)
+    put_off: _PutOff | None = None
     for left in range(_MAX_ROUNDS, -1, -1):
         found = evaluate(problem, pending, kernel, phase)
         if not np.isfinite(found.total).all():
@@ -192,9 +195,10 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         done += len(pending)
         limit = _PANELS_SHARE * wanted / done
         good_enough = left == 0 or off.max() <= _PANELS_SHARE * wanted
-        cuts = None if good_enough else _cuts(found, put_off, limit, MAX_PANELS - done)
+        put_off = None if good_enough else put_off or _PutOff.none(len(pending), known.shape)
+        cuts = _cuts(found, put_off, limit, MAX_PANELS - done) if put_off else None
         exhausted = exhausted or (cuts is not None and cuts.short)
-        if cuts is None or np.all(cuts.good):
+        if put_off is None or cuts is None or np.all(cuts.good):
             total = total + found.total
             quadrature += found.error
             size += found.size
@@ -205,14 +209,13 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             exhausted = exhausted or bool(further > stop and spent)
             if further <= stop or spent or left == 0:
                 break
-            pending = onwards(stop, further, span)
-            put_off = _PutOff.none(len(pending), known.shape)
+            pending, put_off = onwards(stop, further, span), None
             stop = further
         else:
             bad, good, due = cuts.bad, cuts.good, cuts.due
             total = total + found.each.parts[good].sum(0)
             quadrature += found.errors[good].sum(0)
-            size += found.each.sizes[good].sum(0)
+            size += found.sizes[good].sum(0)
             gained += float(found.gains[good].sum())
             sure = tolerance(float(np.max(whole - off - skipped)))  # beside a pole |u| is at first far too large
             left_out = _DETOURS_SHARE * sure - float(skipped.max())
@@ -226,7 +229,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             of = np.where(later, np.cumsum(later) - 1, -1)[halves][origin]
             pending = np.concatenate([cut, turned])
             put_off = _PutOff(np.append(of, np.full(len(turned), -1)), pieces[later], found.hidden[later])
-        k, slope = nodes(pending)
+        k, slope = nodes(pending, NODES)
         kernel = problem.kernel(k.ravel()).reshape(-1, *k.shape) * slope
     rest = tail.bound(stop)
     error = quadrature + skipped + rest + 4e-15 * size + rounded
@@ -242,7 +245,8 @@ class _Opening(NamedTuple):
     """What a path begins with: where its tail is sampled, its first panels, and where they end.
 
     beyond (n,), the wavenumbers (1/m) of the tail's samples; panels; k, these wavenumbers and those of the panels'
-    nodes; slope (panels, nodes); stop, of shape (1,).
+    nodes; slope (panels, nodes); stop, of shape (1,); static, rounding (rows, radii), the loads' static integrals and
+    bounds of their rounding over a body's kernel, 0 below the surface.
     """
 
     beyond: np.ndarray
@@ -250,17 +254,32 @@ class _Opening(NamedTuple):
     k: w.Array
     slope: w.Array
     stop: np.ndarray
+    static: np.ndarray
+    rounding: np.ndarray
 
 
 @kept
 def _opening(
-    load: Load, r: np.ndarray, z: float, end: float, rtol: float, span: float, materials: tuple[w.Material, ...]
+    loads: tuple[Load, ...],
+    r: np.ndarray,
+    z: float,
+    end: float,
+    rtol: float,
+    span: float,
+    bodies: tuple[tuple[w.Material, ...], ...],
+    thinnest: float,
+    far: float,
 ) -> _Opening:
-    beyond = grid(load, r, z, end)
+    beyond = grid(loads[0], r, z, end, thinnest, far, rtol)
     stop = _first_stop(beyond, end, rtol, PHASE / span)
-    panels = from_origin(end, stop, span, materials)
-    k, slope = nodes(panels)
-    return _Opening(beyond, panels, np.concatenate([beyond, k.ravel()]), slope, np.array([stop]))
+    panels = from_origin(end, stop, span, tuple(material for body in bodies for material in body))
+    k, slope = nodes(panels, max(first_nodes(rtol, end, span, body[:-1], body[-1]) for body in bodies))
+    if z > 0.0:
+        static = rounding = np.zeros((sum(len(load.orders) for load in loads), r.size))
+    else:
+        static = np.concatenate([load.static(r) for load in loads])
+        rounding = np.concatenate([load.static_rounding(r) for load in loads])
+    return _Opening(beyond, panels, np.concatenate([beyond, k.ravel()]), slope, np.array([stop]), static, rounding)
 
 
 def _first_stop(beyond: np.ndarray, end: float, rtol: float, longest: float) -> float:
@@ -377,5 +396,5 @@ def _detours(
 
 def _sampled(problem: Problem, panels: w.Array) -> w.Array:
     """Return the kernel with dk/ds at each panel's nodes, shape (rows, panels, nodes)."""
-    k, slope = nodes(panels)
+    k, slope = nodes(panels, NODES)
     return problem.kernel(k.ravel()).reshape(-1, *k.shape) * slope

@@ -23,19 +23,21 @@ def kept(make: Callable[..., Made]) -> Callable[..., Made]:
     @wraps(make)
     def found(*arguments: Any) -> Made:
         key = tuple(
-            (one.tobytes(), one.shape, one.dtype.char) if isinstance(one, np.ndarray) else one for one in arguments
+            [(one.tobytes(), one.shape, one.dtype.char) if isinstance(one, np.ndarray) else one for one in arguments]
         )
         result = results.pop(key, None)
-        if result is None:
-            result = make(*arguments)
-            for array in result:
-                array.flags.writeable = False
-            arrays = (*result, *(one for one in arguments if isinstance(one, np.ndarray)))
-            if sum(array.nbytes for array in arrays) > _MOST_BYTES:
-                return result
-        results[key] = result  # the last one now
-        for oldest in list(results)[:-_RESULTS]:
-            results.pop(oldest, None)
+        if result is not None:
+            results[key] = result  # the last one now
+            return result
+        result = make(*arguments)
+        own = [one for one in result if isinstance(one, np.ndarray)]
+        for array in own:
+            array.flags.writeable = False
+        arrays = (*own, *(one for one in arguments if isinstance(one, np.ndarray)))
+        if sum(array.nbytes for array in arrays) <= _MOST_BYTES:
+            results[key] = result
+            for oldest in list(results)[:-_RESULTS]:
+                results.pop(oldest, None)
         return result
 
     return found

@@ -6,6 +6,8 @@ base + turn s^2, in which the kernel has no root any more.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from unitcad.attenuation.layered import waves as w
@@ -23,6 +25,18 @@ Panels there are as long as a third of the path to the last pole: of 200 random 
 for it at rtol 1e-3, and two at 1e-6.
 """
 _MAX_HALVINGS = 40
+NODES = 16
+"""Of a panel, but for the first ones of a damped medium."""
+_FEWER = ((0.05, 8), (5e-3, 10))
+"""From which rtol on so many do for those."""
+_DAMPED = 0.1
+"""Loss factor from which on a layer's poles are seen from afar."""
+_STIFF = 100.0
+"""Over the stiffest layer: a half-space whose poles lie next to 0, where panels are short."""
+_ALIKE = 12.0
+"""The last pole over the least wavenumber of a layer: up to that, no panel is longer than what is to be seen on it."""
+_NEAR = 4.0 * PHASE
+"""Up to the last pole: farther out, waves turn so much over a panel that few nodes save no time."""
 _CLOSE = 4
 """Halvings between the first panel and those beyond the least wavenumber's pole, each a panel."""
 
@@ -33,6 +47,20 @@ def wavenumbers(panels: w.Array, s: w.Array) -> tuple[w.Array, w.Array]:
     if not np.any(turn):
         return s, np.ones_like(s)
     return np.where(turn == 0, s, base + turn * s * s), np.where(turn == 0, 1.0, 2.0 * turn * s)
+
+
+def first_nodes(rtol: float, end: float, span: float, layers: Sequence[w.Material], half_space: w.Material) -> int:
+    """Return how many nodes each panel has at first; end, span: the last pole (1/m), phase per unit wavenumber (m).
+
+    Where all layers are damped, and their waves not too different, the kernel is smooth over each panel, and few nodes
+    show it to a loose rtol.
+    """
+    stiffest = max((abs(m.shear) for m in layers), default=np.inf)
+    bodies = layers if abs(half_space.shear) > _STIFF * stiffest else (*layers, half_space)
+    damped = all(m.shear.imag >= _DAMPED * m.shear.real for m in bodies)
+    if not damped or end * span > _NEAR or end > _ALIKE * min(abs(m.ks2) ** 0.5 for m in bodies):
+        return NODES
+    return next((count for least, count in _FEWER if rtol >= least), NODES)
 
 
 def from_origin(end: float, stop: float, span: float, materials: tuple[w.Material, ...]) -> w.Array:

@@ -1,15 +1,15 @@
 """Gauss and Legendre over the panels of a Hankel integral, with a bound of the error of each.
 
-A panel's kernel is known at 16 nodes. Where the Bessel functions swing faster than they can be seen there, the panel is
-cut into pieces, and the kernel's Legendre series is read off at the nodes of each: the kernel, which costs most, is
-sampled as it varies, not as the waves do.
+A panel's kernel is known at a few nodes. Where the Bessel functions swing faster than they can be seen there, the panel
+is cut into pieces, and the kernel's Legendre series is read off at the nodes of each: the kernel, which costs most, is
+sampled as it varies, not as the waves do. What the waves of all pieces come to at a panel's node is its weight.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -17,7 +17,8 @@ import numpy as np
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, poles
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.weights import COUNT, NODES, TO_LEGENDRE, Pieces, Weights, closeness, pieces, weights
+from unitcad.attenuation.layered.path import NODES
+from unitcad.attenuation.layered.weights import Turns, Weights, closeness, rule, turns, weights
 
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
@@ -25,6 +26,8 @@ _CANCELLED = 4e-15
 """Of what was taken out of the kernel: what rounding leaves of the last coefficients of the difference."""
 _SINGLE = 1e-7
 """Uncertainty of a pole below which a panel has no other, or one that is next to nothing beside it."""
+_LESS = 0.75
+"""Times their share of the phase: of fewer nodes, which see less of the waves."""
 _CHUNK = 200_000  # integrand values held at once
 
 
@@ -51,30 +54,32 @@ class Seen(Protocol):
 
 
 class Each(NamedTuple):
-    """Of each panel, row and radius: the integral, its absolute size, that of the waves alone, the rule's error.
+    """Of each panel, row and radius: the integral, that of the waves' absolute size, the rule's error.
 
     Shape (panels, rows, radii).
     """
 
     parts: w.Array
-    sizes: np.ndarray
     covered: np.ndarray
     swing: np.ndarray
 
     def errors(self, rest: np.ndarray) -> np.ndarray:
         """Return bounds of the errors; rest (rows, panels): what the kernel's series leaves out."""
-        return rest.T[..., None] * self.covered + self.swing
+        return self.times(rest) + self.swing
+
+    def times(self, kernel: np.ndarray) -> np.ndarray:
+        """Return what a kernel of that size comes to on each panel; kernel (rows, panels)."""
+        return kernel.T[..., None] * self.covered
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
     """Integrals over panels, of all together and, when asked, of each.
 
-    total, error, size (rows, radii): the integral over all panels, a bound of its error, its absolute size; kernel
-    (with dk/ds): what was integrated; closeness: the wavenumber over half of what a panel covers of it; rest (rows,
-    panels): of the kernel, a bound of what its Legendre series leaves out; rounding: what of it may be rounding's;
-    known: what was taken out of each row. What is of each panel is worked out when asked: where no panel is bad,
-    nobody does.
+    total, error, size (rows, radii): the integral over all panels, a bound of its error, what it would be if nothing
+    cancelled; kernel (with dk/ds): what was integrated; closeness: the wavenumber over half of what a panel covers of
+    it; peak, rest (rows, panels): the kernel's largest value, a bound of what its Legendre series leaves out; known:
+    what was taken out of each row. What is of each panel is worked out when asked: where no panel is bad, nobody does.
     """
 
     total: w.Array
@@ -82,8 +87,8 @@ class Evaluated:
     size: np.ndarray
     kernel: w.Array
     closeness: np.ndarray
+    peak: np.ndarray
     rest: np.ndarray
-    rounding: np.ndarray
     known: np.ndarray
     by_panel: Callable[[], Each]
 
@@ -97,20 +102,27 @@ class Evaluated:
         return self.each.errors(self.rest)
 
     @cached_property
+    def sizes(self) -> np.ndarray:
+        """What each panel's part would be if nothing cancelled."""
+        return self.each.times(self.peak)
+
+    @cached_property
     def gains(self) -> np.ndarray:
         """By how much halving a panel lessens the largest part of its error, shape (panels,)."""
-        halved = 2.0 * (2.0 * self.rounding.T + _CANCELLED * np.abs(self.known))[..., None] * self.each.covered
+        halved = 2.0 * self.each.times(
+            2.0 * _rounding(self.peak, self.closeness) + _CANCELLED * np.abs(self.known)[:, None]
+        )
         return np.maximum(self.errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0)
 
     @cached_property
     def poles(self) -> Poles:
         """The pole of each panel."""
-        return poles(self.kernel, NODES, TO_LEGENDRE, self.closeness)
+        return _poles(self.kernel, self.closeness)
 
     @cached_property
     def hidden(self) -> np.ndarray:
         """What a detour around each panel's pole may leave out, shape (panels, rows, radii)."""
-        return HIDDEN * self.poles.rest.T[..., None] * self.each.covered
+        return HIDDEN * self.each.times(self.poles.rest)
 
     @property
     def blurred(self) -> np.ndarray:
@@ -120,7 +132,12 @@ class Evaluated:
 
 def panel_poles(panels: w.Array, kernel: w.Array) -> Poles:
     """Return the pole that each panel's kernel (with dk/ds), shape (rows, panels, nodes), would have."""
-    return poles(kernel, NODES, TO_LEGENDRE, closeness(panels))
+    return _poles(kernel, closeness(panels))
+
+
+def _poles(kernel: w.Array, close: np.ndarray) -> Poles:
+    gauss = rule(kernel.shape[-1])
+    return poles(kernel, gauss.nodes, gauss.to_legendre, close)
 
 
 def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Evaluated:
@@ -128,7 +145,8 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
 
     The rows are those of the first body, of the second one, and so on.
 
-    phase: the most that the fastest Bessel product may turn over a piece of a panel.
+    phase: the most that the fastest Bessel product may turn over a piece of a panel of 16 nodes; over one of fewer as
+    much less.
 
     The kernel is its Legendre series to degree n - 1 and a rest. The rest is at most twice the last two coefficients
     that were seen, as soon as they halve within n degrees or so (to count on the rate at which they seem to fall was
@@ -137,112 +155,81 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
     all that is left of the last coefficients: halving doubles it. Where the kernel is little beside what it is less by,
     their difference's rounding is left, and stays.
     """
-    cut = pieces(seen.load, seen.r, panels, phase)
-    rounding = ROUNDING * cut.closeness * np.abs(kernel).max(axis=-1)
-    series = np.abs(kernel @ TO_LEGENDRE.T)
-    rest = 2.0 * np.maximum(2.0 * series[..., -2:].sum(axis=-1), rounding)
-    whole = len(cut.of) == len(panels)
-    values = kernel if whole else _at_pieces(cut, kernel)
-    if np.any(cut.off_axis) or values.size * seen.r.size > _CHUNK:
-        each = _in_chunks(seen, cut, values)
-        total, sizes = each.parts.sum(axis=0), each.sizes.sum(axis=0)
-        error = each.errors(rest).sum(axis=0)
+    count = kernel.shape[-1]
+    lie = turns(seen.load, seen.r, panels, phase if count == NODES else phase * _LESS * count / NODES)
+    peak = np.abs(kernel).max(axis=-1)
+    series = np.abs(kernel @ rule(count).to_legendre.T)
+    rest = 2.0 * np.maximum(2.0 * series[..., -2:].sum(axis=-1), _rounding(peak, lie.closeness))
+    if not lie.level or len(kernel) * lie.total * count * seen.r.size > _CHUNK:
+        each = _in_chunks(seen, panels, lie, kernel, series)
+        total, error, size = (one.sum(axis=0) for one in (each.parts, each.errors(rest), each.times(peak)))
 
         def by_panel() -> Each:
             return each
     else:
-        met = weights(seen.load, seen.orders, seen.r, cut.panels)
-        series = series if whole else np.abs(values @ TO_LEGENDRE.T)
-        total, error, sizes = _together(met, values, series, rest if whole else rest[:, cut.of])
+        met = weights(seen.load, seen.orders, seen.r, panels, lie.pieces, count)
+        total, error, size = _together(met, kernel, series, np.array([rest, peak]))
 
         def by_panel() -> Each:
-            return _integrated(met, values, cut.count)
+            return _integrated(met, kernel, series)
 
-    return Evaluated(total, error, sizes, kernel, cut.closeness, rest, rounding, seen.taken_out, by_panel)
-
-
-def _at_pieces(cut: Pieces, kernel: w.Array) -> w.Array:
-    """Return the kernel at the nodes of the pieces, shape (rows, pieces, nodes)."""
-    values, count = kernel[:, cut.of], cut.count[cut.of]
-    for number in np.unique(cut.count[cut.count > 1]):
-        re, im = np.moveaxis(_pair(kernel[:, cut.count == number]) @ _spread(int(number)), -2, 0)  # as `products` does
-        values[:, count == number] = (re + 1j * im).reshape(len(kernel), -1, COUNT)
-    return values
+    return Evaluated(total, error, size, kernel, lie.closeness, peak, rest, seen.taken_out, by_panel)
 
 
-@lru_cache(maxsize=64)
-def _spread(count: int) -> np.ndarray:
-    """Return the matrix from values at a panel's nodes to those at the nodes of its equal pieces."""
-    middles = (2.0 * np.arange(count) + 1.0) / count - 1.0
-    at = (middles[:, None] + NODES / count).ravel()
-    return (np.polynomial.legendre.legvander(at, COUNT - 1) @ TO_LEGENDRE).T
+def _rounding(peak: np.ndarray, close: np.ndarray) -> np.ndarray:
+    """Return what of the kernel may be the rounding of its wavenumbers, shape (rows, panels)."""
+    return ROUNDING * close * peak
 
 
 def _together(
-    met: Weights, kernel: w.Array, series: np.ndarray, rest: np.ndarray
+    met: Weights, kernel: w.Array, series: np.ndarray, rest_and_peak: np.ndarray
 ) -> tuple[w.Array, np.ndarray, np.ndarray]:
-    """Return the integral over all pieces, a bound of its error and its absolute size, shape (rows, radii).
+    """Return the integral over all panels, a bound of its error and its size if nothing cancelled, (rows, radii).
 
-    series (rows, pieces, degrees): the kernel's coefficients, absolute; rest (rows, pieces): what they leave out.
+    series (rows, panels, degrees): the kernel's coefficients, absolute; rest_and_peak (2, rows, panels): what they
+    leave out, and the kernel's largest value.
     """
     orders, *_, radii = met.values.shape
-    flat = kernel.reshape(-1, orders, kernel[0].size)
-    total = products(flat, met.values.reshape(orders, -1, radii))
-    size = np.abs(flat)[..., None, :] @ met.sizes.reshape(orders, -1, radii)
-    by_body = series.reshape(-1, orders, *series.shape[1:])
-    swing = (by_body * met.swing).sum(axis=-1)[..., None, :]
-    error = swing @ met.most + rest.reshape(swing.shape) @ met.covered
+    total = products(kernel.reshape(-1, orders, kernel[0].size), met.values.reshape(orders, -1, radii))
+    swing = (series.reshape(-1, orders, *series.shape[1:]) * met.swing).sum(axis=-1)
+    left_out, size = rest_and_peak.reshape(2, *swing.shape)[..., None, :] @ met.covered
+    error = swing[..., None, :] @ met.most + left_out
     return total.reshape(-1, radii), error.reshape(-1, radii), size.reshape(-1, radii)
 
 
-def _integrated(met: Weights, kernel: w.Array, count: np.ndarray) -> Each:
-    """Return the integrals over each panel of `count` (panels,) pieces, all on the axis or all off it."""
-    by_body = kernel.reshape(-1, *met.values.shape[:3])
-    sizes = (np.abs(by_body)[..., None, :] @ met.sizes)[..., 0, :]
-    quantities = (
-        products(by_body, met.values),
-        sizes,
-        np.broadcast_to(met.covered, sizes.shape),
-        (np.abs(by_body @ TO_LEGENDRE.T) * met.swing).sum(axis=-1)[..., None] * met.most,
-    )
-    found = Each(*(one.reshape(*kernel.shape[:2], -1).swapaxes(0, 1) for one in quantities))
-    first = np.cumsum(count) - count
-    return found if len(count) == kernel.shape[1] else Each(*(np.add.reduceat(one, first) for one in found))
+def _integrated(met: Weights, kernel: w.Array, series: np.ndarray) -> Each:
+    """Return the integrals over each panel, all on the axis or all off it; series: coefficients, absolute."""
+    by_body, coefficients = (one.reshape(-1, *met.values.shape[:3]) for one in (kernel, series))
+    swing = (coefficients * met.swing).sum(axis=-1)[..., None] * met.most
+    quantities = (products(by_body, met.values), np.broadcast_to(met.covered, swing.shape), swing)
+    return Each(*(one.reshape(*kernel.shape[:2], -1).swapaxes(0, 1) for one in quantities))
 
 
-def _in_chunks(seen: Seen, cut: Pieces, kernel: w.Array) -> Each:
+def _in_chunks(seen: Seen, panels: w.Array, lie: Turns, kernel: w.Array, series: np.ndarray) -> Each:
     """Return the integrals over each panel, some of them at once that are all on the axis or all off it."""
-    shape = (len(cut.count), len(kernel), seen.r.size)
-    sums = Each(np.empty(shape, dtype=np.complex128), *np.empty((3, *shape)))
-    step = max(1, _CHUNK // (COUNT * seen.r.size * len(kernel)))
-    for which in (np.flatnonzero(~cut.off_axis), np.flatnonzero(cut.off_axis)):
-        ends = np.cumsum(cut.count[which])
-        for chunk in np.split(which, np.flatnonzero(np.diff(ends // step)) + 1):
-            if chunk.size:
-                at = np.isin(cut.of, chunk)
-                met = weights(seen.load, seen.orders, seen.r, cut.panels[at])
-                found = _integrated(met, kernel[:, at], cut.count[chunk])
-                for whole, part in zip(sums, found, strict=True):
-                    whole[chunk] = part
+    count = kernel.shape[-1]
+    shape = (len(panels), len(kernel), seen.r.size)
+    sums = Each(np.empty(shape, dtype=np.complex128), *np.empty((2, *shape)))
+    step = max(1, _CHUNK // (count * seen.r.size * len(kernel)))
+    for which in (np.flatnonzero(~lie.off_axis), np.flatnonzero(lie.off_axis)):
+        ends = np.cumsum(lie.pieces[which])
+        for at in np.split(which, np.flatnonzero(np.diff(ends // step)) + 1):
+            if at.size:
+                met = weights(seen.load, seen.orders, seen.r, panels[at], lie.pieces[at], count)
+                for whole, part in zip(sums, _integrated(met, kernel[:, at], series[:, at]), strict=True):
+                    whole[at] = part
     return sums
 
 
 def products(kernel: w.Array, waves: w.Array) -> w.Array:
     """Sum kernel (.., rows, panels, nodes) times waves (rows, panels, nodes, radii); (.., rows, panels, radii).
 
-    By products of real matrices with two rows. A complex row by a matrix is a matrix by a vector to BLAS, which starts
-    its threads for each of them from 256 radii on.
+    By products of real matrices with two columns. A matrix by a complex vector starts BLAS's threads for each of them
+    from 256 radii on.
     """
+    turned = waves.swapaxes(-1, -2)
+    pair = np.ascontiguousarray(kernel)[..., None].view(np.float64)
     if np.iscomplexobj(waves):
-        (re, im), (re_of_i, im_of_i) = (np.moveaxis(_pair(kernel) @ part, -2, 0) for part in (waves.real, waves.imag))
-        re, im = re - im_of_i, im + re_of_i
-    else:
-        re, im = np.moveaxis(_pair(kernel) @ waves, -2, 0)
-    return re + 1j * im
-
-
-def _pair(values: w.Array) -> np.ndarray:
-    """Return the real and the imaginary part, one more axis before the last."""
-    pair = np.empty((*values.shape[:-1], 2, values.shape[-1]))
-    pair[..., 0, :], pair[..., 1, :] = values.real, values.imag
-    return pair
+        by_re, by_im = (np.ascontiguousarray(part) @ pair for part in (turned.real, turned.imag))
+        return (by_re.view(np.complex128) + 1j * by_im.view(np.complex128))[..., 0]
+    return (turned @ pair).view(np.complex128)[..., 0]

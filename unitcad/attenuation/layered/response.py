@@ -124,7 +124,7 @@ def _on_one_path(
 ) -> list[list[Response]]:
     """Return the displacement of each body under each load, rtol being over the largest of all."""
     flat = radii.ravel()
-    end = max(_last_pole(body.medium, body.medium.materials(body.omega), body.omega) for body in bodies)
+    end = max(body.medium.last_pole(body.omega) for body in bodies)
     _check_size(end, float(flat.max()) + loads[0].reach + 2.0 * z, max(body.omega for body in bodies))
     sideways = any(load.direction == "tangential" for load in loads)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what is no number is refused below
@@ -163,12 +163,12 @@ def _radii(r: Any) -> w.Array:
         raise Refusal("r", str(r), "must be radii: a number or an array of numbers") from None
     if radii.size == 0:
         raise Refusal("r", None, "needs a radius")
-    wrong = radii[~(np.isfinite(radii) & (radii >= 0))]
-    if wrong.size:
-        raise Refusal("r", float(wrong[0]), "radii must be finite and not negative", 0.0)
-    wrong = radii[(radii != 0) & ~((radii >= LEAST) & (radii <= MOST))]
-    if wrong.size:
-        raise out_of_range("r", float(wrong[0]))
+    good = ((radii >= LEAST) & (radii <= MOST)) | (radii == 0)
+    if not good.all():
+        wrong = float(radii[~good][0])
+        if not (np.isfinite(wrong) and wrong >= 0):
+            raise Refusal("r", wrong, "radii must be finite and not negative", 0.0)
+        raise out_of_range("r", wrong)
     return radii
 
 
@@ -178,28 +178,27 @@ def _solve(bare: Problem, end: float, rtol: float) -> Integrals:
     What was integrated first may have been accepted beside a largest |u| that the rest then took away: again, beside
     the one that came out. Where the panels do not suffice for rtol, a larger one may spend them better.
     """
-    best, size, count = None, np.inf, 0
+    best, size = None, np.inf
     for _ in range(_MOST_ATTEMPTS):
         integrals = integrate(bare, end, rtol, size)
-        count += integrals.wavenumbers
         best = _better(best, integrals) if best else integrals
-        before, size = size, float(np.max(np.abs(best.total))) or 1.0
-        reached = float(np.max(best.error)) / size
-        if reached <= rtol or integrals.cut_short or count + integrals.wavenumbers > _MOST_WAVENUMBERS:
+        before, size = size, float(np.abs(best.total).max()) or 1.0
+        reached = float(best.error.max()) / size
+        if reached <= rtol or integrals.cut_short or best.wavenumbers + integrals.wavenumbers > _MOST_WAVENUMBERS:
             break
         if integrals.exhausted:
             rtol = float(np.sqrt(rtol * min(reached, 0.1)))
         elif before <= 2.0 * size:
             break
     assert best is not None
-    return replace(best, wavenumbers=count)
+    return best
 
 
 def _better(one: Integrals, other: Integrals) -> Integrals:
-    """Return each row at each radius from the one that has the lower bound there."""
+    """Return each row at each radius from the one that has the lower bound there, and the wavenumbers of both."""
     lower = other.error < one.error
     total, error = np.where(lower, other.total, one.total), np.minimum(other.error, one.error)
-    return replace(other, total=total, error=error)
+    return replace(other, total=total, error=error, wavenumbers=one.wavenumbers + other.wavenumbers)
 
 
 def _check_size(end: float, span: float, omega: float) -> None:
@@ -208,20 +207,3 @@ def _check_size(end: float, span: float, omega: float) -> None:
     if panels > _MOST_PANELS:
         limit = f"its waves are too short for {span:g} m: {panels:.2g} panels, the most is {_MOST_PANELS}"
         raise Refusal("omega", omega, limit, float(f"{0.9 * omega * _MOST_PANELS / panels:.2g}"))
-
-
-def _last_pole(medium: Stack, materials: tuple[w.Material, ...], omega: float) -> float:
-    """Return a wavenumber (1/m) above every pole and branch point: slow surface waves, bending of layers as plates.
-
-    The softest layer bends with what it lies on, not as a plate.
-    """
-    shear = max(abs(m.ks2) ** 0.5 for m in materials)
-    softest = min(abs(m.shear) for m in materials)
-    mass = sum(layer.thickness * layer.density for layer in medium.layers)
-    bending = [
-        (6.0 * mass * omega**2 / ((1.0 + layer.poisson_ratio) * abs(material.shear) * layer.thickness**3)) ** 0.25
-        for layer, material in zip(medium.layers, materials, strict=False)
-        if abs(material.shear) > softest
-    ]
-    floor = min(max(bending, default=0.0), 20.0 * shear)
-    return 1.5 * max(1.5 * shear, floor)

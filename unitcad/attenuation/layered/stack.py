@@ -90,6 +90,7 @@ class Stack:
         self.half_space = half_space
         self.least_loss = least_loss
         self._last: tuple[float, tuple[w.Material, ...]] | None = None
+        self._pole: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
         count, thickness = len(self.layers), sum(layer.thickness for layer in self.layers)
@@ -126,13 +127,22 @@ class Stack:
 
     def materials(self, omega: float) -> tuple[w.Material, ...]:
         """Return the layers' and the half-space's complex moduli at omega. Raises `Refusal` for a static free body."""
-        omega = finite("omega", omega)
-        if self.half_space.youngs_modulus == 0.0 and omega == 0.0:
-            raise Refusal("omega", omega, "nothing holds this body: static loads would carry it away")
         if self._last is None or self._last[0] != omega:
+            omega = finite("omega", omega)
+            if self.half_space.youngs_modulus == 0.0 and omega == 0.0:
+                raise Refusal("omega", omega, "nothing holds this body: static loads would carry it away")
             bodies = (*self.layers, self.half_space)
             self._last = omega, tuple(_material(body, omega, self.least_loss) for body in bodies)
         return self._last[1]
+
+    def last_pole(self, omega: float) -> float:
+        """Return a wavenumber (1/m) above every pole and branch point: slow surface waves, bending of layers as plates.
+
+        The softest layer bends with what it lies on, not as a plate. Raises as `materials`.
+        """
+        if self._pole is None or self._pole[0] != omega:
+            self._pole = omega, _last_pole(self.layers, self.materials(omega), omega)
+        return self._pole[1]
 
     def planes(self, k: w.Array, omega: float, depth: float = 0.0) -> list[Plane]:
         """Return the stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).
@@ -150,17 +160,19 @@ class Stack:
         planes = self.planes(k, omega, depth)
         top = planes[0]
         c = w.adjugate(top.t)[:, ways] / w.determinant(top.t)
-        u = w.product(top.u, c)
+        if depth == 0.0:
+            return w.product(top.u, c)
+        states = w.product(top.states, c)
         materials = self.materials(omega)
         pieces = _cut([layer.thickness for layer in self.layers], depth)
         for (plane, below), (kind, _, _) in zip(pairwise(planes), pieces, strict=True):
             if plane.bottom is None:
                 break
-            u, t = w.product(plane.bottom[0], c), w.product(plane.bottom[1], c)
+            states = w.product(plane.bottom, c)
             material = materials[kind]
             stiffness = abs(material.shear) * np.maximum(np.abs(k), abs(material.ks2) ** 0.5)
-            c = parameter(below, u, t, stiffness)
-        return u
+            c = parameter(below, states[:2], states[2:], stiffness)
+        return states[:2]
 
     def shear_transfer(self, k: w.Array, omega: float, depth: float) -> w.Array:
         """Return u_theta at `depth` per surface traction of horizontally polarised shear (m/Pa), shape (n,)."""
@@ -170,6 +182,19 @@ class Stack:
             for kind, h, above in _cut([layer.thickness for layer in self.layers], depth)
         ]
         return shear_horizontal.compliance(base, pieces, k)
+
+
+def _last_pole(layers: tuple[Layer, ...], materials: tuple[w.Material, ...], omega: float) -> float:
+    shear = max(abs(m.ks2) ** 0.5 for m in materials)
+    softest = min(abs(m.shear) for m in materials)
+    mass = sum(layer.thickness * layer.density for layer in layers)
+    bending = [
+        (6.0 * mass * omega**2 / ((1.0 + layer.poisson_ratio) * abs(material.shear) * layer.thickness**3)) ** 0.25
+        for layer, material in zip(layers, materials, strict=False)
+        if abs(material.shear) > softest
+    ]
+    floor = min(max(bending, default=0.0), 20.0 * shear)
+    return 1.5 * max(1.5 * shear, floor)
 
 
 def _material(body: Layer | HalfSpace, omega: float, least_loss: float) -> w.Material:

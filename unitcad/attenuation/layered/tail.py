@@ -16,6 +16,10 @@ from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.statics import static_kernels
 
 _PER_DECADE = 8
+_LOOSE = 1e-4
+"""rtol from which on a tail stops early, so that half as many wavenumbers show what is far out."""
+_FAR = 30.0
+"""Over the first wavenumber, and over the thinnest layer's thickness: beyond both a kernel falls off as a power."""
 _MARGIN = 1.5
 _SOON = 10.0
 """Over the first wavenumber: where a tail may stop by the top layer's half-space, no other one is tried."""
@@ -45,16 +49,26 @@ class Tail:
 
     def bound(self, stop: float) -> np.ndarray:
         """Return the bounds from a `stop` (1/m) on, not before the first of `k`; shape (rows, radii)."""
-        return self.bounds[..., np.searchsorted(self.k, stop, side="right") - 1]
+        return self.bounds[..., self.k.searchsorted(stop, side="right") - 1]
 
 
-def grid(load: Load, r: np.ndarray, z: float, end: float) -> np.ndarray:
-    """Return the wavenumbers (1/m), from beyond the last pole on, at which the kernel is sampled to bound its tail."""
+def grid(
+    load: Load, r: np.ndarray, z: float, end: float, thinnest: float, affordable: float, rtol: float
+) -> np.ndarray:
+    """Return the wavenumbers (1/m), from beyond the last pole on, at which the kernel is sampled to bound its tail.
+
+    thinnest: thickness of a layer (m); affordable: the last wavenumber to which a path may go, which is one of them.
+    """
     lengths = [x for x in (load.reach, z, float(r.max())) if x > 0]
     first = max(1.4 * end, 1e-3 / max(lengths))
     last = max(1e5 * first, 1e5 / min(lengths))
-    decades = np.log10(last / first)
-    return first * 10.0 ** np.linspace(0.0, decades, int(_PER_DECADE * decades) + 2)
+    far = min(max(_FAR * first, _FAR / thinnest), 0.1 * last)
+    near_decades, far_decades = np.log10([far / first, last / far])
+    near = np.linspace(0.0, near_decades, int(_PER_DECADE * near_decades) + 2)
+    per_decade = _PER_DECADE / 2 if rtol >= _LOOSE else _PER_DECADE
+    beyond = near_decades + np.linspace(0.0, far_decades, int(np.ceil(per_decade * far_decades)) + 1)
+    k = first * 10.0 ** np.concatenate([near, beyond[1:]])
+    return np.union1d(k, affordable) if k[0] < affordable < k[-3] else k
 
 
 def joined(tails: Sequence[Tail]) -> Tail:
@@ -72,25 +86,25 @@ def measure_tail(
     materials: tuple[w.Material, ...],
     loads: Sequence[Load],
     r: np.ndarray,
-    z: float,
+    static: np.ndarray | None,
     far: float,
     rtol: float,
     largest: float = np.inf,
 ) -> Tail:
     """Bound a body's tail by the kernel on its `grid` k; choose the static half-space that leaves the least.
 
-    raw (rows, wavenumbers): the kernel, nothing taken out; far: the last wavenumber (1/m) that can be afforded;
-    largest: displacement, if known. Two bounds, the lower one counts: the envelope of the Bessel functions, and, where
-    the kernel falls off, integration by parts against their oscillation.
+    raw (rows, wavenumbers): the kernel, nothing taken out; static: the loads' integrals, shape (rows, radii), None
+    below the surface; far: the last wavenumber (1/m) that can be afforded; largest: displacement, if known. Two bounds,
+    the lower one counts: the envelope of the Bessel functions, and, where the kernel falls off, integration by parts
+    against their oscillation.
     """
-    within = max(1, int(np.searchsorted(k, far)))
-    if z > 0:
+    within = max(1, int(k.searchsorted(far, side="right")))
+    if static is None:
         bounds = _bounds(k, raw, loads, r)[..., :within]
         return Tail(k[:within], bounds, (None,), min(float(bounds[..., 0].max()), largest))
     # As on a half-space of the compliance at the wavenumber of the load's size: a film is not what the disc rests on.
-    at = min(int(np.searchsorted(k, 1.0 / max(loads[0].reach, float(r.min())))), k.size - 1)
-    static = np.concatenate([load.static(r) for load in loads])
-    scale = min(float(np.max(np.abs(static).T * np.abs(raw[:, at]))), largest)
+    at = min(int(k.searchsorted(1.0 / max(loads[0].reach, float(r.min())))), k.size - 1)
+    scale = min(float((np.abs(static).max(axis=1) * np.abs(raw[:, at])).max()), largest)
     directions = tuple(load.direction for load in loads)
 
     def less(material: w.Material) -> w.Array:
@@ -99,9 +113,11 @@ def measure_tail(
     def tail(material: w.Material) -> Tail:
         return Tail(k[:within], _bounds(k, less(material), loads, r)[..., :within], (material,), scale)
 
-    choice = [material for material in dict.fromkeys(reversed(materials)) if material.shear != 0]
     top = tail(materials[0])
-    if len(choice) == 1 or top.start(rtol * scale) <= _SOON * k[0]:
+    if top.start(rtol * scale) <= _SOON * k[0]:
+        return top
+    choice = [material for material in dict.fromkeys(reversed(materials)) if material.shear != 0]
+    if len(choice) == 1:
         return top
     few = np.array([r.min(), r[np.argmin(np.abs(r - loads[0].reach))], r.max()])
     bounds = _bounds(k, np.array([less(material) for material in choice]), loads, few)
@@ -157,7 +173,7 @@ def _bounds(k: np.ndarray, kernels: w.Array, loads: Sequence[Load], r: np.ndarra
     variation[..., :-1] += _summed_from_right(np.abs(kernels[..., 1:] - kernels[..., :-1]))
     size = size[..., None, :]
     by_envelope = _summed_from_right(size * waves.weighted) - size * waves.before
-    by_envelope += _beyond(k, size[..., -8::7] * waves.envelope[..., -8::7])
+    by_envelope += _beyond(k, size[..., -3::2] * waves.envelope[..., -3::2])
     return np.minimum(by_envelope, variation[..., None, :] * waves.by_parts)
 
 
@@ -166,7 +182,7 @@ def _summed_from_right(f: np.ndarray) -> np.ndarray:
 
 
 def _beyond(k: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Integrate what goes on as k^-1.5, or as fast as it fell from the last wavenumber but seven to the last one."""
+    """Integrate what goes on as k^-1.5, or as fast as it fell from the last wavenumber but two to the last one."""
     least = np.maximum(ends, 1e-300)
-    power = np.log(least[..., :1] / least[..., 1:]) / np.log(k[-1] / k[-8])
+    power = np.log(least[..., :1] / least[..., 1:]) / np.log(k[-1] / k[-3])
     return ends[..., 1:] * (k[-1] / np.maximum(power - 1.0, 1e-3))

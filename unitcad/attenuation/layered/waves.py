@@ -30,17 +30,20 @@ class Material:
 
 @dataclass(frozen=True)
 class Waves:
-    """The waves of a material at wavenumbers k: vertical rates g_p, g_s (1/m), displacement and traction blocks."""
+    """The waves of a material that go down, at wavenumbers k: vertical rates g_p, g_s (1/m), states (4, 2, n)."""
 
     gp: Array
     gs: Array
-    displacement: Array
-    traction: Array
+    down: Array
+
+
+UPWARDS = np.array([1.0, -1.0, -1.0, 1.0])[:, None, None]
+"""Times the states of a wave that goes down: those of the one that goes up."""
 
 
 def product(a: Array, b: Array) -> Array:
-    """Return the matrix product of two (2, 2, n) blocks (or of a block and an (2, m, n) one)."""
-    return a[:, 0, None] * b[None, 0] + a[:, 1, None] * b[None, 1]
+    """Return the matrix products of (.., l, 2, n) blocks and (.., 2, m, n) ones."""
+    return a[..., 0, None, :] * b[..., None, 0, :, :] + a[..., 1, None, :] * b[..., None, 1, :, :]
 
 
 def determinant(a: Array) -> Array:
@@ -51,11 +54,6 @@ def determinant(a: Array) -> Array:
 def adjugate(a: Array) -> Array:
     """Return the adjugate of a (2, 2, n) block: its inverse times its determinant."""
     return np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]])
-
-
-def mirrored(a: Array) -> Array:
-    """Return J a with J = diag(1, -1): the block of the waves that go up."""
-    return np.array([a[0], -a[1]])
 
 
 def decaying_root(squared: Array) -> Array:
@@ -79,11 +77,12 @@ def waves(material: Material, k: Array, gp: Array, gs: Array) -> Waves:
     """Return the waves P and Q of `material` at complex wavenumbers k, shape (n,), in 1/m, with their `rates`."""
     eps, ks2, mu = material.eps, material.ks2, material.shear
     below_p, below_s = 1.0 / (gp + k), 1.0 / (gs + k)
-    displacement = np.array([[k, -below_s], [gp, eps * below_p]])
-    traction = mu * np.array(
-        [[2.0 * k * gp, 2.0 * eps * k * below_p - 1.0], [2.0 * k * k - ks2, -ks2 * below_s * below_s]]
-    )
-    return Waves(gp, gs, displacement, traction)
+    down = np.empty((4, 2, k.size), dtype=np.complex128)
+    down[0, 0], down[0, 1] = k, -below_s
+    down[1, 0], down[1, 1] = gp, eps * below_p
+    down[2, 0], down[2, 1] = 2.0 * mu * k * gp, mu * (2.0 * eps * k * below_p - 1.0)
+    down[3, 0], down[3, 1] = mu * (2.0 * k * k - ks2), -mu * ks2 * below_s * below_s
+    return Waves(gp, gs, down)
 
 
 def decay(material: Material, solved: Waves, h: float) -> Array:

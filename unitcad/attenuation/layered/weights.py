@@ -5,6 +5,7 @@ Nothing of it is the medium's: it is kept for the next medium, frequency or tole
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,46 +17,62 @@ from unitcad.attenuation.layered.kept import kept
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import wavenumbers
 
-NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
-COUNT = NODES.size
-TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(NODES, COUNT - 1))
-_DEGREES = np.arange(2 * COUNT, COUNT, -1)
-_ODD_FACTORIALS = np.array([float(factorial2(2 * m - 1)) for m in _DEGREES])
+
+class Rule(NamedTuple):
+    """Gauss's rule of n nodes from -1 to 1.
+
+    to_legendre (n, n): from values at the nodes to coefficients of degrees 0 to n - 1; degrees (n,): of the waves, the
+    least that meets an error of the rule beside each coefficient; odd_factorials: (2m - 1)!! of these.
+    """
+
+    nodes: np.ndarray
+    weights: np.ndarray
+    to_legendre: np.ndarray
+    degrees: np.ndarray
+    odd_factorials: np.ndarray
 
 
-class Pieces(NamedTuple):
-    """How panels are cut where the waves turn faster over them than may be.
+@cache
+def rule(count: int) -> Rule:
+    """Return the rule of `count` nodes."""
+    at, weighing = np.polynomial.legendre.leggauss(count)
+    to_legendre = np.linalg.inv(np.polynomial.legendre.legvander(at, count - 1))
+    degrees = np.arange(2 * count, count, -1)
+    return Rule(at, weighing, to_legendre, degrees, np.array([float(factorial2(2 * m - 1)) for m in degrees]))
 
-    Of each panel, shape (panels,): closeness, its wavenumber over half of what it covers; off_axis, whether it leaves
-    the real axis; count, its pieces. Of each piece: of (pieces,), its panel; panels (pieces, 4), the piece itself.
+
+class Turns(NamedTuple):
+    """How panels lie to the waves, shape (panels,).
+
+    closeness: the wavenumber over half of what a panel covers of it; off_axis: whether it leaves the real axis; pieces:
+    into how many it has to be cut, that the waves turn little enough over each; level: whether none leaves the axis;
+    total: pieces of all.
     """
 
     closeness: np.ndarray
     off_axis: np.ndarray
-    count: np.ndarray
-    of: np.ndarray
-    panels: w.Array
+    pieces: np.ndarray
+    level: bool
+    total: int
 
 
 class Weights(NamedTuple):
     """What the kernel at each node is multiplied by, a row an order, shape (orders, panels, nodes, radii).
 
-    sizes: their absolute values; covered (orders, panels, radii): the sums of these; swing (panels, degrees) and most
-    (orders, panels, radii): a bound of the rule's error is the sum of the kernel's coefficients times `swing`, times
-    `most`.
+    covered (orders, panels, radii): the integral of the absolute waves; swing (panels, degrees) and most (orders,
+    panels, radii): a bound of the rule's error is the sum of the kernel's coefficients times `swing`, times `most`.
     """
 
     values: w.Array
-    sizes: np.ndarray
     covered: np.ndarray
     swing: np.ndarray
     most: np.ndarray
 
 
-def nodes(panels: w.Array) -> tuple[w.Array, w.Array]:
-    """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, nodes)."""
+def nodes(panels: w.Array, count: int) -> tuple[w.Array, w.Array]:
+    """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, count)."""
     half = (panels[:, 1] - panels[:, 0]) / 2.0
-    return wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * NODES)
+    return wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * rule(count).nodes)
 
 
 def closeness(panels: w.Array) -> np.ndarray:
@@ -69,23 +86,61 @@ def _span(load: Load, r: np.ndarray) -> float:
 
 
 @kept
-def pieces(load: Load, r: np.ndarray, panels: w.Array, phase: float) -> Pieces:
-    """Cut panels into equal pieces over which the waves at radii r (m), shape (n,), turn by no more than `phase`."""
+def turns(load: Load, r: np.ndarray, panels: w.Array, phase: float) -> Turns:
+    """Return how panels lie to the waves at radii r (m), shape (n,), which may turn by `phase` over a piece."""
     slope = wavenumbers(panels, panels[:, :2])[1]
     turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(load, r)
-    count = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
-    of = np.repeat(np.arange(len(panels)), count)
-    cut = panels[of]
-    place = np.arange(len(of)) - (np.cumsum(count) - count)[of]
-    for side in (0, 1):
-        share = (place + side) / count[of]
-        cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
-    return Pieces(closeness(panels), np.any(panels[:, :2].imag, axis=1), count, of, cut)
+    pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
+    off_axis = np.any(panels[:, :2].imag, axis=1)
+    return Turns(closeness(panels), off_axis, pieces, not off_axis.any(), int(pieces.sum()))
 
 
 @kept
-def weights(load: Load, orders: tuple[int, ...], r: np.ndarray, panels: w.Array) -> Weights:
-    """Return the weights of panels that are all on the axis, or all off it.
+def weights(
+    load: Load, orders: tuple[int, ...], r: np.ndarray, panels: w.Array, pieces: np.ndarray, count: int
+) -> Weights:
+    """Return the weights of panels of `count` nodes, all on the axis or all off it, each cut into so many `pieces`.
+
+    At the nodes of a piece the kernel is what its panel's Legendre series says.
+    """
+    of = np.repeat(np.arange(len(panels)), pieces)
+    place = np.arange(len(of)) - (np.cumsum(pieces) - pieces)[of]
+    cut = panels[of]
+    for side in (0, 1):
+        share = (place + side) / pieces[of]
+        cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
+    found = _of_pieces(load, orders, r, cut, count)
+    if len(of) == len(panels):
+        return found
+    first = np.cumsum(pieces) - pieces
+    values = np.empty((len(orders), len(panels), count, r.size), dtype=found.values.dtype)
+    swing = np.empty((len(panels), count))
+    for number in np.unique(pieces):
+        at, here = pieces == number, pieces[of] == number
+        spread, restricted = _spread(int(number), count)
+        values[:, at] = spread @ found.values[:, here].reshape(len(orders), -1, number * count, r.size)
+        by_piece = found.swing[here].reshape(-1, number, 1, count)
+        swing[at] = (by_piece @ restricted).max(axis=1)[:, 0]
+    covered, most = (np.add.reduceat(one, first, axis=1) for one in (found.covered, found.most))
+    return Weights(values, covered, swing, most)
+
+
+@cache
+def _spread(number: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return what leads from a panel of `count` nodes to its equal pieces.
+
+    The matrix from the nodes' values (one more row) to those at the nodes of the pieces, and of each piece one that
+    bounds the coefficients of the kernel there by those of the panel, shape (pieces, count, count).
+    """
+    middles = (2.0 * np.arange(number) + 1.0) / number - 1.0
+    at = (middles[:, None] + rule(count).nodes / number).ravel()
+    degrees = np.polynomial.legendre.legvander(at, count - 1)
+    to_legendre = rule(count).to_legendre
+    return (degrees @ to_legendre).T, np.abs(to_legendre @ degrees.reshape(number, count, count))
+
+
+def _of_pieces(load: Load, orders: tuple[int, ...], r: np.ndarray, panels: w.Array, count: int) -> Weights:
+    """Return the weights of panels over which the waves turn little.
 
     The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `load.weight`: their coefficient of degree m is
     at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
@@ -94,19 +149,19 @@ def weights(load: Load, orders: tuple[int, ...], r: np.ndarray, panels: w.Array)
     """
     span = _span(load, r)
     half = (panels[:, 1] - panels[:, 0]) / 2.0
-    k = nodes(panels)[0]
+    gauss = rule(count)
+    k = nodes(panels, count)[0]
     if not np.any(panels[:, :2].imag):
         k, half = k.real, half.real  # Bessel functions of real numbers are cheaper
-    scale = load.transform(k) * (half[:, None] * _WEIGHTS)
+    scale = load.transform(k) * (half[:, None] * gauss.weights)
     values = bessels(orders, k[..., None] * r) * scale[..., None]
-    sizes = np.abs(values)
     ends, slope = wavenumbers(panels, panels[:, :2])
     half = np.abs(half)
     phi = half * np.abs(slope).max(axis=1) * span
-    swing = phi[:, None] ** _DEGREES / _ODD_FACTORIALS
+    swing = phi[:, None] ** gauss.degrees / gauss.odd_factorials
     swing = swing * (3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span))[:, None]
     least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
     at = np.maximum(least, covers) / 2.0
     envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None]
     most = np.minimum(envelope * bessel_bounds(orders, at[:, None] * r), load.weight)
-    return Weights(values, sizes, sizes.sum(axis=-2), swing, most)
+    return Weights(values, np.abs(values).sum(axis=-2), swing, most)
