@@ -54,20 +54,21 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
     if regions:
         groove = CrossSection.batch_boolean(regions, OpType.Add)
         tiles = _tiles(moulds, groove, farthest, (bottom - farthest, top))
-        hollow = Manifold() if tiles else _above(bottom - farthest, pieces)
+        deep = [piece for piece in pieces if piece.bounding_box()[2] < top]
 
         def wall(i: int) -> float:
             """Return the distance from the groove in a tile to the nearest other hollow, mm, `farthest` at most."""
-            near, there, beside = groove, groove, hollow
+            near, there, beside = groove, groove, deep
             if tiles:
                 there = groove ^ _circle(tiles[i], farthest)
                 near = there ^ _circle(tiles[i], -farthest)
-                beside = Manifold.compose([cropped(piece, tiles[i]) for piece in reaching(pieces, tiles[i])])
-            around = Manifold.extrude(near.offset(farthest, JoinType.Round), top - bottom + farthest)
+                beside = [cropped(piece, tiles[i]) for piece in reaching(deep, tiles[i])]
             inside = Manifold.extrude(there.offset(GRID, JoinType.Miter), step.rim - bottom + 2 * GRID)
-            others = beside ^ (around.translate((0, 0, bottom - farthest)) - inside.translate((0, 0, bottom - GRID)))
-            if others.volume() <= SLIVER:
+            others = Manifold.compose(beside) - inside.translate((0, 0, bottom - GRID))
+            whole = [part for part in shells(others) if part.volume() > SLIVER]
+            if not whole:
                 return farthest
+            others = Manifold.compose(whole).trim_by_plane((0, 0, -1), -top)
             return float(Manifold.extrude(near, top - bottom).translate((0, 0, bottom)).min_gap(others, farthest))
 
         piece = moulds.plan.tool(moulds.plan.walled(step))
