@@ -18,7 +18,7 @@ from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, poles
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import NODES
-from unitcad.attenuation.layered.weights import Turns, Weights, closeness, rule, turns, weights
+from unitcad.attenuation.layered.weights import Turns, Weights, closeness, rule, spread, turns, weights
 
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
@@ -167,11 +167,11 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
         def by_panel() -> Each:
             return each
     else:
-        met = weights(seen.load, seen.orders, seen.r, panels, lie.pieces, count)
+        met = weights(seen.load, seen.orders, seen.r, panels, lie.pieces, count, True)
         total, error, size = _together(met, kernel, series, np.array([rest, peak]))
 
         def by_panel() -> Each:
-            return _integrated(met, kernel, series)
+            return _integrated(met, kernel, series, np.ones_like(lie.pieces))
 
     return Evaluated(total, error, size, kernel, lie.closeness, peak, rest, seen.taken_out, by_panel)
 
@@ -197,12 +197,31 @@ def _together(
     return total.reshape(-1, radii), error.reshape(-1, radii), size.reshape(-1, radii)
 
 
-def _integrated(met: Weights, kernel: w.Array, series: np.ndarray) -> Each:
-    """Return the integrals over each panel, all on the axis or all off it; series: coefficients, absolute."""
-    by_body, coefficients = (one.reshape(-1, *met.values.shape[:3]) for one in (kernel, series))
+def _integrated(met: Weights, kernel: w.Array, series: np.ndarray, pieces: np.ndarray) -> Each:
+    """Return the integrals over each panel, all on the axis or all off it.
+
+    series: coefficients, absolute; pieces (panels,): how many weights of its own each panel has at a node.
+    """
+    orders = len(met.values)
+    coefficients = series.reshape(-1, orders, *series.shape[1:])
     swing = (coefficients * met.swing).sum(axis=-1)[..., None] * met.most
-    quantities = (products(by_body, met.values), np.broadcast_to(met.covered, swing.shape), swing)
+    parts = products(_at_pieces(kernel, pieces).reshape(-1, *met.values.shape[:3]), met.values)
+    if parts.shape[2] != len(pieces):
+        parts = np.add.reduceat(parts, np.cumsum(pieces) - pieces, axis=2)
+    quantities = (parts, np.broadcast_to(met.covered, swing.shape), swing)
     return Each(*(one.reshape(*kernel.shape[:2], -1).swapaxes(0, 1) for one in quantities))
+
+
+def _at_pieces(kernel: w.Array, pieces: np.ndarray) -> w.Array:
+    """Return the kernel at the nodes of each panel's pieces, shape (rows, pieces, nodes)."""
+    if pieces.max(initial=1) == 1:
+        return kernel
+    count = kernel.shape[-1]
+    values, numbers = np.repeat(kernel, pieces, axis=1), np.repeat(pieces, pieces)
+    for number in np.unique(pieces[pieces > 1]):
+        onto, _ = spread(int(number), count)
+        values[:, numbers == number] = products(kernel[:, pieces == number], onto).reshape(len(kernel), -1, count)
+    return values
 
 
 def _in_chunks(seen: Seen, panels: w.Array, lie: Turns, kernel: w.Array, series: np.ndarray) -> Each:
@@ -215,8 +234,9 @@ def _in_chunks(seen: Seen, panels: w.Array, lie: Turns, kernel: w.Array, series:
         ends = np.cumsum(lie.pieces[which])
         for at in np.split(which, np.flatnonzero(np.diff(ends // step)) + 1):
             if at.size:
-                met = weights(seen.load, seen.orders, seen.r, panels[at], lie.pieces[at], count)
-                for whole, part in zip(sums, _integrated(met, kernel[:, at], series[:, at]), strict=True):
+                pieces = lie.pieces[at]
+                met = weights(seen.load, seen.orders, seen.r, panels[at], pieces, count, False)
+                for whole, part in zip(sums, _integrated(met, kernel[:, at], series[:, at], pieces), strict=True):
                     whole[at] = part
     return sums
 

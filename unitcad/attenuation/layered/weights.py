@@ -59,7 +59,7 @@ class Turns(NamedTuple):
 class Weights(NamedTuple):
     """What the kernel at each node is multiplied by, a row an order, shape (orders, panels, nodes, radii).
 
-    covered (orders, panels, radii): the integral of the absolute waves; swing (panels, degrees) and most (orders,
+    values: of each panel's nodes, or of those of each piece; covered (orders, panels, radii): the integral of the absolute waves; swing (panels, degrees) and most (orders,
     panels, radii): a bound of the rule's error is the sum of the kernel's coefficients times `swing`, times `most`.
     """
 
@@ -97,11 +97,18 @@ def turns(load: Load, r: np.ndarray, panels: w.Array, phase: float) -> Turns:
 
 @kept
 def weights(
-    load: Load, orders: tuple[int, ...], r: np.ndarray, panels: w.Array, pieces: np.ndarray, count: int
+    load: Load,
+    orders: tuple[int, ...],
+    r: np.ndarray,
+    panels: w.Array,
+    pieces: np.ndarray,
+    count: int,
+    folded: bool,
 ) -> Weights:
     """Return the weights of panels of `count` nodes, all on the axis or all off it, each cut into so many `pieces`.
 
-    At the nodes of a piece the kernel is what its panel's Legendre series says.
+    At the nodes of a piece the kernel is what its panel's Legendre series says. folded: whether the weights are summed
+    to those of the panel's nodes, which pays where they are kept.
     """
     of = np.repeat(np.arange(len(panels)), pieces)
     place = np.arange(len(of)) - (np.cumsum(pieces) - pieces)[of]
@@ -113,12 +120,13 @@ def weights(
     if len(of) == len(panels):
         return found
     first = np.cumsum(pieces) - pieces
-    values = np.empty((len(orders), len(panels), count, r.size), dtype=found.values.dtype)
+    values = np.empty((len(orders), len(panels), count, r.size)) if folded else found.values
     swing = np.empty((len(panels), count))
     for number in np.unique(pieces):
         at, here = pieces == number, pieces[of] == number
-        spread, restricted = _spread(int(number), count)
-        values[:, at] = spread @ found.values[:, here].reshape(len(orders), -1, number * count, r.size)
+        onto, restricted = spread(int(number), count)
+        if folded:
+            values[:, at] = onto @ found.values[:, here].reshape(len(orders), -1, number * count, r.size)
         by_piece = found.swing[here].reshape(-1, number, 1, count)
         swing[at] = (by_piece @ restricted).max(axis=1)[:, 0]
     covered, most = (np.add.reduceat(one, first, axis=1) for one in (found.covered, found.most))
@@ -126,7 +134,7 @@ def weights(
 
 
 @cache
-def _spread(number: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+def spread(number: int, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return what leads from a panel of `count` nodes to its equal pieces.
 
     The matrix from the nodes' values (one more row) to those at the nodes of the pieces, and of each piece one that
