@@ -59,8 +59,9 @@ class Turns(NamedTuple):
 class Weights(NamedTuple):
     """What the kernel at each node is multiplied by, a row an order, shape (orders, panels, nodes, radii).
 
-    values: of each panel's nodes, or of those of each piece; covered (orders, panels, radii): the integral of the absolute waves; swing (panels, degrees) and most (orders,
-    panels, radii): a bound of the rule's error is the sum of the kernel's coefficients times `swing`, times `most`.
+    values: of each panel's nodes, or of those of each piece; covered (orders, panels, radii): the integral of the
+    absolute waves; swing (panels, degrees) and most (orders, panels, radii): a bound of the rule's error is the sum of
+    the kernel's coefficients times `swing`, times `most`.
     """
 
     values: w.Array
