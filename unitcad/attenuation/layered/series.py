@@ -68,9 +68,12 @@ def exponential(material: w.Material, k: w.Array, h: float) -> Exponential:
         sinh[0] /= 4.0
         trace, determinant = 4.0 * trace, 16.0 * determinant
     rates = np.empty((2, 2, 2, k.size), dtype=np.complex128)
-    (rates[0, 0, 0], rates[0, 0, 1]), (rates[0, 1, 0], rates[0, 1, 1]) = (k, -1.0 / mu), (ks2 * mu, -k)
+    of_b, of_a = rates
     lame, stiff = (1.0 - 2.0 * eps) * k, (4.0 * (1.0 - eps) * k2 - ks2) * mu
-    (rates[1, 0, 0], rates[1, 0, 1]), (rates[1, 1, 0], rates[1, 1, 1]) = (-lame, -eps / mu), (-stiff, lame)
+    of_b[0, 0], of_b[0, 1] = k, -1.0 / mu
+    of_b[1, 0], of_b[1, 1] = ks2 * mu, -k
+    of_a[0, 0], of_a[0, 1] = -lame, -eps / mu
+    of_a[1, 0], of_a[1, 1] = -stiff, lame
     scale = np.array([[h * h], [1.0]])
     return Exponential(rates, cosh * scale, sinh * (-h * scale))
 

@@ -2,10 +2,10 @@
 
 The state below an interface is the plane of all (u, t) that the stack can carry there. It is kept as a pair of 2x2
 blocks (U, T), u = U c, t = T c. It is carried upwards through a thick layer by reflection, R -> E R E, with decaying
-exponentials only, and through one that is thin for a wave by the series of exp(-A h) - 1; then one of the blocks is the
-identity: the impedance T U^-1 or the compliance U T^-1, whichever is better conditioned, so that neither a clamped nor
-a free resonance of the lower layers costs digits. The Thomson-Haskell propagator, which multiplies growing
-exponentials, loses all digits where k h is large or omega small.
+exponentials only, and through one that is thin for a wave by the series of exp(-A h) - 1; before the next such step one
+of the blocks is made the identity: the impedance T U^-1 or the compliance U T^-1, whichever is better conditioned, so
+that neither a clamped nor a free resonance of the lower layers costs digits. The Thomson-Haskell propagator, which
+multiplies growing exponentials, loses all digits where k h is large or omega small.
 
 Time factor e^{+i omega t}; z into the body; u_z with J0(kr), u_r with J1(kr), both k dk; SI throughout.
 """
