@@ -184,7 +184,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     skipped = np.zeros(known.shape)  # by the detours
     count, done, exhausted, gained = beyond.size, 0, False, 0.0
     settled: list[Evaluated] = []
-    put_off: _PutOff | None = None
+    put_off = _PutOff.none(len(pending), known.shape)
     for left in range(_MAX_ROUNDS, -1, -1):
         found = evaluate(problem, pending, kernel, phase)
         if not np.isfinite(found.total).all():
@@ -195,10 +195,9 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         done += len(pending)
         limit = _PANELS_SHARE * wanted / done
         good_enough = left == 0 or off.max() <= _PANELS_SHARE * wanted
-        put_off = None if good_enough else put_off or _PutOff.none(len(pending), known.shape)
-        cuts = _cuts(found, put_off, limit, MAX_PANELS - done) if put_off else None
+        cuts = None if good_enough else _cuts(found, put_off, limit, MAX_PANELS - done)
         exhausted = exhausted or (cuts is not None and cuts.short)
-        if put_off is None or cuts is None or np.all(cuts.good):
+        if cuts is None or np.all(cuts.good):
             total = total + found.total
             quadrature += found.error
             size += found.size
@@ -209,7 +208,8 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             exhausted = exhausted or bool(further > stop and spent)
             if further <= stop or spent or left == 0:
                 break
-            pending, put_off = onwards(stop, further, span), None
+            pending = onwards(stop, further, span)
+            put_off = _PutOff.none(len(pending), known.shape)
             stop = further
         else:
             bad, good, due = cuts.bad, cuts.good, cuts.due

@@ -17,7 +17,7 @@ Made = TypeVar("Made", bound=tuple[Any, ...])
 
 
 def kept(make: Callable[..., Made]) -> Callable[..., Made]:
-    """Return a function of arrays and hashable values that keeps its last small results: tuples of read-only arrays."""
+    """Return a function of arrays and hashable values that keeps its last small results: tuples, arrays read-only."""
     results: dict[Hashable, Made] = {}
 
     @wraps(make)

@@ -145,8 +145,8 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
 
     The rows are those of the first body, of the second one, and so on.
 
-    phase: the most that the fastest Bessel product may turn over a piece of a panel of 16 nodes; over one of fewer as
-    much less.
+    phase: the most that the fastest Bessel product may turn over a piece of a panel of 16 nodes; where there are fewer,
+    `_LESS` of their share of it.
 
     The kernel is its Legendre series to degree n - 1 and a rest. The rest is at most twice the last two coefficients
     that were seen, as soon as they halve within n degrees or so (to count on the rate at which they seem to fall was
@@ -171,7 +171,7 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
         total, error, size = _together(met, kernel, series, np.array([rest, peak]))
 
         def by_panel() -> Each:
-            return _integrated(met, kernel, series, np.ones_like(lie.pieces))
+            return _integrated(met, kernel, series, lie.pieces)
 
     return Evaluated(total, error, size, kernel, lie.closeness, peak, rest, seen.taken_out, by_panel)
 
@@ -200,13 +200,14 @@ def _together(
 def _integrated(met: Weights, kernel: w.Array, series: np.ndarray, pieces: np.ndarray) -> Each:
     """Return the integrals over each panel, all on the axis or all off it.
 
-    series: coefficients, absolute; pieces (panels,): how many weights of its own each panel has at a node.
+    series: coefficients, absolute; pieces (panels,): of each panel, if the weights are not of panels but of pieces.
     """
-    orders = len(met.values)
-    coefficients = series.reshape(-1, orders, *series.shape[1:])
+    coefficients = series.reshape(-1, len(met.values), *series.shape[1:])
     swing = (coefficients * met.swing).sum(axis=-1)[..., None] * met.most
-    parts = products(_at_pieces(kernel, pieces).reshape(-1, *met.values.shape[:3]), met.values)
-    if parts.shape[2] != len(pieces):
+    of_panels = met.values.shape[1] == len(pieces)
+    values = kernel if of_panels else _at_pieces(kernel, pieces)
+    parts = products(values.reshape(-1, *met.values.shape[:3]), met.values)
+    if not of_panels:
         parts = np.add.reduceat(parts, np.cumsum(pieces) - pieces, axis=2)
     quantities = (parts, np.broadcast_to(met.covered, swing.shape), swing)
     return Each(*(one.reshape(*kernel.shape[:2], -1).swapaxes(0, 1) for one in quantities))
@@ -214,8 +215,6 @@ def _integrated(met: Weights, kernel: w.Array, series: np.ndarray, pieces: np.nd
 
 def _at_pieces(kernel: w.Array, pieces: np.ndarray) -> w.Array:
     """Return the kernel at the nodes of each panel's pieces, shape (rows, pieces, nodes)."""
-    if pieces.max(initial=1) == 1:
-        return kernel
     count = kernel.shape[-1]
     values, numbers = np.repeat(kernel, pieces, axis=1), np.repeat(pieces, pieces)
     for number in np.unique(pieces[pieces > 1]):

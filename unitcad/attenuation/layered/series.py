@@ -8,6 +8,7 @@ trace and the determinant of h^2 M alone. Its eigenvalues are (g_p h)^2 and (g_s
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from math import factorial
 from typing import NamedTuple
 
@@ -22,6 +23,8 @@ _SUMMED = 1.6
 _LEFT_OUT = 1e-18
 """Of 1: the first term that is not summed. The eigenvalues of h^2 M are at most 2 (max(|k|, |k_s|) h)^2."""
 _MOST_TERMS = 14
+_REACH = [(0.5 * (_LEFT_OUT * factorial(2 * n)) ** (1.0 / n)) ** 0.5 for n in range(1, _MOST_TERMS + 1)]
+"""Up to which max(|k|, |k_s|) h one term, two and so on are enough."""
 _COEFFICIENTS = np.array([[1.0 / factorial(2 * n + first) for n in range(_MOST_TERMS)] for first in (2, 4, 3, 5)])
 
 
@@ -58,7 +61,7 @@ def exponential(material: w.Material, k: w.Array, h: float) -> Exponential:
     k2 = k * k
     trace = (2.0 * k2 - (1.0 + eps) * ks2) * thin**2
     determinant = (k2 - eps * ks2) * (k2 - ks2) * thin**4
-    cosh, sinh = _series(trace, determinant, _terms(size / 2**doublings))
+    cosh, sinh = _series(trace, determinant, max(2, 1 + bisect_left(_REACH, size / 2**doublings)))
     for _ in range(doublings):
         square = _product(sinh, sinh, trace, determinant)
         sinh = sinh + _product(sinh, cosh, trace, determinant)
@@ -76,14 +79,6 @@ def exponential(material: w.Material, k: w.Array, h: float) -> Exponential:
     of_a[1, 0], of_a[1, 1] = -stiff, lame
     scale = np.array([[h * h], [1.0]])
     return Exponential(rates, cosh * scale, sinh * (-h * scale))
-
-
-def _terms(size: float) -> int:
-    """Return how many terms are summed for max(|k|, |k_s|) h up to `size`."""
-    n = 2
-    while (2.0 * size * size) ** n / factorial(2 * n) > _LEFT_OUT:
-        n += 1
-    return n
 
 
 def _series(trace: w.Array, determinant: w.Array, terms: int) -> tuple[w.Array, w.Array]:

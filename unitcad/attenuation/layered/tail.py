@@ -57,7 +57,8 @@ def grid(
 ) -> np.ndarray:
     """Return the wavenumbers (1/m), from beyond the last pole on, at which the kernel is sampled to bound its tail.
 
-    thinnest: thickness of a layer (m); affordable: the last wavenumber to which a path may go, which is one of them.
+    thinnest: thickness of a layer (m); affordable: the last wavenumber to which a path may go. It is one of them where
+    they reach beyond it.
     """
     lengths = [x for x in (load.reach, z, float(r.max())) if x > 0]
     first = max(1.4 * end, 1e-3 / max(lengths))

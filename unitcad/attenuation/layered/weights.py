@@ -5,7 +5,7 @@ Nothing of it is the medium's: it is kept for the next medium, frequency or tole
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -111,16 +111,16 @@ def weights(
     At the nodes of a piece the kernel is what its panel's Legendre series says. folded: whether the weights are summed
     to those of the panel's nodes, which pays where they are kept.
     """
+    if pieces.sum() == len(panels):
+        return _of_pieces(load, orders, r, panels, count)
+    first = np.cumsum(pieces) - pieces
     of = np.repeat(np.arange(len(panels)), pieces)
-    place = np.arange(len(of)) - (np.cumsum(pieces) - pieces)[of]
+    place = np.arange(len(of)) - first[of]
     cut = panels[of]
     for side in (0, 1):
         share = (place + side) / pieces[of]
         cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
     found = _of_pieces(load, orders, r, cut, count)
-    if len(of) == len(panels):
-        return found
-    first = np.cumsum(pieces) - pieces
     values = np.empty((len(orders), len(panels), count, r.size)) if folded else found.values
     swing = np.empty((len(panels), count))
     for number in np.unique(pieces):
@@ -134,7 +134,7 @@ def weights(
     return Weights(values, covered, swing, most)
 
 
-@cache
+@lru_cache(maxsize=128)
 def spread(number: int, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return what leads from a panel of `count` nodes to its equal pieces.
 
