@@ -6,7 +6,6 @@ import hashlib
 import os
 from collections.abc import Sequence
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
 
@@ -46,6 +45,8 @@ def kernel_versions(formats: Sequence[str]) -> dict[str, str]:
 
 @cache
 def _version(name: str) -> str | None:
+    from importlib.metadata import PackageNotFoundError, version  # takes long to import
+
     try:
         return version(name)
     except PackageNotFoundError:
