@@ -24,7 +24,7 @@ SHARPER = 2
 _INKED = (np.arange(256) * 0.28).astype(np.uint8)
 """What a line leaves of each of the 256 brightnesses under it."""
 _WHITE = 0xFFFFFFFF
-_OPAQUE = np.array([0, 0, 0, 255], np.uint8).view(np.uint32)[0]
+_BLACK = np.array([0, 0, 0, 255], np.uint8).view(np.uint32)[0]
 _LANES, _HALF = np.uint32(0x00FF00FF), np.uint32(0x00020002)
 _ROWS = 16
 """Of the picture at a time: they stay in the processor's cache."""
@@ -117,7 +117,7 @@ def together(bodies: Sequence[DrawnBody], of: Camera, names: Sequence[Name] = ()
             line[other] |= differs
         inked = np.flatnonzero(line)
         shades = field.reshape(-1)[inked].view(np.uint8)
-        field.reshape(-1)[inked] = _INKED[shades].view(np.uint32) | _OPAQUE
+        field.reshape(-1)[inked] = _INKED[shades].view(np.uint32) | _BLACK
         colour[inside] = field
     _write(colour, drawn, names, of)
     rows = np.flatnonzero((colour != _WHITE).any(axis=1))
@@ -182,7 +182,7 @@ def _write(colour: np.ndarray, drawn: np.ndarray, names: Sequence[Name], of: Cam
                 mask[_disc(window, (x, y), dot - 1.2 * SHARPER)] = False
         mask[top - up : top - up + rows, left - side : left - side + columns] |= ink
         colour[window][_grown(mask, (3 if name.on else 1) * SHARPER)] = _WHITE
-        colour[window][mask] = _OPAQUE
+        colour[window][mask] = _BLACK
         taken[window] |= _grown(mask, 3 * SHARPER)
         taken[max(top - _APART, 0) : top + rows + _APART, max(left - _APART, 0) : left + columns + _APART] = True
 

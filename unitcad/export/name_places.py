@@ -147,12 +147,11 @@ def _covered(drawn: np.ndarray, left: np.ndarray, top: np.ndarray, size: tuple[i
     y0, y1 = top - gap, np.minimum(top + size[1] + gap, height)
     part = drawn[y0[0] : y1[-1], x0[0] : x1[-1]]
     x0, x1, y0, y1 = x0 - x0[0], x1 - x0[0], y0 - y0[0], y1 - y0[0]
-    # Down first, where sums of whole rows are quick, and only rows that are asked for across.
-    down = np.zeros((part.shape[0] + 1, part.shape[1]), np.int32)  # enough for every picture's pixels
-    np.cumsum(part, axis=0, out=down[1:])
-    total = np.zeros((len(y0), part.shape[1] + 1), np.int32)
-    np.cumsum(down[y1] - down[y0], axis=1, out=total[:, 1:])
-    return total[:, x1] - total[:, x0]
+    along = np.zeros((part.shape[0], part.shape[1] + 1), np.int32)  # enough for every picture's pixels
+    np.cumsum(part, axis=1, out=along[:, 1:])
+    total = np.zeros((part.shape[0] + 1, len(x0)), np.int32)
+    np.cumsum(along[:, x1] - along[:, x0], axis=0, out=total[1:])
+    return total[y1] - total[y0]
 
 
 def overlap(one: Box, other: Box) -> bool:

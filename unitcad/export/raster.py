@@ -140,10 +140,9 @@ def _fragments(
         down = (second[:, 2] * first[:, 0] - first[:, 2] * second[:, 0]) / np.where(area, area, 1.0)
         which = np.flatnonzero((np.abs(area) > 1e-12) & (high >= low))
         rows = (high - low + 1)[which]
-        sides = np.stack([corners, np.roll(corners, -1, axis=1)])[..., :2].transpose(3, 0, 2, 1).copy()
         for some in _blocks(rows):
             face, row = np.repeat(which[some], rows[some]), _counted(low[which[some]], rows[some])
-            left, right = _span(sides, face, row + 0.5)
+            left, right = _span(corners, face, row + 0.5)
             left = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
             right = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int)
             number = np.maximum(right - left + 1, 0)
@@ -174,21 +173,16 @@ def _counted(start: np.ndarray, count: np.ndarray) -> np.ndarray:
     return np.arange(count.sum()) + np.repeat(start - (np.cumsum(count) - count), count)
 
 
-def _span(sides: np.ndarray, face: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return from where to where (px) the line y = `level` lies in faces: (m,) each.
-
-    `sides` (2, 2, 3, n): x and y of each side's start and end.
-    """
+def _span(corners: np.ndarray, face: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return from where to where (px) the line y = `level` lies in faces of `corners` (n, 3, 3): (m,) each."""
     left, right = np.full(len(face), np.inf), np.full(len(face), -np.inf)
-    for (x0, x1), (y0, y1) in zip(sides[0].transpose(1, 0, 2), sides[1].transpose(1, 0, 2), strict=True):
-        lower = np.where(y0 != y1, np.minimum(y0, y1), np.inf)  # a level side gives no end
-        crosses = np.flatnonzero((lower[face] <= level) & (level <= np.maximum(y0, y1)[face]))
-        of = face[crosses]
-        share = (level[crosses] - y0[of]) / np.where(y0 != y1, y1 - y0, 1.0)[of]
-        x = x0[of] + share * (x1 - x0)[of]
-        np.clip(x, np.minimum(x0, x1)[of], np.maximum(x0, x1)[of], out=x)
-        left[crosses] = np.minimum(left[crosses], x)
-        right[crosses] = np.maximum(right[crosses], x)
+    for k in range(3):
+        x0, y0 = corners[face, k, 0], corners[face, k, 1]
+        x1, y1 = corners[face, k - 2, 0], corners[face, k - 2, 1]
+        crosses = (np.minimum(y0, y1) <= level) & (level <= np.maximum(y0, y1)) & (y0 != y1)
+        share = (level - y0) / np.where(y0 != y1, y1 - y0, 1.0)
+        x = np.clip(x0 + share * (x1 - x0), np.minimum(x0, x1), np.maximum(x0, x1))
+        left, right = np.where(crosses, np.minimum(left, x), left), np.where(crosses, np.maximum(right, x), right)
     return left, right
 
 
