@@ -276,8 +276,8 @@ def compare(asked: argparse.Namespace, net: Net, parent: Node, sweep: Path, out:
     """Export a sample from the store, and compare each file with that which this process makes."""
     from unitcad.batch import load_sweep
     from unitcad.cache import MemoryStore
-    from unitcad.pipeline.stages import Stages
-    from unitcad.pipeline.subjects import product_of, subject_of
+    from unitcad.pipeline.make import Stages
+    from unitcad.pipeline.write import product_of, subject_of
 
     wanted, chosen = load_sweep(sweep), {}
     for index in {asked.variants * i // SAMPLE for i in range(SAMPLE)}:

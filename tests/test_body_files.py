@@ -20,7 +20,7 @@ from unitcad.kernels import mesh
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.mould_checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.shape import Extrude, Polyhedron, Shape, content_hash, cut, cylinder, polygon
 from unitcad.shape.body import Body
 from unitcad.spec.body_file import bodies_in

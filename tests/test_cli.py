@@ -13,7 +13,7 @@ import pytest
 from typer.main import get_command
 from typer.testing import CliRunner
 
-from unitcad.casting.time_line import duration
+from unitcad.casting.steps import duration
 from unitcad.cli import app
 from unitcad.export import slicer
 

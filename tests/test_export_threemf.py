@@ -12,7 +12,7 @@ from unitcad.check import check_file
 from unitcad.export import printing, threemf
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.bodies import is_printed, threemf_content
+from unitcad.pipeline.plan import is_printed, threemf_content
 from unitcad.validation import load
 
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"

@@ -40,7 +40,7 @@ def test_memory_that_is_kept_is_not_cleared_again() -> None:
 
 def _searches(*before: str) -> int:
     """Return how often Python sought cycles while a build's modules were loaded."""
-    lines = (*before, "import gc, unitcad.pipeline.build", "print(gc.get_stats()[0]['collections'])")
+    lines = (*before, "import gc, unitcad.pipeline.write", "print(gc.get_stats()[0]['collections'])")
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=True)
     return int(done.stdout)
 
@@ -48,8 +48,3 @@ def _searches(*before: str) -> int:
 def test_modules_are_seldom_searched_for_cycles_while_they_load() -> None:
     told = ("from unitcad.heap import seek_cycles_seldom", "seek_cycles_seldom()")
     assert _searches(*told) * 5 < _searches()
-
-
-def test_the_process_beside_a_build_loads_its_modules_after_it_is_told() -> None:
-    code = "import sys, unitcad.pipeline.beside_child; print('numpy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"

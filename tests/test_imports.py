@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 import unitcad
-from unitcad.children import cores
 from unitcad.designs import shipped
 from unitcad.validation import default_template, templates
+from unitcad.workers import cores
 
 PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
@@ -36,8 +36,9 @@ FLOORS = [
     {"shape"},
     {"check"},
     {"catalogue"},
-    {"files", "arguments", "sharing"},
-    {"errors", "children"},
+    {"files", "arguments"},
+    {"workers"},
+    {"errors"},
     {"text", "json_text", "notebook", "geometry"},
     {"lean_import", "heap"},
 ]
@@ -93,12 +94,11 @@ def test_attenuation_and_check_know_nothing_of_cad() -> None:
             assert below in (
                 "arguments",
                 "catalogue",
-                "children",
+                "workers",
                 "files",
                 "geometry",
                 "lean_import",
                 "notebook",
-                "sharing",
                 "text",
                 "errors",
             ), f"{file} imports {below}"

@@ -18,10 +18,15 @@ import trimesh
 
 from unitcad import estimating
 from unitcad.errors import UnitcadError
-from unitcad.pipeline import Variant, artifacts
-from unitcad.pipeline.build import build
-from unitcad.pipeline.folder import folder_name, placing, replacing
+from unitcad.pipeline import Variant
+from unitcad.pipeline import make as artifacts
+from unitcad.pipeline.write import build, placing, replacing, subject
 from unitcad.validation import load, templates
+
+
+def folder_name(spec):
+    return subject(spec).folder_name
+
 
 NAMES = sorted(templates())
 
@@ -73,7 +78,7 @@ def test_every_template_builds_and_passes_all_checks(name: str, tmp_path: Path) 
 def test_the_same_spec_gives_the_same_bytes(tmp_path: Path) -> None:
     first = build(_mesh_only("chain"), tmp_path / "a")
     code = (
-        "from unitcad.pipeline.build import build; from unitcad.validation import load; from pathlib import Path;"
+        "from unitcad.pipeline.write import build; from unitcad.validation import load; from pathlib import Path;"
         f"build(load('chain', ['output.formats=[\"stl\",\"3mf\"]']), Path({str(tmp_path / 'b')!r}))"
     )
     subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONHASHSEED": "7"})
@@ -137,7 +142,7 @@ def test_a_killed_process_leaves_the_old_result_whole(tmp_path: Path) -> None:
     folder = build(spec, tmp_path, only=["unit"]).folder
     before = _tree(folder)
     code = (
-        "import sys, time; from pathlib import Path; from unitcad.pipeline.folder import replacing\n"
+        "import sys, time; from pathlib import Path; from unitcad.pipeline.write import replacing\n"
         f"with replacing(Path({str(folder)!r})) as fresh:\n"
         "    (fresh / 'spec.toml').write_text('half'); print('in', flush=True); time.sleep(60)\n"
     )
@@ -157,7 +162,7 @@ def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tm
     folder = build(spec, tmp_path, only=["unit"]).folder
     before = _tree(folder)
     code = (
-        "import os, signal; from pathlib import Path; from unitcad.pipeline.folder import replacing\n"
+        "import os, signal; from pathlib import Path; from unitcad.pipeline.write import replacing\n"
         "rename = Path.rename\n"
         "def fatal(path, target):\n"
         "    rename(path, target)\n"

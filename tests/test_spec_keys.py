@@ -16,11 +16,9 @@ from unitcad.cache import MemoryStore, digest
 from unitcad.catalogue.entries import kinds_of
 from unitcad.errors import Refusal
 from unitcad.lab.fit_files import fit_toml
-from unitcad.lab.fit_lab import load_fit_lab
-from unitcad.lab.fitting import fit_lab
-from unitcad.pipeline.artifacts import OUTPUTS
-from unitcad.pipeline.product import make
-from unitcad.pipeline.stages import Stages
+from unitcad.lab.fitting import fit_lab, load_fit_lab
+from unitcad.pipeline.make import Progress, make
+from unitcad.pipeline.plan import OUTPUTS
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.spec.fields import alternatives, entry_in, fields_of, notes, table_in
@@ -196,7 +194,7 @@ def _before(base: str) -> dict[str, str]:
 
 def _written(data: dict[str, Any]) -> dict[str, str]:
     """The content of each file that is written, as a hash, but for the spec itself; and what the checks find."""
-    product = make(from_data(data), OUTPUTS, True, _STORE, Stages())
+    product = make(from_data(data), OUTPUTS, True, _STORE, Progress())
     own = {path: digest(content) for path, content in product.own.items()}
     for path in ("spec.toml", "manifest.json"):
         del own[path]
@@ -250,7 +248,7 @@ def test_provenance_and_range_of_a_silicone_are_written(path: str, value: object
 
 
 def test_a_key_that_is_read_by_nothing_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    for reader in ("figures", "instructions", "preparation", "finishing"):
+    for reader in ("figures", "preparation", "pouring"):
         monkeypatch.setattr(f"unitcad.casting.{reader}.at_room", lambda value, room_c: value)
     _before.cache_clear()
     assert not any(_effect("whole", "casting.room_c", value) for value in (20.0, 30.0))

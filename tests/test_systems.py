@@ -12,7 +12,7 @@ import pytest
 from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.export import slicer
-from unitcad.pipeline import versions
+from unitcad.pipeline import plan as versions
 
 
 class OneReader(filelock.FileLock):
@@ -129,7 +129,7 @@ def test_what_is_written_has_the_same_line_ends_everywhere(tmp_path: Path, monke
     """A result's texts are written as bytes: a system whose lines end otherwise changes none of them."""
     monkeypatch.setattr(os, "linesep", "\r\n")
     monkeypatch.chdir(tmp_path)
-    from unitcad.pipeline.build import build
+    from unitcad.pipeline.write import build
     from unitcad.validation import load
 
     folder = build(load("embedded", ["output.formats=['stl']"]), tmp_path / "out", check=False).folder

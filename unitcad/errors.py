@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import math
 import re
 from collections.abc import Iterable
@@ -22,6 +23,10 @@ class UnitcadError(Exception):
     def as_dict(self) -> dict[str, object]:
         """Return the error as JSON-ready data."""
         return {"message": str(self)}
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Come back from a worker as it was, whatever arguments the class takes."""
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
 
 class Missing(UnitcadError):

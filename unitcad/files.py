@@ -145,7 +145,9 @@ def writing(path: Path, *, sync: bool = False) -> Iterator[IO[bytes]]:
         sync_folder(path.parent)
 
 
-def replace_all(folder: Path, contents: Mapping[str, bytes], last: str, former: re.Pattern[str]) -> None:
+def replace_all(
+    folder: Path, contents: Mapping[str, bytes], last: str, former: re.Pattern[str] = re.compile("(?!)")
+) -> None:
     """Write files into a folder in place of those of a former run: of names that match `former`, none other is left.
 
     All are written under another name first. The file `last` is removed before anything is changed and put in place
@@ -156,6 +158,8 @@ def replace_all(folder: Path, contents: Mapping[str, bytes], last: str, former: 
         inside = fresh / NEW
         inside.mkdir()
         for name, content in contents.items():
+            for where in (inside, folder):
+                (where / name).parent.mkdir(parents=True, exist_ok=True)
             write_new(inside / name, content)
         (folder / last).unlink(missing_ok=True)
         for path in sorted(folder.iterdir()):

@@ -31,8 +31,8 @@ from unitcad.arrays.patch_pictures import pictures as patch_pictures  # noqa: E4
 from unitcad.cache import MemoryStore  # noqa: E402
 from unitcad.export.picture import draw  # noqa: E402
 from unitcad.pipeline import Variant  # noqa: E402
-from unitcad.pipeline.build import build  # noqa: E402
 from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # noqa: E402
+from unitcad.pipeline.write import build  # noqa: E402
 from unitcad.report import write_report  # noqa: E402
 from unitcad.validation import load  # noqa: E402
 

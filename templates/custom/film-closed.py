@@ -11,6 +11,7 @@
 from dataclasses import replace
 
 from unitcad.designs import Design
+from unitcad.designs.design import Fitting
 from unitcad.designs.dimensions import concentric
 from unitcad.designs.parts import circuit, motor
 from unitcad.errors import Refusal
@@ -51,9 +52,17 @@ def limits(spec, dims):
 def assembly(spec, dims):
     """Write how motor and circuit are laid into the mould."""
     return [
-        "Solder the motor to the circuit's pad, and try the motor: nothing of it can be reached later.",
-        "Brush a thin coat of the mix onto the middle of the film. Lay the circuit on it, its pad in the middle, the "
-        "motor up, the tail on the base's rib. Press the pad down from its middle, so that no air stays under it.",
+        Fitting(
+            "Solder the motor to the circuit's pad, and try the motor: nothing of it can be reached later.",
+            needs=("soldering iron and solder",),
+        ),
+        Fitting(
+            "Brush a thin coat of the mix onto the middle of the film. Lay the circuit on it, its pad in the middle, "
+            "the motor up, the tail on the base's rib. Press the pad down from its middle, so that no air stays under "
+            "it.",
+            needs=("small brush",),
+            mix=True,
+        ),
     ]
 
 

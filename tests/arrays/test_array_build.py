@@ -14,6 +14,7 @@ from html import escape
 from pathlib import Path
 
 import pytest
+from casting_rules import broken_rules
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_hash, load_array
@@ -21,12 +22,10 @@ from unitcad.arrays.patch import patch_bodies
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.arrays.pocket_procedure import pocket_procedure
 from unitcad.cache import MemoryStore
-from unitcad.casting.bench_views import picture_path, views
-from unitcad.casting.in_short import in_short
-from unitcad.casting.plates import mould_plates
+from unitcad.casting.bill import mould_plates
 from unitcad.casting.procedure import Procedure, procedure
-from unitcad.casting.rules import broken_rules
-from unitcad.casting.time_line import duration
+from unitcad.casting.steps import duration, in_short
+from unitcad.casting.views import picture_path, views
 from unitcad.casting.written import files as written
 from unitcad.check import Options, check_bytes
 from unitcad.cli.array_summary import array_summary
@@ -34,9 +33,9 @@ from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
 from unitcad.mould_checks import mould_checks
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.array_build import build_array
-from unitcad.pipeline.array_product import unit_folders
-from unitcad.pipeline.build import Built
+from unitcad.pipeline.arrays import unit_folders
+from unitcad.pipeline.write import Built
+from unitcad.pipeline.write import build as build_array
 from unitcad.report import write_report
 from unitcad.report.bench_page import write_bench
 from unitcad.serve.answers import answered

@@ -17,7 +17,7 @@ from unitcad.mould_checks.gap import play_missing
 from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.array_build import build_array
+from unitcad.pipeline.write import build as build_array
 from unitcad.report.array_page import write_array_page
 from unitcad.validation import load
 

@@ -11,10 +11,10 @@ import pytest
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.casting.in_short import pour_warnings
-from unitcad.casting.instructions import GREASE
+from unitcad.casting.drawings import HELD, TAPE_WIDTH, side_places, tape_places
+from unitcad.casting.pouring import GREASE
 from unitcad.casting.procedure import Procedure
-from unitcad.casting.tape import HELD, TAPE_WIDTH, side_places, tape_places
+from unitcad.casting.steps import pour_warnings
 from unitcad.casting.written import to_markdown
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.shape.lettering import seen

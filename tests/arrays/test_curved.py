@@ -15,10 +15,10 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.circuit.outline import circuit_body
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
-from unitcad.casting.bench_views import views
 from unitcad.casting.figures import RESIN_LAYER_S
-from unitcad.casting.instructions import GREASE
+from unitcad.casting.pouring import GREASE
 from unitcad.casting.procedure import Procedure
+from unitcad.casting.views import views
 from unitcad.check import Options, check_bytes
 from unitcad.errors import Refusal
 from unitcad.export import stl

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from casting_rules import broken_rules
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.hidden_tails import MOST_NAMES, hidden_tails, hidden_tails_warning
@@ -14,11 +15,10 @@ from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.arrays.pocket_procedure import pocket_procedure
 from unitcad.arrays.tail_ways import tail_half_width, tail_length
 from unitcad.casting.procedure import procedure
-from unitcad.casting.rules import broken_rules
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.array_build import build_array
+from unitcad.pipeline.write import build as build_array
 from unitcad.report import write_report
 from unitcad.shape import Extrude, box, moved, rotated
 

@@ -22,7 +22,7 @@ from unitcad.mould_checks import check_moulds, mould_checks
 from unitcad.moulds.cuts import Feature, Sized, in_gaps, seams
 from unitcad.moulds.dovetails import FLANK_DEG, LARGE, ROUND, Seam, split, straight
 from unitcad.moulds.pieces import base_piece
-from unitcad.pipeline.bodies import file_stem
+from unitcad.pipeline.plan import file_stem
 from unitcad.shape import Common, Shape, box, cut, moved, union
 from unitcad.spec import printer_of
 

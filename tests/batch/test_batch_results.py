@@ -13,14 +13,14 @@ from typing import Any
 import pytest
 from batching import bytes_of, calls, ring_sweep, rows, unitcad
 
+from unitcad.arrays.array import Array
 from unitcad.batch import BatchOptions, load_sweep, run
 from unitcad.batch.executors import SerialExecutor
 from unitcad.batch.sweep import Sweep, from_file
 from unitcad.batch.task import VariantOutcome
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.build import build
-from unitcad.pipeline.subjects import Made
-from unitcad.spec import to_toml
+from unitcad.pipeline.write import build
+from unitcad.spec import Spec, to_toml
 from unitcad.validation import from_data, load, read
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
@@ -324,7 +324,7 @@ def test_workers_begin_before_all_variants_are_there(tmp_path: Path, monkeypatch
     there, asked = [], []
     spec = Sweep.spec
 
-    def counting(self: Sweep, index: int) -> Made:
+    def counting(self: Sweep, index: int) -> Spec | Array:
         there.append(index)
         return spec(self, index)
 

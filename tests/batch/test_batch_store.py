@@ -17,13 +17,14 @@ from object_store import BUCKET, Faulty, s3_server
 import unitcad
 from unitcad.batch import BatchOptions, Summary, load_sweep, record_packs, run
 from unitcad.batch.batch_call import make
-from unitcad.batch.executors import SerialExecutor, WorkerDied, Workers
+from unitcad.batch.executors import SerialExecutor, Workers
 from unitcad.batch.sweep import from_file
 from unitcad.batch.task import outcomes
 from unitcad.cache import MissingContent, SharedStore, digest, shared_store
 from unitcad.cache.shared_store import TRIES
 from unitcad.errors import UnitcadError
 from unitcad.spec import custom_code
+from unitcad.workers import WorkerEnded
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +80,7 @@ class Dying(SerialExecutor):
         if self.deaths:
             self.deaths -= 1
             done = Future()
-            done.set_exception(WorkerDied("the worker died (SIGKILL)"))
+            done.set_exception(WorkerEnded("the worker died (SIGKILL)"))
         return done
 
 
@@ -236,7 +237,7 @@ def test_a_damaged_entry_counts_as_absent(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", ["../x", "/tmp/x", "a/../../x", "C:x", "a\\b"])
 def test_a_record_names_no_file_outside_its_folder(path: str, tmp_path: Path) -> None:
-    from unitcad.pipeline.product import Product
+    from unitcad.pipeline.make import Product
 
     store = SharedStore(str(tmp_path / "store"))
     manifest: Any = {}

@@ -14,7 +14,7 @@ from unitcad.batch.paths import known_paths
 from unitcad.batch.run import counted
 from unitcad.batch.sweep import Range, from_file, shipped
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.pipeline.geometry import build_key
+from unitcad.pipeline.plan import build_key
 from unitcad.validation import read
 
 SOFT, STIFF = "ecoflex-00-10", "dragon-skin-30"

@@ -6,15 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from casting_rules import broken_rules
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.casting.holding import LEVEL_AGAIN
-from unitcad.casting.instructions import GREASE, TACK
+from unitcad.casting.pouring import GREASE, LEVEL_AGAIN, TACK
 from unitcad.casting.procedure import Pour, Procedure, procedure
-from unitcad.casting.rules import broken_rules
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load, templates
 

@@ -15,18 +15,16 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.casting.bench_extras import ARROW, BAND, CARD, GREASE, TAPE
-from unitcad.casting.bench_pictures import SIZE, BenchPictures, _Kind, _piece_names, _seen_from_above, pictures
-from unitcad.casting.bench_view import OVER
-from unitcad.casting.bench_views import View, picture_path, views
+from unitcad.casting.drawings import ARROW, BAND, CARD, GREASE, TAPE, tongue_prop
+from unitcad.casting.pictures import SIZE, BenchPictures, pictures
 from unitcad.casting.procedure import Procedure, procedure
-from unitcad.casting.tongue_prop import tongue_prop
+from unitcad.casting.views import View, picture_path, views
 from unitcad.designs import layer_colour
 from unitcad.export import composite
 from unitcad.export.picture_letters import Name, written
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.shape import box, moved
 from unitcad.validation import load, templates
 
@@ -144,7 +142,9 @@ def test_pictures_of_a_curved_set_show_what_is_there() -> None:
 
 def test_pieces_of_a_split_tool_are_numbered_where_they_lie_and_one_is_pushed_onto_the_next() -> None:
     moulds, casting = planned("wrist-band")
-    names = _piece_names(moulds, BenchPictures(moulds)._scene_of(_Kind("pieces", OVER, False)).placed)
+    bench = BenchPictures(moulds)
+    bench.picture("pieces")
+    names = bench.written
     assert sorted(name.text for name in names if name.on) == ["1", "1", "1", "2", "2", "2"]
     assert {"base", "cup 1", "cup 2"} <= {name.text for name in names}
     join = next(step for step in casting.preparation if step.title == "Join the pieces")
@@ -171,7 +171,9 @@ def test_what_leaves_a_curved_base_is_all_of_the_silicone_and_clear_of_it() -> N
     shown, base = views(moulds), moulds.mesh(moulds.plan.tool("base2"))
     for name, whole in (("peel", moulds.unit), ("pour2-laid-in", moulds.unit[:1])):
         colours = {body.colour for body in moulds.unit}
-        moved_off = [moulds.mesh_of(extra.shape) for extra in shown[name].extras if extra.colour in colours]
+        moved_off = [
+            moulds.mesh_of(moved(extra.shape, *extra.moved)) for extra in shown[name].extras if extra.colour in colours
+        ]
         volume = sum(moulds.mesh(body).volume() for body in whole)
         assert sum(each.volume() for each in moved_off) == pytest.approx(volume, rel=1e-5)
         assert all((each ^ base).volume() < 1e-9 for each in moved_off)
@@ -307,7 +309,7 @@ def test_what_strikes_off_passes_what_stands_on_the_base() -> None:
     base = realise(moulds.plan.of_kind("base")[0].shape, 32)
     view, rim = views(moulds)["pour1-strike"], moulds.plan.steps[0].rim
     assert not any(part.name == "blade" for part in view.parts)
-    strip = realise(next(extra.shape for extra in view.extras if extra.colour == CARD), 32)
+    strip = realise(next(moved(extra.shape, *extra.moved) for extra in view.extras if extra.colour == CARD), 32)
     x0, y0, _, _, y1, top = strip.bounding_box()
     way = realise(box(x0, -x0, y0, y1, rim, top), 32)
     assert (way ^ base).volume() < 1e-9
@@ -386,14 +388,3 @@ def test_a_cut_tongue_is_drawn_as_the_strip_that_its_step_describes() -> None:
     assert steps["Cut the tongues"] == picture_path("cut-tongue")
     printed = planned("encapsulating")[0].solids["tongue"].bounding_box()
     assert printed[4] - printed[1] == pytest.approx(10.0, abs=0.01)
-
-
-def test_a_name_points_at_its_piece() -> None:
-    """An L lies round the place that is named: the middle of its nearest face is taken."""
-    ell = Manifold.cube((10, 2, 3)) + Manifold.cube((2, 10, 1))
-    mesh = ell.to_mesh()
-    solid = np.asarray(mesh.vert_properties, float), np.asarray(mesh.tri_verts, np.int64), (1.0, 1.0, 1.0)
-    assert _seen_from_above([solid], 5, 1) == pytest.approx((5, 1, 3))
-    assert _seen_from_above([solid], 1, 9) == pytest.approx((1, 9, 1))
-    x, y, z = _seen_from_above([solid], 6, 6)
-    assert (0 <= x <= 10 and 0 <= y <= 2 and z == 3) or (0 <= x <= 2 and 0 <= y <= 10 and z == 1)

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cast_records import spec_of, to_json
 from typer.testing import CliRunner
 
-from unitcad.casting.cast_record import FORMAT, cast_record, read_cast_record, spec_of, to_json
+from unitcad.casting.cast_record import FORMAT, cast_record, read_cast_record
 from unitcad.cli import app, main
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import spec_hash, to_data

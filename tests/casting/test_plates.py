@@ -12,10 +12,10 @@ import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.casting.plates import mould_plates
+from unitcad.casting.bill import mould_plates
 from unitcad.casting.preparation import printing
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.bodies import threemf_content
+from unitcad.pipeline.plan import threemf_content
 from unitcad.validation import load
 
 

@@ -6,10 +6,8 @@ from dataclasses import asdict
 
 import pytest
 
-from unitcad.casting.bench_step import BenchStep
-from unitcad.casting.in_short import in_short
 from unitcad.casting.procedure import Procedure, procedure
-from unitcad.casting.time_line import duration, phases
+from unitcad.casting.steps import BenchStep, duration, in_short, phases
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from dataclasses import dataclass
 
 from unitcad.check import Options
@@ -20,3 +21,16 @@ class Deadly(Options):
         if name == "unit" and value == "die" and os.environ.get("PYTEST_CURRENT_TEST") is None:
             os._exit(9)
         return value
+
+
+def aborts(path: str) -> None:
+    os.abort()
+
+
+def prints(path: str) -> None:
+    print("noise")
+    raise ModuleNotFoundError("OCP")
+
+
+def hangs(path: str) -> None:
+    time.sleep(60)

@@ -75,12 +75,15 @@ def test_a_reader_that_dies_or_prints_is_a_finding(
     path = tmp_path / "a.step"
     path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n")
     monkeypatch.setattr(read_step, "installed", lambda: True)
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    import dying
+
     for child, code, said in (
-        ("import os; os.abort()", "F003", "died"),
-        ("print('noise'); raise ModuleNotFoundError('OCP')", "F012", "pip install"),
-        ("import time; time.sleep(60)", "F011", "not finished"),
+        (dying.aborts, "F003", "died"),
+        (dying.prints, "F012", "pip install"),
+        (dying.hangs, "F011", "not finished"),
     ):
-        monkeypatch.setattr(read_step, "_CHILD", child)
+        monkeypatch.setattr(read_step, "measure", child)
         (found,) = check_file(path, Options(limits=Limits(seconds=5))).findings
         assert found.code == code
         assert said in found.message

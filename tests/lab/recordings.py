@@ -99,3 +99,10 @@ FORMATS = {
     "float.wav": write_wav,
     "int.wav": lambda path: write_wav(path, "<i2"),
 }
+
+
+def hangs(*asked: object) -> None:
+    """Stand in for a library that never returns."""
+    import time
+
+    time.sleep(60)

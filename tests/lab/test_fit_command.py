@@ -16,8 +16,7 @@ from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.lab.fit_files import contents
-from unitcad.lab.fit_lab import load_fit_lab
-from unitcad.lab.fitting import fit_lab
+from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.validation import load
 
 UNITS = [

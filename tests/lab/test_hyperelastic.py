@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from unitcad.lab import hyperelastic as hyper
-from unitcad.lab.hyperelastic import Law
-from unitcad.lab.modulus_methods import by_name, default_method, fit_toe, moduli, secant
+from unitcad.lab import tensile as hyper
+from unitcad.lab.tensile import Law, default_method, fit_start, moduli, secant
 
 KNOWN: dict[Law, dict[str, float]] = {
     "neo-Hooke": {"c10": 5e3},
@@ -83,7 +82,7 @@ def test_an_exact_law_gives_its_modulus_by_every_method_that_tends_to_it() -> No
     """A stiff start is small strain: secants of neo-Hooke's law are E (1 + 1/L + 1/L^2) / 3 with L the stretch."""
     strain = np.linspace(0.001, 3.5, 3500)
     stress = hyper.nominal_stress("neo-Hooke", {"c10": 1e4}, strain)
-    found = by_name(moduli(strain, stress, 0.12, 0.24))
+    found = {one.method: one for one in moduli(strain, stress, 0.12, 0.24)}
     for at in (0.1, 0.15, 0.25, 0.5):
         stretch = 1 + at
         exact = 6e4 * (1 + 1 / stretch + 1 / stretch**2) / 3  # (L - 1/L^2) / (L - 1) = (L^2 + L + 1) / L^2
@@ -98,11 +97,13 @@ def test_an_exact_law_gives_its_modulus_by_every_method_that_tends_to_it() -> No
 def test_slack_and_an_offset_of_the_force_do_not_move_the_default(slack: float) -> None:
     strain = np.linspace(0.04, 0.6, 60)
     bar = hyper.nominal_stress("neo-Hooke", {"c10": 1e4}, strain - slack)
-    toe = fit_toe(strain, bar, 0.24)
+    toe = fit_start(strain, bar, 0.24)
     assert toe is not None
     assert toe.origin == pytest.approx(slack, abs=1e-6)
     exact = np.mean([20e3 * (s**2 + s + 1) / s**2 for s in np.linspace(1.12, 1.24, 1001)])
-    assert by_name(moduli(strain, bar, 0.12, 0.24))[default_method(0.12, 0.24)].value == pytest.approx(exact, rel=1e-4)
+    assert {one.method: one for one in moduli(strain, bar, 0.12, 0.24)}[
+        default_method(0.12, 0.24)
+    ].value == pytest.approx(exact, rel=1e-4)
     plain = secant(strain, bar, 0.15)
     assert plain is not None
     assert (abs(plain / exact - 1) > 0.1) == (slack != 0)
@@ -110,7 +111,7 @@ def test_slack_and_an_offset_of_the_force_do_not_move_the_default(slack: float) 
 
 def test_a_method_that_a_curve_does_not_reach_says_so() -> None:
     strain = np.linspace(0.05, 0.4, 30)
-    found = by_name(moduli(strain, 1e5 * strain, 0.12, 0.24))
+    found = {one.method: one for one in moduli(strain, 1e5 * strain, 0.12, 0.24)}
     assert found["secant at 50 %"].value is None
     assert "5 to 40 %" in found["secant at 50 %"].reason
     assert found["Yeoh up to 100 %"].value is None

@@ -20,11 +20,10 @@ from unitcad.attenuation import FractionalKelvinVoigt
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_input
-from unitcad.lab import hyperelastic as hyper
-from unitcad.lab.declared_columns import declared
-from unitcad.lab.dynamic_test import evaluate_dynamic, read_dynamic
-from unitcad.lab.tensile_curve import Specimen, TensileCurve, header_of, read_curve
-from unitcad.lab.tensile_result import evaluate
+from unitcad.lab import tensile as hyper
+from unitcad.lab.columns import declared
+from unitcad.lab.dynamic import evaluate_dynamic, read_dynamic
+from unitcad.lab.tensile import Specimen, TensileCurve, evaluate, header_of, read_curve
 from unitcad.validation import load
 
 C10 = 1.2e4

@@ -17,8 +17,8 @@ from unitcad.accuracy.synthetic_records import Scenario, synthetic
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import read_campaign
-from unitcad.lab.lab_rules import RULES
 from unitcad.lab.measuring import Measured, measure
+from unitcad.lab.record import RULES
 
 RATE = 2000
 SCENARIO = Scenario("lab", snr=60.0, drift=0.004, mains=(0.01, 0.004, 0.004), harmonics=(0.1, 0.05), spin_up_s=0.05)

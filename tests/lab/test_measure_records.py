@@ -10,14 +10,14 @@ import pytest
 from scipy.io import wavfile
 
 from unitcad.errors import Refusal
-from unitcad.lab import measured_files, signals
+from unitcad.lab import measured_files
+from unitcad.lab import record as signals
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable, read_campaign
+from unitcad.lab.chains import CHAINS
 from unitcad.lab.chains.chain import Chain, ChainTable
 from unitcad.lab.chains.line import Mains
-from unitcad.lab.chains.signal_chains import CHAINS
-from unitcad.lab.measured_record import measure_record
 from unitcad.lab.measuring import Measured, measure
-from unitcad.lab.record_result import RecordResult
+from unitcad.lab.record import RecordResult, measure_record
 
 RATE = 2000
 TIME = np.arange(2 * RATE) / RATE

@@ -14,11 +14,10 @@ from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, UnitTabl
 from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.chains.line import FALSE_ALARM, Mains, fit_line, most_of_noise
 from unitcad.lab.chains.paper import chain as paper_chain
-from unitcad.lab.measured_charts import charts_of
-from unitcad.lab.measured_record import measure_record
+from unitcad.lab.measured_files import charts_of
 from unitcad.lab.measuring import Measured, measure
-from unitcad.lab.readers.formats import expect_ending
-from unitcad.lab.record_result import RecordResult
+from unitcad.lab.readers import expect_ending
+from unitcad.lab.record import RecordResult, measure_record
 
 RATE = 2000
 TIME = np.arange(2 * RATE) / RATE

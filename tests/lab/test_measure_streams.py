@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from unitcad.lab import signals
+from unitcad.lab import record as signals
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, UnitTable
 from unitcad.lab.chains.line import Mains
-from unitcad.lab.measured_record import measure_record
-from unitcad.lab.signals import SECTION, open_signal
+from unitcad.lab.record import SECTION, measure_record, open_signal
 
 SENSOR = SensorTable(quantity="displacement", unit="um", scale=500.0)
 MEASURE = """
@@ -21,7 +20,7 @@ import resource, sys
 from pathlib import Path
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable
 from unitcad.lab.chains.line import Mains
-from unitcad.lab.measured_record import measure_record
+from unitcad.lab.record import measure_record
 sensor = SensorTable(quantity="displacement", unit="um", scale=500.0)
 campaign = Campaign(name="long", sensor=sensor, unit=(UnitTable(name="a"),))
 path = Path(sys.argv[1])

@@ -9,9 +9,8 @@ import pytest
 from scipy.io import savemat, wavfile
 
 from unitcad.errors import Refusal
-from unitcad.lab.campaign import RecordingTable, read_campaign
+from unitcad.lab.campaign import RecordingTable, read_campaign, recording_of
 from unitcad.lab.measuring import Measured, measure
-from unitcad.lab.own_recordings import recording_of
 from unitcad.spec.convert import convert
 
 HEAD = 'name = "t"\n[sensor]\nquantity = "displacement"\nunit = "um"\n'

@@ -9,10 +9,8 @@ import pytest
 from scipy.io import wavfile
 
 from unitcad.lab.campaign import Campaign, SensorTable
-from unitcad.lab.chains.line import Mains, fit_line
-from unitcad.lab.chains.running_part import running_part
-from unitcad.lab.measured_record import measure_record
-from unitcad.lab.record_result import RecordResult
+from unitcad.lab.chains.line import Mains, fit_line, running_part
+from unitcad.lab.record import RecordResult, measure_record
 from unitcad.spec.convert import convert
 
 RATE = 2000

@@ -18,10 +18,9 @@ from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_spec
 from unitcad.kernels.mesh import bounds, realise
-from unitcad.lab.phantom import bench, phantom_files, tensile_coupons
-from unitcad.lab.phantom.description import PhantomTable, load_phantom, phantoms
-from unitcad.lab.phantom.phantom_set import PhantomSet, phantom_set
-from unitcad.lab.phantom.recipe import modulus_by_table
+from unitcad.lab.phantom import PhantomSet, bench, phantom_files, phantom_set
+from unitcad.lab.phantom.box import coupon_outline, coupon_volume_mm3
+from unitcad.lab.phantom.recipe import PhantomTable, load_phantom, modulus_by_table, phantoms
 from unitcad.shape import box, exact_volume
 from unitcad.shape.lettering import engraving
 from unitcad.spec import convert
@@ -136,7 +135,7 @@ def test_the_blade_passes_the_pegs_and_lies_on_both_rims() -> None:
 
 def test_the_coupon_is_die_c() -> None:
     """ASTM D412 die C: 115 over all, 25 wide, 6 over the narrow 33; the arcs meet without a step."""
-    outline = tensile_coupons.outline()
+    outline = coupon_outline()
     assert outline.bounds == pytest.approx((-57.5, -12.5, 57.5, 12.5))
     narrow = [v for v in outline.vertices if abs(v[1]) == 3.0]
     assert sorted({abs(v[0]) for v in narrow}) == [16.5]
@@ -148,7 +147,7 @@ def test_the_coupon_is_die_c() -> None:
     width = np.where(x < 16.5, 3.0, np.where(x < meet, low, np.where(x < 16.5 + reach, high, 12.5)))
     assert y == pytest.approx(float(low[np.searchsorted(x, meet)]), abs=1e-3)
     assert outline.area == pytest.approx(4 * float(np.trapezoid(width, x)), rel=1e-4)
-    assert tensile_coupons.volume_mm3(3) == pytest.approx(9 * outline.area)
+    assert coupon_volume_mm3(3) == pytest.approx(9 * outline.area)
 
 
 def test_a_coupon_has_the_number_of_its_pour_wherever_it_stands() -> None:

@@ -12,10 +12,9 @@ import pytest
 from unitcad.catalogue import printers
 from unitcad.export import drawing
 from unitcad.kernels.mesh import bounds, realise
-from unitcad.lab.phantom import phantom_files
-from unitcad.lab.phantom.description import load_phantom
-from unitcad.lab.phantom.marked_lid import marks, numbers
-from unitcad.lab.phantom.phantom_set import PhantomSet, phantom_set
+from unitcad.lab.phantom import PhantomSet, phantom_files, phantom_set
+from unitcad.lab.phantom.box import marks, numbers
+from unitcad.lab.phantom.recipe import load_phantom
 from unitcad.shape import Shape, box, cylinder, moved, union
 from unitcad.shape.lettering import engraving
 

@@ -15,9 +15,8 @@ from unitcad.attenuation import FractionalKelvinVoigt
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.files import sha256
-from unitcad.lab.phantom import bench, phantom_files
-from unitcad.lab.phantom.description import load_phantom, phantoms
-from unitcad.lab.phantom.phantom_set import PhantomSet, phantom_set
+from unitcad.lab.phantom import PhantomSet, bench, phantom_files, phantom_set
+from unitcad.lab.phantom.recipe import load_phantom, phantoms
 
 LAW = FractionalKelvinVoigt(300e-6, 0.3)
 STATIC = 90e3

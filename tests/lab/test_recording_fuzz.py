@@ -11,7 +11,7 @@ import pytest
 from recordings import CENTRES, FORMATS
 
 from unitcad.errors import UnitcadError
-from unitcad.lab.readers.formats import open_recording
+from unitcad.lab.readers import open_recording
 
 LONGEST = 90.0
 """Seconds that a damaged file of some kilobytes may take."""
@@ -49,13 +49,13 @@ def shifted(path: Path) -> str | None:
     """Read a file; say which column holds values that are another column's, if one does."""
     recording = open_recording(path)
     names = {channel.name.rpartition("/")[2]: i for i, channel in enumerate(recording.channels)}
-    if recording.form == "wav":
+    if path.suffix == ".wav":
         names = {name: i for i, name in enumerate(CENTRES) if i < len(recording.channels)}
     factor = 2**15 / 50 if path.name == "int.wav" else 1.0
     for name, centre in CENTRES.items():
         if name not in names:
             continue
-        found = np.concatenate(list(recording.read((names[name],))))[:, 0] * factor
+        found = recording.columns((names[name],))[:, 0] * factor
         away = np.abs(found - centre) > 51
         if away.sum() > 12:
             return f"{name}: {away.sum()} of {len(found)} values are not its own, such as {found[away][:3]}"

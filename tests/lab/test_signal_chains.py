@@ -12,11 +12,10 @@ from scipy.stats import norm, ttest_ind, ttest_rel
 
 from unitcad.accuracy.synthetic_records import LENGTH_S, PLAIN, RATE, Scenario, synthetic
 from unitcad.errors import Refusal
-from unitcad.lab.chains.censored import solve_censored
-from unitcad.lab.chains.line import Mains, fit_line
-from unitcad.lab.chains.line_fit import LineFit
-from unitcad.lab.chains.paper import PaperChain
-from unitcad.lab.levels import level, paired_level
+from unitcad.lab.chains import paper
+from unitcad.lab.chains.chain import ChainTable, LineFit
+from unitcad.lab.chains.line import Mains, fit_line, solve_censored
+from unitcad.lab.measuring import level
 
 TIME = np.arange(4000) / RATE
 
@@ -173,19 +172,19 @@ def test_a_record_without_a_line_has_none() -> None:
 @pytest.mark.parametrize("hz", [100.0, 101.0, 117.0, 150.0])
 def test_the_papers_chain_has_the_gain_that_it_states(zero_phase: bool, hz: float) -> None:
     """A long steady line through the filters themselves, not through their frequency response."""
-    chain = PaperChain(zero_phase=zero_phase, trim_s=4.0)
+    chain = ChainTable(zero_phase=zero_phase, trim_s=4.0)
     time = np.arange(20000) / RATE
-    found = chain.amplitude(2.0 * np.cos(2 * np.pi * hz * time + 0.3), RATE)
-    assert found == pytest.approx(2.0 * chain.gain(hz), abs=2e-4)
-    assert (chain.gain(hz) < 1e-6) == (hz in (100.0, 150.0))
+    found = paper.amplitude(chain, 2.0 * np.cos(2 * np.pi * hz * time + 0.3), RATE)
+    assert found == pytest.approx(2.0 * paper.gain(chain, hz), abs=2e-4)
+    assert (paper.gain(chain, hz) < 1e-6) == (hz in (100.0, 150.0))
 
 
 def test_the_papers_chain_takes_other_rates() -> None:
     time = np.arange(102400) / 51200
-    found = PaperChain().amplitude(np.cos(2 * np.pi * 122 * time), 51200.0)
-    assert found == pytest.approx(PaperChain().gain(122), rel=2e-3)
+    found = paper.amplitude(ChainTable(), np.cos(2 * np.pi * 122 * time), 51200.0)
+    assert found == pytest.approx(paper.gain(ChainTable(), 122), rel=2e-3)
     with pytest.raises(Refusal, match=r"paper\.trim_s"):
-        PaperChain().amplitude(np.zeros(1000), 2000.0)
+        paper.amplitude(ChainTable(), np.zeros(1000), 2000.0)
 
 
 def test_a_levels_interval_is_welchs() -> None:
@@ -195,7 +194,7 @@ def test_a_levels_interval_is_welchs() -> None:
     welch = ttest_ind(np.log(edge), np.log(motor), equal_var=False).confidence_interval(0.95)
     assert (found.low, found.high) == pytest.approx((math.exp(welch.low), math.exp(welch.high)), rel=1e-9)
     assert found.repeats == (4, 3)
-    pairs = paired_level([a / b for a, b in zip(edge, motor, strict=False)])
+    pairs = level([a / b for a, b in zip(edge, motor, strict=False)])
     paired = ttest_rel(np.log(edge[:3]), np.log(motor)).confidence_interval(0.95)
     assert (pairs.low, pairs.high) == pytest.approx((math.exp(paired.low), math.exp(paired.high)), rel=1e-9)
     assert level(edge, motor, shared=0.1).high > found.high

@@ -11,9 +11,8 @@ import pytest
 
 from unitcad import catalogue
 from unitcad.estimating import estimate_input, estimate_spec
-from unitcad.lab.declared_columns import declared
-from unitcad.lab.tensile_curve import Specimen, read_curve
-from unitcad.lab.tensile_result import TensileResult, evaluate
+from unitcad.lab.columns import declared
+from unitcad.lab.tensile import Specimen, TensileResult, evaluate, read_curve
 from unitcad.validation import load
 
 DATA = Path(__file__).parent / "data" / "soft-robotics-materials-database"

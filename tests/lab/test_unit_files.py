@@ -22,10 +22,8 @@ from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
 from unitcad.files import sha256
-from unitcad.lab.campaign import read_campaign
-from unitcad.lab.campaign_files import check_files
-from unitcad.lab.fit_lab import load_fit_lab
-from unitcad.lab.fitting import fit_lab
+from unitcad.lab.campaign import check_files, read_campaign
+from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.spec import spec_hash, to_data
 from unitcad.validation import load
 

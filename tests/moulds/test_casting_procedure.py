@@ -11,21 +11,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from casting_rules import broken_rules
 from faulty_sets import set_of
 
-from unitcad.casting import figures, instructions, release_agent, written
+from unitcad.casting import figures, pouring, written
 from unitcad.casting import procedure as casting_procedure
-from unitcad.casting.bench_step import BenchStep
-from unitcad.casting.layer_grid import off_grid, unit_heights
+from unitcad.casting.figures import off_grid, unit_heights
+from unitcad.casting.pouring import Face
 from unitcad.casting.procedure import Procedure
-from unitcad.casting.release_agent import Face
-from unitcad.casting.rules import broken_rules
+from unitcad.casting.steps import BenchStep
 from unitcad.catalogue import materials
 from unitcad.designs.dimensions import Exit
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.spec import Spec
 from unitcad.text import number
 from unitcad.validation import load, templates
@@ -375,7 +375,7 @@ def test_agent_on_a_bond_face_breaks_a_rule(pour: int, face: Face) -> None:
 
 def test_agent_before_the_last_pour_breaks_a_rule(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted where the procedure is made: data and words are of one source."""
-    for module in (casting_procedure, instructions):
+    for module in (casting_procedure, pouring):
         monkeypatch.setattr(module, "agent_faces", lambda _moulds, step: (Face(step.cup, "bore"),))
     casting = procedure("three-layer")
     assert {fault.split(":")[0] for fault in broken_rules(casting)} == {"pour 1", "pour 2"}
@@ -393,7 +393,7 @@ def test_words_allow_agent_on_the_last_cups_bore_alone(name: str) -> None:
 def test_a_custom_design_of_two_layers_gets_no_agent() -> None:
     """Its last cup's bore may meet the first layer's edge, to which the second bonds."""
     moulds = set_of("custom/film-closed")
-    assert [release_agent.agent_faces(moulds, step) for step in moulds.plan.steps] == [(), ()]
+    assert [pouring.agent_faces(moulds, step) for step in moulds.plan.steps] == [(), ()]
 
 
 def words(*source: str) -> str:

@@ -19,7 +19,7 @@ from unitcad.moulds.complement import complement
 from unitcad.moulds.cup import cup_blank
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import cast_layers
-from unitcad.pipeline.build import Built, build
+from unitcad.pipeline.write import Built, build
 from unitcad.shape import Revolve, Shape, polygon, union
 from unitcad.validation import custom_templates, load, templates
 

@@ -24,7 +24,7 @@ SEGMENTS = 64
 
 
 def pieces(name: str) -> dict[str, Manifold]:
-    return {body.name: realise(body.shape, SEGMENTS) for body in coupon.bodies(printers()[name])}
+    return {body.name: realise(body.shape, SEGMENTS) for body in coupon.Coupon(printers()[name]).bodies()}
 
 
 @pytest.mark.parametrize("name", sorted(printers()))
@@ -33,19 +33,19 @@ def test_stations_have_the_clearances_they_say(name: str) -> None:
     plate = pieces(name)["coupon-plate"]
     assert len(plate.decompose()) == 1
     assert plate.genus() == 5
-    values, made = {fit.feature: fit.values_mm for fit in coupon.fits(printer)}, coupon.sizes(printer)
-    _, plug, tongue = (body.shape for body in coupon.bodies(printer))
+    values, made = {fit.feature: fit.values_mm for fit in coupon.Coupon(printer).fits.values()}, coupon.Coupon(printer)
+    _, plug, tongue = (body.shape for body in made.bodies())
     for i in range(5):
         # The plug, turned over, its handle on the plate: below the plate's face only its sides are near.
-        x = coupon.station_x(printer, i)
-        inside = moved(turned(plug, "x", 2), x, coupon.row(printer, "recess"), coupon.PLATE + 4)
+        x = made.x(i)
+        inside = moved(turned(plug, "x", 2), x, made.y("recess"), coupon.PLATE + 4)
         mesh = realise(inside, SEGMENTS)
         assert (mesh ^ plate).volume() < 1e-6
         below = mesh.trim_by_plane((0, 0, -1), 0.3 - coupon.PLATE)
         assert below.min_gap(plate, 1) == pytest.approx(values["recess"][i], abs=2 * GRID)
         if "ribs" in values:
             pressed = realise(
-                moved(turned(plug, "x", 2), x, coupon.row(printer, "ribs"), coupon.PLATE + made.boss + 4),
+                moved(turned(plug, "x", 2), x, made.y("ribs"), coupon.PLATE + made.boss + 4),
                 SEGMENTS,
             )
             # So far under the mouth a rib has its full depth, on a leaf or without.
@@ -63,9 +63,9 @@ def test_stations_have_the_clearances_they_say(name: str) -> None:
         strip = realise(moved(turned(tongue, "z", 2), x, 5, coupon.WINDOW_Z), SEGMENTS)
         assert strip.min_gap(plate, 1) == pytest.approx(values["window"][i], abs=GRID)
         hole = plate.slice(1.0).to_polygons()
-        radii = [max(math.dist(p, (x, coupon.row(printer, "hole"))) for p in loop) for loop in hole]
+        radii = [max(math.dist(p, (x, made.y("hole"))) for p in loop) for loop in hole]
         assert 2 * min(radii) / area_true(SEGMENTS) == pytest.approx(values["hole"][i], abs=2 * GRID)
-        around = CrossSection.square((coupon.WALL_LENGTH, 2.0), True).translate((x, coupon.row(printer, "wall")))
+        around = CrossSection.square((coupon.WALL_LENGTH, 2.0), True).translate((x, made.y("wall")))
         wall = (plate.slice(coupon.PLATE + 4) ^ around).bounds()
         assert min(wall[2] - wall[0], wall[3] - wall[1]) == pytest.approx(values["wall"][i], abs=GRID)
 
@@ -73,10 +73,10 @@ def test_stations_have_the_clearances_they_say(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(printers()))
 def test_its_toml_is_taken_by_a_spec(name: str) -> None:
     printer = printers()[name]
-    block = coupon.to_markdown(printer).split("```toml\n")[1].split("```")[0]
+    block = coupon.Coupon(printer).markdown().split("```toml\n")[1].split("```")[0]
     spec = from_data({**read("encapsulating"), **tomllib.loads(block)})
     assert spec.moulds.plinth_clearance_mm == float(printer.plinth_clearance_mm)
-    for fit in coupon.fits(printer):
+    for fit in coupon.Coupon(printer).fits.values():
         own = tomllib.loads(fit.toml(3))
         data = {**read("no-fpcb"), "moulds": {"printer": "mine"}, "printers": {"mine": {"like": name, **own}}}
         assert getattr(from_data(data).moulds, fit.key) == fit.values_mm[3]
@@ -96,7 +96,7 @@ def test_command_writes_a_folder(tmp_path: Path) -> None:
 
 
 def test_resin_coupon_prints_no_tongue(tmp_path: Path) -> None:
-    from unitcad.casting.coupon_files import write
+    from unitcad.casting.coupon import write
 
     assert not (write(printers()["sla"], tmp_path) / "coupon-tongue.stl").exists()
 
@@ -105,17 +105,17 @@ def test_resin_coupon_prints_no_tongue(tmp_path: Path) -> None:
 def test_windows_end_whole_layers_and_keep_the_clearance(name: str) -> None:
     printer = printers()[name]
     layer, thick = float(printer.layer_mm), float(printer.slot_height_mm)
-    around = next(fit.values_mm for fit in coupon.fits(printer) if fit.feature == "window")
-    for (low, high), clearance in zip(coupon._windows(printer), around, strict=True):
+    around = next(fit.values_mm for fit in coupon.Coupon(printer).fits.values() if fit.feature == "window")
+    for (low, high), clearance in zip(coupon.Coupon(printer).windows, around, strict=True):
         assert low / layer == pytest.approx(round(low / layer))
         assert high / layer == pytest.approx(round(high / layer))
         assert coupon.WINDOW_Z - low >= clearance - 1e-9
         assert high - coupon.WINDOW_Z - thick >= clearance - 1e-9
-    assert "differ in width only" in coupon.to_markdown(printer)
+    assert "differ in width only" in coupon.Coupon(printer).markdown()
 
 
 def test_resin_coupon_says_how_to_cut_the_tongue() -> None:
-    text = coupon.to_markdown(printers()["sla"])
+    text = coupon.Coupon(printers()["sla"]).markdown()
     assert "cut a strip 3.4 wide" in text
     assert "0.35 mm thick" in text
 
@@ -125,7 +125,7 @@ def test_a_cup_has_the_window_of_station_3_or_one_layer_more(name: str) -> None:
     """What the coupon's page says of cups, for every template's window."""
     printer = printers()[name]
     layer = float(printer.layer_mm)
-    low, high = coupon._windows(printer)[2]
+    low, high = coupon.Coupon(printer).windows[2]
     for template in templates():
         moulds = MouldSet(load(template, [f"moulds.printer={name}"]))
         for step in moulds.plan.steps if moulds.dimensions.exit else ():

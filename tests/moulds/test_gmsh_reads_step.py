@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from unitcad.pipeline import Variant
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.validation import load
 
 pytestmark = pytest.mark.skipif(shutil.which("gmsh") is None, reason="gmsh is not installed")

@@ -15,8 +15,8 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.kernels.mesh import bounds
 from unitcad.mould_checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.build import build
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
+from unitcad.pipeline.write import build
 from unitcad.shape import box, cut, moved
 from unitcad.validation import load, templates
 

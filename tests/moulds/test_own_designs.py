@@ -11,7 +11,7 @@ from faulty_sets import broken, of_spec
 
 from unitcad import designs
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.spec import custom_code
 from unitcad.validation import load, templates
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from faulty_sets import broken, set_of, with_fault
 
-from unitcad.casting.eccentricity import UNEVEN, eccentricity, shift_per_depth
+from unitcad.casting.figures import UNEVEN, eccentricity, shift_per_depth
 from unitcad.catalogue import printers
 from unitcad.errors import Refusal
 from unitcad.mould_checks import check_moulds

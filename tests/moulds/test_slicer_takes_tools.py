@@ -19,14 +19,19 @@ from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.ribs import SLOPE, ribs
 from unitcad.pipeline import slicing
-from unitcad.pipeline.build import build
-from unitcad.pipeline.folder import folder_name
+from unitcad.pipeline.write import build, subject
 from unitcad.validation import load, templates
 
 pytestmark = [
     pytest.mark.slicer,
     pytest.mark.skipif(slicer.program() is None, reason="PrusaSlicer is not installed"),
 ]
+
+
+def folder_name(spec):
+    return subject(spec).folder_name
+
+
 SETS = [(name,) for name in sorted(templates())] + [
     ("encapsulating", "moulds.cavities=[2,3]"),
     ("encapsulating", "moulds.pour=injected"),
@@ -146,7 +151,7 @@ def test_every_tool_slices(source: tuple[str, ...], tmp_path: Path) -> None:
 
 
 def test_coupon_needs_no_repair(tmp_path: Path) -> None:
-    for body in coupon.bodies(printers()["fdm-0.4"]):
+    for body in coupon.Coupon(printers()["fdm-0.4"]).bodies():
         file = tmp_path / f"{body.name}.stl"
         file.write_bytes(stl.content(*print_ready(*arrays(realise(body.shape, 64))), body.name))
         assert not slicer.needs_repair(file)

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from unitcad.cache import MemoryStore
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.validation import load
 

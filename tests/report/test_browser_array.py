@@ -12,7 +12,7 @@ from chromium import Visit
 from test_browser_variant import canvas, changed, drawn_share, shown
 
 from unitcad.arrays.array_file import load_array
-from unitcad.pipeline.array_build import build_array
+from unitcad.pipeline.write import build as build_array
 from unitcad.report import write_report
 
 SMALL = ["layout.columns=2", "layout.rows=2", "sheet.strap_slot_mm=[3, 8]", "output.formats=[]"]

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cast_records import spec_of
 from chromium import Visit
 
-from unitcad.casting.cast_record import ENDING, read_cast_record, spec_of
-from unitcad.pipeline.build import build
+from unitcad.casting.cast_record import ENDING, read_cast_record
+from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.spec import spec_hash
 from unitcad.validation import load

@@ -16,7 +16,7 @@ from chromium import Visit
 from unitcad.experiments.lab_file import load_lab
 from unitcad.experiments.study import study
 from unitcad.experiments.study_files import shown, write_study
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.validation import load
 

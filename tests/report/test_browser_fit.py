@@ -10,9 +10,8 @@ import pytest
 from chromium import Visit
 
 from unitcad.lab.fit_files import fit_toml
-from unitcad.lab.fit_lab import load_fit_lab
-from unitcad.lab.fitting import Fitted, fit_lab
-from unitcad.pipeline.build import build
+from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
+from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.validation import load
 

@@ -16,7 +16,7 @@ from unitcad.arrays.patch import patch_bodies, patch_parts
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.export import glb
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.pipeline.bodies import glb_content, patch_glb
+from unitcad.pipeline.plan import glb_content, patch_glb
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, cylinder
 from unitcad.validation import templates

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 from unitcad.cache import MemoryStore
 from unitcad.cli import app
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.report import page, read_results, write_report
 from unitcad.report.html_page import compressed
 from unitcad.report.pool import REFERENCE, Pool

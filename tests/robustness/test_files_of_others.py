@@ -17,12 +17,15 @@ from unitcad import files
 from unitcad.batch import BatchOptions, load_sweep, run
 from unitcad.batch.executors import SerialExecutor
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.build import build
-from unitcad.pipeline.folder import clear_leftovers, folder_name, replacing
+from unitcad.pipeline.write import build, clear_leftovers, replacing, subject
 from unitcad.report import write_report
 from unitcad.validation import load
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and pipes as POSIX has them")
+
+
+def folder_name(spec):
+    return subject(spec).folder_name
 
 
 def _letter(folder: Path) -> Path:

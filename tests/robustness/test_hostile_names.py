@@ -26,7 +26,7 @@ from unitcad.cli import app
 from unitcad.cli.output import say_error
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.export import drawing, threemf
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.spec import Spec, to_toml
 from unitcad.validation import from_data, read

@@ -17,7 +17,7 @@ import pytest
 from hostile_results import KINDS, SECRET
 
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.validation import load
 

@@ -21,7 +21,7 @@ sys.path.append(str(Path(__file__).parent.parent / "batch"))
 from batching import bytes_of, command, environment, leftovers, ring_sweep, rows
 
 from unitcad.batch.journal import JOURNAL
-from unitcad.pipeline.folder import whole
+from unitcad.pipeline.write import whole
 
 HEIGHTS = [float(height) for height in range(2, 10)]
 MATERIALS = 3

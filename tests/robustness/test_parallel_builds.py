@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.pipeline.folder import whole
+from unitcad.pipeline.write import whole
 
 FORMATS = ("stl", "3mf", "svg", "glb")
 OUTPUTS = ("unit", "estimate", "casting")

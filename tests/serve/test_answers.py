@@ -16,7 +16,7 @@ from unitcad.batch.sweep import from_file
 from unitcad.estimating import estimate_spec
 from unitcad.mould_checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.bodies import glb_content
+from unitcad.pipeline.plan import glb_content
 from unitcad.serve.messages import Field
 from unitcad.validation import load, templates
 

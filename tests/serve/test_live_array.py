@@ -25,11 +25,11 @@ from unitcad.arrays.patch import patch_parts
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import read_campaign
-from unitcad.lab.measured_charts import charts_of
+from unitcad.lab.measured_files import charts_of
 from unitcad.lab.measuring import measure
 from unitcad.mould_checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.bodies import patch_glb
+from unitcad.pipeline.plan import patch_glb
 from unitcad.serve.server import serve
 from unitcad.validation import templates
 

@@ -13,7 +13,7 @@ from unitcad.batch import BatchOptions, run
 from unitcad.batch.executors import SerialExecutor
 from unitcad.batch.sweep import from_file
 from unitcad.cache import MemoryStore
-from unitcad.pipeline.build import build
+from unitcad.pipeline.write import build
 from unitcad.report.page import page_data
 from unitcad.validation import load
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from unitcad.geometry.arrays import Floats
+from unitcad.lab.chains import CHAINS as SHIPPED
+from unitcad.lab.chains import paper
 from unitcad.lab.chains.chain import Chain, ChainTable
 from unitcad.lab.chains.line import fit_line
-from unitcad.lab.chains.paper import PaperChain
-from unitcad.lab.chains.signal_chains import CHAINS as SHIPPED
 
 BAND_HZ = (60.0, 250.0)
 
@@ -34,7 +35,7 @@ def flat_top(x: Floats, rate: float) -> float:
 
 def lock_in(x: Floats, rate: float) -> float:
     """Return the product with a carrier at the spectrum's peak, of fixed frequency, averaged over the inner 80 %."""
-    from unitcad.lab.chains.demodulation import coarse_frequency
+    from unitcad.lab.chains.line import coarse_frequency
 
     frequency = coarse_frequency(x, rate, BAND_HZ, 50.0)
     inner = slice(len(x) // 10, len(x) - len(x) // 10)
@@ -54,10 +55,12 @@ def _of(chain: Chain) -> Callable[[Floats, float], float]:
 
 
 CHAINS: dict[str, Callable[[Floats, float], float]] = {
-    "paper, zero-phase, half peak-to-peak, whole record": PaperChain(measure="peak", trim_s=0.0).amplitude,
-    "same, ends trimmed": PaperChain(measure="peak").amplitude,
-    "paper, zero-phase, RMS, trimmed": PaperChain().amplitude,
-    "paper, causal, RMS, trimmed": PaperChain(zero_phase=False).amplitude,
+    "paper, zero-phase, half peak-to-peak, whole record": partial(
+        paper.amplitude, ChainTable(measure="peak", trim_s=0.0)
+    ),
+    "same, ends trimmed": partial(paper.amplitude, ChainTable(measure="peak")),
+    "paper, zero-phase, RMS, trimmed": partial(paper.amplitude, ChainTable()),
+    "paper, causal, RMS, trimmed": partial(paper.amplitude, ChainTable(zero_phase=False)),
     "FFT peak, rectangular window": fft_peak,
     "FFT, flat-top window": flat_top,
     "lock-in, fixed frequency": lock_in,

@@ -8,11 +8,10 @@ from functools import partial
 from unitcad.accuracy.result import Cell, Result, Say, Table
 from unitcad.accuracy.timing import interleaved, machine
 from unitcad.cache import MemoryStore
-from unitcad.pipeline import bodies
-from unitcad.pipeline.artifacts import OUTPUTS
-from unitcad.pipeline.manifest_records import Manifest
-from unitcad.pipeline.product import make
-from unitcad.pipeline.stages import Stages
+from unitcad.pipeline import plan as bodies
+from unitcad.pipeline.make import Progress, make
+from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.plan import OUTPUTS
 from unitcad.validation import default_template, load, templates
 
 _ALL = ("step", "stl", "3mf", "svg", "glb")
@@ -54,4 +53,4 @@ def run(quick: bool, say: Say) -> Result:
 def _manifest(template: str, request: str) -> Manifest:
     only, formats, check = REQUESTS[request]
     bodies.forget()
-    return make(load(template, [f"output.formats={list(formats)}"]), only, check, MemoryStore(), Stages()).manifest
+    return make(load(template, [f"output.formats={list(formats)}"]), only, check, MemoryStore(), Progress()).manifest

@@ -13,9 +13,10 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, TypeVar
 
-from unitcad.batch.executors import WorkerDied, Workers
+from unitcad.batch.executors import Workers
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.versions import code_version
+from unitcad.pipeline.plan import code_version
+from unitcad.workers import WorkerEnded
 
 J = TypeVar("J")
 T = TypeVar("T")
@@ -44,7 +45,7 @@ def in_order(
             job, answer = running.popleft()
             try:
                 yield answer.result()
-            except WorkerDied:
+            except WorkerEnded:
                 yield late(job)
 
 

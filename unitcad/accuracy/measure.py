@@ -20,9 +20,10 @@ from unitcad.accuracy.synthetic_records import (
     synthetic,
 )
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, machine
+from unitcad.lab.chains import paper
+from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.chains.line import Mains, fit_line
-from unitcad.lab.chains.paper import PaperChain
-from unitcad.lab.levels import level
+from unitcad.lab.measuring import level
 
 SEED = 20240
 TRIALS, QUICK_TRIALS = 400, 100
@@ -61,7 +62,7 @@ def run(quick: bool, say: Say) -> Result:
         coverage.append(_coverage(scenario, trials))
     say("levels")
     repeats = [_level_coverage(count, 1000 if quick else 10000) for count in (3, 5)]
-    gains = [(hz, PaperChain().gain(hz), PaperChain(zero_phase=False).gain(hz)) for hz in _GAIN_HZ]
+    gains = [(hz, paper.gain(ChainTable(), hz), paper.gain(ChainTable(zero_phase=False), hz)) for hz in _GAIN_HZ]
     return Result(
         suite="measure",
         title="Signal chains of a measurement",
@@ -145,8 +146,8 @@ def run(quick: bool, say: Say) -> Result:
                 "Hz",
                 "gain",
                 {
-                    "forwards and backwards": tuple((hz, max(PaperChain().gain(hz), 1e-4)) for hz in _FINE_HZ),
-                    "forwards": tuple((hz, max(PaperChain(zero_phase=False).gain(hz), 1e-4)) for hz in _FINE_HZ),
+                    "forwards and backwards": tuple((hz, max(paper.gain(ChainTable(), hz), 1e-4)) for hz in _FINE_HZ),
+                    "forwards": tuple((hz, max(paper.gain(ChainTable(zero_phase=False), hz), 1e-4)) for hz in _FINE_HZ),
                 },
                 curves=("forwards and backwards", "forwards"),
                 linear_x=True,
@@ -164,7 +165,7 @@ def run(quick: bool, say: Say) -> Result:
             ),
             *(Promise(f"level from {r[0]} + {r[0]}: part outside 95 %", round(1 - r[1], 6), 0.06) for r in repeats),
             *(Promise(f"level from {r[0]} + {r[0]}: part within 95 %", r[1], 0.98) for r in repeats),
-            Promise("paper: gain at 100 Hz", PaperChain().gain(100.0), 1e-6),
+            Promise("paper: gain at 100 Hz", paper.gain(ChainTable(), 100.0), 1e-6),
         ),
         measured={**machine("numpy", "scipy"), "records": trials, "seed": SEED},
         summary=_summary(rows, coverage),

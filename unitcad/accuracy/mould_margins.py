@@ -12,9 +12,8 @@ from unitcad.accuracy.timing import machine, timing
 from unitcad.cache import MemoryStore
 from unitcad.errors import Refusal
 from unitcad.mould_checks import mould_checks
-from unitcad.pipeline.manifest_records import FindingRecord
-from unitcad.pipeline.product import make
-from unitcad.pipeline.stages import Stages
+from unitcad.pipeline.make import Progress, make
+from unitcad.pipeline.manifest import FindingRecord
 from unitcad.spec import Spec
 from unitcad.validation import default_template, from_data, load
 
@@ -86,7 +85,7 @@ def run(quick: bool, say: Say) -> Result:
 
 def _seconds(spec: Spec) -> tuple[float, list[FindingRecord]]:
     """Return the seconds that the mould checks of a spec take, and what they found. Raises Refusal."""
-    stages = Stages()
+    stages = Progress()
     manifest = make(spec, ("unit", "moulds"), True, MemoryStore(), stages).manifest
     return stages.seconds["mould checks"], manifest["laws"]
 

@@ -39,7 +39,7 @@ class Outcome:
 
 def build_outcome(data: dict[str, Any]) -> Outcome:
     """Build unit and moulds of a spec's data, with all checks, into a folder that is removed afterwards."""
-    from unitcad.pipeline.build import build
+    from unitcad.pipeline.write import build
     from unitcad.validation import from_data
 
     start = time.perf_counter()

@@ -14,11 +14,9 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array, with_formats
 from unitcad.arrays.array_names import is_array
 from unitcad.pipeline import Variant
-from unitcad.pipeline.array_build import build_array
-from unitcad.pipeline.artifacts import OUTPUTS
-from unitcad.pipeline.build import Built
-from unitcad.pipeline.build import build as build_spec
-from unitcad.pipeline.folder import PAGE, held
+from unitcad.pipeline.plan import OUTPUTS
+from unitcad.pipeline.write import PAGE, Built, held
+from unitcad.pipeline.write import build as build_whole
 from unitcad.spec import Spec
 from unitcad.spec.asked import Format
 from unitcad.validation import Changes, Source, load
@@ -97,13 +95,13 @@ def build(
         if formats is not None:
             array = with_formats(array, texts("formats", formats))
         spec = array.unit
-        built = build_array(array, into, only=texts("only", only), check=check, say=say)
+        built = build_whole(array, into, only=texts("only", only), check=check, say=say)
     else:
         assert not isinstance(source, Array)
         spec = load(source, set)
         if formats is not None:
             spec = load(spec, {"output.formats": texts("formats", formats)})
-        built = build_spec(spec, into, only=texts("only", only), check=check, say=say)
+        built = build_whole(spec, into, only=texts("only", only), check=check, say=say)
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
         from unitcad.report import write_report
 

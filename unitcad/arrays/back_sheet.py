@@ -21,6 +21,7 @@ from unitcad.arrays.fins import fins, least_apart
 from unitcad.arrays.outlines import rounded, slot_profile
 from unitcad.arrays.tail_ways import CLEAR
 from unitcad.designs import design_of, dimensions, layer_colour, shipped
+from unitcad.designs.design import Fitting
 from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
 from unitcad.moulds.plan import Plan
@@ -107,16 +108,19 @@ def greased(array: Array, pour: int) -> str:
     )
 
 
-def assembly(array: Array) -> tuple[str, ...]:
+def assembly(array: Array) -> tuple[Fitting, ...]:
     """Write how the circuit is laid in, with all motors on it."""
-    return (
+    solder = (
         f"Solder the {len(array.places)} motors to the circuit's pads, their backs on it, and try each one. Lay the "
-        "patch on its back, the cavities up.",
+        "patch on its back, the cavities up."
+    )
+    lay_in = (
         "Put a smear of Layer 1's silicone on each pad, where the cap of Layer 1 will touch it (assumed: silicone "
         "bonds poorly to bare metal and polyimide; a primer or a silicone adhesive holds better). Lay the circuit in "
         "from the skin's side, motor by motor, its rows in the notches, and push each motor in until its pad lies "
-        "against that cap. The spine lies free between the units. The notches may be filled with the same silicone.",
+        "against that cap. The spine lies free between the units. The notches may be filled with the same silicone."
     )
+    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, silicone=1, smear=True)
 
 
 CONSTRUCTION = Construction(

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from unitcad.arrays.patch_moulds import PatchMoulds
-from unitcad.casting.bench_step import BenchStep
-from unitcad.casting.bench_views import picture_path
 from unitcad.casting.procedure import Procedure, procedure
+from unitcad.casting.steps import BenchStep
+from unitcad.casting.views import picture_path
 
 
 def back_sheet_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:

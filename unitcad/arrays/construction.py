@@ -12,6 +12,7 @@ from typing import NamedTuple
 from unitcad.arrays.array import Array, Sheet
 from unitcad.arrays.array_tables import Cast
 from unitcad.arrays.array_tables import Construction as Name
+from unitcad.designs.design import Fitting
 from unitcad.errors import Refusal
 from unitcad.moulds.plan import Plan
 from unitcad.shape.body import Body
@@ -52,7 +53,7 @@ class Construction:
     bodies: Callable[[Array], tuple[Body, ...]]
     plan: Callable[[Array], Plan]
     unfit: Callable[[Spec, Sheet], str] = lambda _, __: ""
-    assembly: Callable[[Array], tuple[str, ...]] = lambda _: ()
+    assembly: Callable[[Array], tuple[Fitting, ...]] = lambda _: ()
     greased: Callable[[Array, int], str] = lambda _, __: ""
     cast: Cast = "flat"
 

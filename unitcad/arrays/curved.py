@@ -24,6 +24,7 @@ from unitcad.arrays.fins import fins
 from unitcad.arrays.limb_frame import barrel, bent, inside_of_end, strap_slot
 from unitcad.arrays.limb_limits import check_limb
 from unitcad.designs import design_of, dimensions, layer_colour
+from unitcad.designs.design import Fitting
 from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
 from unitcad.moulds.plan import Plan
@@ -115,14 +116,14 @@ def plan(array: Array) -> Plan:
     return curved_plan(array, back_sheet.layers(array)[:-1], laid_in(array), poured(array))
 
 
-def assembly(array: Array) -> tuple[str, ...]:
+def assembly(array: Array) -> tuple[Fitting, ...]:
     """Write how the flat circuit is laid into the sleeve."""
     solder, lay_in = back_sheet.assembly(array)
     flat = (
         "Open the sleeve until it lies flat and tape its ends down: the circuit is flat, as long as the sheet laid "
         "flat, and bends with the sleeve when it is worn. It stays flat until the smear is cured."
     )
-    return f"{solder} {flat}", lay_in
+    return replace(solder, text=f"{solder.text} {flat}"), lay_in
 
 
 CONSTRUCTION = Construction(

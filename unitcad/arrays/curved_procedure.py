@@ -13,24 +13,35 @@ from unitcad import catalogue
 from unitcad.arrays.array import Array
 from unitcad.arrays.back_sheet_procedure import motors_in
 from unitcad.arrays.patch_moulds import PatchMoulds
-from unitcad.casting import figures as fig
-from unitcad.casting.bench_step import BenchStep
-from unitcad.casting.bench_views import picture_path, views
 from unitcad.casting.bill import Item, bill, injecting
-from unitcad.casting.finishing import motor_in, never_pushed, smears
-from unitcad.casting.finishing import release as flat_release
-from unitcad.casting.finishing import shown as grams_shown
-from unitcad.casting.holding import lid_held
-from unitcad.casting.instructions import cure, draw_up, inject, mixed, pour_steps, rest
-from unitcad.casting.needs import needs
+from unitcad.casting.figures import (
+    LAY_IN_MIN,
+    LIFT_MIN,
+    PEEL_MIN,
+    PULL_MIN,
+    Batch,
+)
+from unitcad.casting.pouring import (
+    BondFace,
+    Face,
+    cure,
+    injected,
+    lid_held,
+    mixed,
+    motor_in,
+    never_pushed,
+    pour_steps,
+    smears,
+)
+from unitcad.casting.pouring import release as flat_release
+from unitcad.casting.pouring import shown as grams_shown
 from unitcad.casting.preparation import printing
-from unitcad.casting.procedure import Procedure, bubbles, pour_of, procedure
-from unitcad.casting.release_agent import BondFace, Face
-from unitcad.casting.time_line import phases
+from unitcad.casting.procedure import Procedure, pour_of, procedure, times
+from unitcad.casting.steps import BenchStep
+from unitcad.casting.views import picture_path, views
 from unitcad.catalogue import Material
 from unitcad.moulds.plan import Step
 from unitcad.shape.lettering import seen
-from unitcad.spec import Spec
 from unitcad.text import listed, number, spaced
 
 
@@ -42,48 +53,38 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
     flat = moulds.cast_flat
     assert flat is not None
     made, shown = procedure(flat, layer_volumes_mm3[:-1], printed_mm3), views(flat)
-    spec, step, volume = _injected(moulds.spec), moulds.plan.steps[-1], layer_volumes_mm3[-1]
-    under_lid = PatchMoulds(spec, moulds.plan, array=moulds.array)
-    known = catalogue.materials(spec.materials)
+    spec, step = moulds.spec, moulds.plan.steps[-1]
+    injected_spec = structs.replace(spec, moulds=structs.replace(spec.moulds, pour="injected"))
+    under_lid = PatchMoulds(injected_spec, moulds.plan, array=moulds.array)
+    known, cells = catalogue.materials(spec.materials), len(flat.plan.layout.cells)
     silicones = [known[each.material] for each in moulds.plan.steps]
-    last = silicones[-1]
-    mix = fig.mix(spec, last, volume + fig.channels_mm3(step))
-    verdict = bubbles(spec, step, last, mix, 1)
-    prepared = (_sort(moulds), *made.preparation[1:])
-    mixes = [
-        (silicone, fig.mix(flat.spec, silicone, v))
-        for silicone, v in zip(silicones[:-1], layer_volumes_mm3[:-1], strict=True)
-    ]
     # In the words of the whole set: what is cast flat bonds later, so its cup gets no release agent.
+    flat_batches = [
+        Batch(moulds, each, silicone, volume, cells)
+        for each, silicone, volume in zip(flat.plan.steps, silicones[:-1], layer_volumes_mm3[:-1], strict=True)
+    ]
+    batch = Batch(under_lid, step, silicones[-1], layer_volumes_mm3[-1], 1)
     flat_pours = tuple(
-        replace(each, agent=(), steps=tuple(pour_steps(moulds, flat_step, *mixed_of, each.verdict, shown)))
-        for each, flat_step, mixed_of in zip(made.pours, flat.plan.steps, mixes, strict=True)
+        replace(each, agent=(), steps=tuple(pour_steps(of, shown)))
+        for each, of in zip(made.pours, flat_batches, strict=True)
     )
     steps = (
         *_laid_in(moulds, flat, silicones[0]),
         *_lid_on(moulds, step),
-        *mixed(under_lid, step, last, mix, verdict),
-        draw_up(mix),
-        *(() if spec.casting.vacuum else (rest(spec, step, last, verdict),)),
-        inject(under_lid, _picture(step, "inject")),
-        cure(under_lid, step, last, _picture(step, "filled")),
+        *mixed(batch),
+        *injected(batch, _picture(step, "inject")),
+        cure(batch, "the bead on a vent", "layer", _picture(step, "filled")),
         _lid_off(moulds, step),
     )
-    pour = pour_of(under_lid, step, last, mix, volume, verdict, steps)
-    pours, out = (*flat_pours, pour), tuple(_out(moulds, silicones[0]))
-    together = motors_in(tuple(motor_in(moulds, silicones)))
-    stages = [("preparation", prepared), *((f"pour {each.index}", each.steps) for each in pours)]
-    stages.append(("out of the mould", out))
-    until, line = phases(stages), phases([*stages, ("motors and circuit in", together)])
+    pours, prepared = (*flat_pours, pour_of(batch, steps)), (_sort(moulds), *made.preparation[1:])
+    out, together = tuple(_out(moulds, silicones[0])), motors_in(tuple(motor_in(moulds, silicones)))
     every = [*prepared, *(each for one in pours for each in one.steps), *out, *together]
     grams = [v * float(s.density_g_cm3) / 1000 for v, s in zip(layer_volumes_mm3, silicones, strict=True)]
     return replace(
         made,
         name=spec.name,
         label=moulds.plan.label,
-        earliest_finish_min=until[-1].end_min,
-        bench_min=sum(phase.bench_min for phase in until),
-        time_line=line,
+        **times(prepared, pours, out, "motors and circuit in", together),
         printing=printing(moulds, printed_mm3, max(_heights(moulds))),
         preparation=prepared,
         pours=pours,
@@ -91,7 +92,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         release=out,
         assembly=together,
         measure=tuple(_measure(moulds, grams)),
-        bill=(*_bill(moulds, [*mixes, (last, mix)], every), *injecting(spec, [mix])),
+        bill=(*_bill(moulds, [*flat_batches, batch], every), *injecting([batch])),
         last="Motors and circuit in",
     )
 
@@ -109,10 +110,6 @@ def _heights(moulds: PatchMoulds) -> Iterator[float]:
             yield high - low
 
 
-def _injected(spec: Spec) -> Spec:
-    return structs.replace(spec, moulds=structs.replace(spec.moulds, pour="injected"))
-
-
 def _base(moulds: PatchMoulds) -> str:
     """Return what the base of the last pour is called."""
     return spaced(moulds.plan.base_of(moulds.plan.steps[-1]))
@@ -128,7 +125,7 @@ def _sort(moulds: PatchMoulds) -> BenchStep:
         f"for Layer 1: the base has a b before it, and of the cups {cups}. The curved ones are for the last pour: "
         f"{_base(moulds)} has B{last.index:X} before it, {spaced(last.lid or '')} L{last.index:X}.",
         picture_path("pieces"),
-        minutes=fig.SORT_MIN,
+        minutes=5.0,
     )
 
 
@@ -145,7 +142,8 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         "in the notches of the circuit: lay each down on paper at its own place, the same way round as in the mould. "
         "Trim the flash with small scissors.",
         picture_path("flat-peel"),
-        minutes=fig.PEEL_MIN * units,
+        minutes=PEEL_MIN * units,
+        needs=("small scissors", "blunt spatula", "paper"),
     )
     yield BenchStep(
         f"Filament into {base}",
@@ -154,7 +152,8 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         "flat board: it bears the filaments, so none can sink. Trim the upper end flush with the core's top with a "
         "knife.",
         _picture(step, "filament"),
-        minutes=fig.FILAMENT_MIN * units,
+        minutes=3.0 * units,
+        needs=("sharp knife",),
     )
     yield BenchStep(
         f"Level {base}",
@@ -163,13 +162,15 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         f"much the vents clear (C400). Lift {lid} off again. {base.capitalize()} stays there: it is filled and cured "
         "on this spot.",
         _picture(step, "level"),
-        minutes=fig.LEVEL_MIN,
+        minutes=5.0,
+        needs=("level", "paper"),
     )
     yield BenchStep(
         f"Wipe {cast}",
         f"Wipe {cast} with isopropanol and let it dry. Its outside is the bond face: no release agent on it, ever, no "
         "grease, no fingers.",
-        minutes=fig.WIPE_MIN * units,
+        minutes=2.0 * units,
+        needs=("isopropanol and lint-free wipes",),
     )
     yield BenchStep(
         f"Lay {cast} in",
@@ -177,7 +178,7 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         "Press its edge down all round until it lies on the floor of its moat and its top flat on the core: what "
         "creeps under it fills the cavity's mouth. No release agent and no grease on core or moat.",
         _picture(step, "laid-in"),
-        minutes=fig.LAY_IN_MIN * units / 2,
+        minutes=LAY_IN_MIN * units / 2,
     )
 
 
@@ -204,7 +205,8 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
         f"Press it down until it bears on the land all round; at both ends, beside the pins, a slit of {slit} mm stays "
         "open.",
         _picture(step, "lid-on"),
-        minutes=fig.LIFT_MIN,
+        minutes=LIFT_MIN,
+        needs=("petroleum jelly",),
     )
     yield lid_held(step, _picture(step, "lid-held"))
 
@@ -216,7 +218,8 @@ def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
         f"both a little at a time, until {spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents "
         "tear off at the sheet. Trim them flush with a knife.",
         _picture(step, "lid-off"),
-        minutes=fig.LIFT_MIN,
+        minutes=LIFT_MIN,
+        needs=("sharp knife",),
     )
 
 
@@ -228,7 +231,8 @@ def _out(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
         f"Lift the mould off the bench and lay {base} on its side. Take each filament with pliers in its pocket and "
         f"pull it out along itself: {never_pushed(moulds.spec, inner)}",
         picture_path("filament-out"),
-        minutes=fig.PULL_MIN * units,
+        minutes=PULL_MIN * units,
+        needs=("narrow pliers",),
     )
     yield BenchStep(
         "Peel off",
@@ -236,7 +240,8 @@ def _out(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
         "core square to the base at its place, row after row. Straight up only the middle ones come. The "
         "picture shows the way of each part; the sheet stays in one piece. Trim the flash with small scissors.",
         picture_path("peel"),
-        minutes=fig.PEEL_MIN * units,
+        minutes=PEEL_MIN * units,
+        needs=("small scissors", "blunt spatula"),
     )
 
 
@@ -261,10 +266,10 @@ def _measure(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
     yield f"Weigh one {moulds.makes}, trimmed, without motors and circuit: {weights} g. Less means air."
 
 
-def _bill(moulds: PatchMoulds, mixes: list[tuple[Material, fig.Mix]], steps: Sequence[BenchStep]) -> Iterator[Item]:
+def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchStep]) -> Iterator[Item]:
     """Yield the bill of the whole set, its filaments told apart: bent ones, and straight ones."""
     places = len(moulds.arranged.places)
-    for item in bill(moulds, mixes, needs(steps), smears(moulds, [silicone for silicone, _ in mixes])):
+    for item in bill(moulds, batches, steps, smears(moulds, [batch.silicone for batch in batches])):
         if item.item == "filament stub":
             size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
             yield replace(item, quantity=item.quantity - places)

@@ -19,6 +19,7 @@ from unitcad.arrays.made_plan import made_plan
 from unitcad.arrays.offers import offered, with_other_ways
 from unitcad.arrays.patch import SHEET, patch_bodies
 from unitcad.designs import Dimensions, unit_bodies
+from unitcad.designs.design import Fitting
 from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet, geometric
 from unitcad.moulds.plan import Plan, Step
@@ -171,7 +172,7 @@ class PatchMoulds(MouldSet):
         return "array.toml"
 
     @property
-    def assembly(self) -> tuple[str, ...]:
+    def assembly(self) -> tuple[Fitting, ...]:
         """How motors and circuit go in, in the construction's words."""
         return self.construction.assembly(self.arranged)
 

@@ -4,34 +4,34 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.hidden_tails import hidden_tails
 from unitcad.arrays.patch_moulds import PatchMoulds
 from unitcad.casting.bill import Item, consumed
-from unitcad.casting.figures import Mix
-from unitcad.casting.needs import CALIPER, NEEDS, Need
+from unitcad.casting.figures import Batch
 from unitcad.casting.procedure import Procedure
-from unitcad.catalogue import Material
+from unitcad.casting.steps import NEEDS, BenchStep
 from unitcad.text import number
 
-ONCE = frozenset(need.item for need in (*NEEDS, CALIPER))
+ONCE = frozenset(NEEDS)
 """What one piece, dab or roll of is enough for every casting."""
 
 
 def pocket_bill(
-    moulds: PatchMoulds, silicone: Material, mix: Mix, named: Sequence[Need], units: Mapping[str, Procedure]
+    moulds: PatchMoulds, batch: Batch, steps: Iterable[BenchStep], units: Mapping[str, Procedure]
 ) -> tuple[Item, ...]:
-    """Return the bill of units and sheet. `mix`: of the sheet; `named`: by its steps; `units` by their folder."""
+    """Return the bill of units and sheet. `batch` and `steps`: of the sheet; `units` by their folder."""
+    silicone, mix = batch.silicone, batch.mix
     net = f"sheet: {number(mix.net_g, 3)} g net"
     own = [
         *_pieces(moulds),
         Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", net),
         Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", net),
         *_wires(moulds.arranged),
-        *consumed(moulds, [mix], named),
+        *consumed(moulds, [batch], steps),
     ]
     return tuple(_added([*_scaled(moulds.arranged, units), *own]))
 

@@ -13,19 +13,13 @@ from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch_moulds import PatchMoulds
 from unitcad.arrays.pocket_bill import castings, counts, pocket_bill
 from unitcad.arrays.tray import hold_strain
-from unitcad.casting import figures as fig
-from unitcad.casting.bench_step import BenchStep
-from unitcad.casting.bench_views import picture_path
-from unitcad.casting.figures import STRIKE_AGAIN_MIN, at_room
-from unitcad.casting.finishing import shown
-from unitcad.casting.instructions import TACK, mixed
-from unitcad.casting.joining import joining
-from unitcad.casting.needs import needs
-from unitcad.casting.plates import mould_plates
-from unitcad.casting.preparation import cleaning, fall, printing
-from unitcad.casting.procedure import Procedure, bubbles, pour_of
-from unitcad.casting.time_line import Phase, duration, phases
-from unitcad.catalogue import Material
+from unitcad.casting.bill import mould_plates
+from unitcad.casting.figures import PEEL_MIN, Batch
+from unitcad.casting.pouring import cure, mixed, shown, struck
+from unitcad.casting.preparation import cleaning, fall, joining, level, printing
+from unitcad.casting.procedure import Procedure, pour_of
+from unitcad.casting.steps import BenchStep, Phase, duration, phases
+from unitcad.casting.views import picture_path
 from unitcad.check.findings import counted
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.lettering import seen
@@ -47,25 +41,42 @@ def pocket_procedure(
     """
     array, spec, (step,) = moulds.arranged, moulds.spec, moulds.plan.steps
     silicone = catalogue.materials(spec.materials)[step.material]
-    mix = fig.mix(spec, silicone, sheet_mm3)
-    verdict = bubbles(spec, step, silicone, mix, 1)
+    batch = Batch(moulds, step, silicone, sheet_mm3, 1)
     cast = tuple(_units(array, units))
     prepared = (
-        BenchStep("Sort the pieces", _sort(moulds), picture_path("pieces"), minutes=fig.SORT_MIN),
+        BenchStep("Sort the pieces", _sort(moulds), picture_path("pieces"), minutes=5.0),
         *cleaning(moulds, [silicone]),
-        *joining(moulds, picture_path("join")),
-        BenchStep("Level the bench", _level(moulds), picture_path("level"), minutes=fig.LEVEL_MIN),
+        *joining(moulds),
+        # The sheet must not get thinner at one end by more than a dent.
+        level(
+            f"{fall(moulds)}. Put the tray where it will stay. Lay a phone with its level, or a small spirit level, on "
+            "the cores, which are as high as the wall, along the tray and across, and put paper under a corner until "
+            "it shows less. The tray stays there: it is poured and cured on this spot."
+        ),
     )
-    poured = tuple(_pour(moulds, silicone, mix, verdict))
+    poured = (
+        *mixed(batch),
+        *struck(
+            batch,
+            "Pour in a thin thread, first along the wall and round every core, until the tray stands over its rim and "
+            "the cores are covered. Prick the bubbles that you see with a pin.",
+            "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke from end to "
+            "end: it runs on rim and cores. What it takes goes into the groove.",
+            " The film that it leaves on the cores cures too and is trimmed at the end.",
+            len(array.places),
+            1,
+            picture_path,
+        ),
+        cure(batch, "the silicone in the groove", "sheet", picture_path("filled")),
+    )
     out = tuple(_out(moulds))
     together = tuple(_together(array, moulds))
     sheet = [("sheet: preparation", prepared), ("sheet: pour", poured), ("sheet: out of the mould", out)]
     until = _side_by_side(phases([("units", cast)]), phases(sheet), _first_cure(units))
     finish = max(phase.end_min for phase in until)
     line = (*until, *_later(phases([("units in", together)]), finish))
-    pour = replace(pour_of(moulds, step, silicone, mix, sheet_mm3, verdict, poured), layer="sheet")
+    pour = replace(pour_of(batch, poured), layer="sheet")
     grams = sheet_mm3 * float(silicone.density_g_cm3) / 1000
-    named = needs([*prepared, *poured, *out, *together])
     return Procedure(
         name=array.name,
         label=moulds.plan.label,
@@ -87,7 +98,7 @@ def pocket_procedure(
         eccentricity=None,
         without_ribs=None,
         walls=(),
-        bill=pocket_bill(moulds, silicone, mix, named, units),
+        bill=pocket_bill(moulds, batch, [*prepared, *poured, *out, *together], units),
         makes="sheet",
         last="Units in",
     )
@@ -156,58 +167,6 @@ def _printing(moulds: PatchMoulds, solid_mm3: float, array: Array, folders: Iter
     yield f"The units' moulds: {listed(files)}, as their casting.md says."
 
 
-def _level(moulds: PatchMoulds) -> str:
-    """Say how level the tray must lie: the sheet must not get thinner at one end by more than a dent."""
-    return (
-        f"{fall(moulds)}. Put the tray where it will stay. Lay a phone with its level, or a small spirit level, on the "
-        "cores, which are as high as the wall, along the tray and across, and put paper under a corner until it shows "
-        "less. The tray stays there: it is poured and cured on this spot."
-    )
-
-
-def _pour(moulds: PatchMoulds, silicone: Material, mix: fig.Mix, verdict: str) -> Iterator[BenchStep]:
-    spec, (step,) = moulds.spec, moulds.plan.steps
-    yield from mixed(moulds, step, silicone, mix, verdict)
-    rests = fig.rest_min(spec, step.rim, silicone)
-    if not spec.casting.vacuum and not rests:
-        yield BenchStep("Brush a first coat", verdict, minutes=fig.BRUSH_MIN)
-    yield BenchStep(
-        "Pour",
-        "Pour in a thin thread, first along the wall and round every core, until the tray stands over its rim and the "
-        "cores are covered. Prick the bubbles that you see with a pin.",
-        picture_path("pour"),
-        kind="pour",
-        minutes=fig.pouring_min(len(moulds.arranged.places)) - fig.STRIKE_MIN,
-    )
-    if rests and not spec.casting.vacuum:
-        yield BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=rests)
-    yield BenchStep(
-        "Strike off",
-        "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke from end to end: "
-        "it runs on rim and cores. What it takes goes into the groove.",
-        picture_path("strike"),
-        minutes=fig.STRIKE_MIN,
-    )
-    yield BenchStep(
-        "Wait, strike again",
-        f"Wipe it. Top up and strike again after {number(STRIKE_AGAIN_MIN, 3)} min (assumed). The film that it leaves "
-        "on the cores cures too and is trimmed at the end.",
-        picture_path("strike"),
-        kind="rest",
-        minutes=fig.STRIKE_MIN,
-        wait_min=STRIKE_AGAIN_MIN - fig.STRIKE_MIN,
-    )
-    hours = at_room(float(silicone.cure_h), spec.casting.room_c)
-    yield BenchStep(
-        "Cure",
-        f"Let it cure, level, for {number(hours, 2)} h. Touch the silicone in the groove, not the sheet, to see "
-        f"whether it is done: {TACK}.",
-        picture_path("filled"),
-        kind="cure",
-        wait_min=60 * hours,
-    )
-
-
 def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
     thick = number(moulds.arranged.sheet.thickness_mm, 3)
     yield BenchStep(
@@ -216,7 +175,8 @@ def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
         f"the sheet off slowly, up over the cores: it is {thick} mm thick and tears at a notch. Trim the flash round "
         "the pockets and strap slots with small scissors.",
         picture_path("peel"),
-        minutes=fig.PEEL_MIN * 2,
+        minutes=PEEL_MIN * 2,
+        needs=("small scissors", "blunt spatula"),
     )
 
 
@@ -230,6 +190,7 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
             "the connector needs, and try the motor again. They leave between sheet and skin. Longer tails need none "
             f"where the way is free. {longer_tails(hidden)}",
             minutes=SOLDER_MIN * len(hidden),
+            needs=("soldering iron and solder",),
         )
     strains = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units}
     stretch = listed(f"{number(100 * one, 2)} % round {number(size, 3)} mm" for size, one in sorted(strains.items()))

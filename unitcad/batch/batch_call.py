@@ -20,8 +20,7 @@ from unitcad.batch.run import Watch, batch_head, counted, run, trim
 from unitcad.batch.shards import shard_of, store_of
 from unitcad.batch.sweep import Sweep, load_sweep
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
-from unitcad.pipeline.artifacts import OUTPUTS
-from unitcad.pipeline.product import checked_outputs
+from unitcad.pipeline.plan import OUTPUTS, checked_outputs
 from unitcad.report.batch_table import read_batch
 from unitcad.spec.asked import Format
 from unitcad.text import toml

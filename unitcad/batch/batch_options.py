@@ -8,7 +8,7 @@ from pathlib import Path
 
 from unitcad.batch.shards import Shard
 from unitcad.cache import DEFAULT_LIMIT_MB
-from unitcad.pipeline.artifacts import OUTPUTS
+from unitcad.pipeline.plan import OUTPUTS
 
 
 @dataclass(frozen=True)

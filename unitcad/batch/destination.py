@@ -15,7 +15,7 @@ from unitcad.batch.record_packs import export, intact, packed_specs
 from unitcad.batch.task import Task, VariantOutcome
 from unitcad.cache import DiskStore, MissingContent, SharedStore, digest
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.folder import whole
+from unitcad.pipeline.write import whole
 
 
 class Destination(Protocol):

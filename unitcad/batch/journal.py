@@ -24,7 +24,7 @@ from msgspec import ValidationError, convert, structs, to_builtins
 from unitcad import files
 from unitcad.batch.batch_records import BatchHead, JournalEntry
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.versions import code_version
+from unitcad.pipeline.plan import code_version
 
 JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
 SHARDS = "shard-*-of-*"

@@ -19,7 +19,7 @@ from unitcad.batch.unread_keys import swept_estimate
 from unitcad.batch.unread_keys import warnings as unread_warnings
 from unitcad.cache import DiskStore, MissingContent, SharedStore, default_root
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.folder import ADDRESS, STORE
+from unitcad.pipeline.write import ADDRESS, STORE
 from unitcad.text import listed
 
 

@@ -17,10 +17,10 @@ from unitcad.batch.unread_keys import warnings as unread_warnings
 from unitcad.cache import MemoryStore
 from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.bodies import body_key, groups
-from unitcad.pipeline.product import checked_outputs
-from unitcad.pipeline.stages import Stages
-from unitcad.pipeline.subjects import Made, key_of, outputs_of, product_of
+from unitcad.pipeline.make import Progress
+from unitcad.pipeline.plan import body_key, checked_outputs, groups
+from unitcad.pipeline.write import subject
+from unitcad.spec import Spec
 
 LOOKED_AT = 20_000
 """Variants whose geometry is worked out; of a larger sweep the rest is estimated in proportion."""
@@ -42,7 +42,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     indices = options.shard.indices(whole) if options.shard else range(whole)
     count = len(indices)
     looked = min(count, LOOKED_AT)
-    geometries: dict[str, Made] = {}
+    geometries: dict[str, Spec | Array] = {}
     refused: list[RefusedVariant] = []
     accepted = 0
     for index in indices[:looked]:
@@ -52,7 +52,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
             refused.append(RefusedVariant(index, sweep.faults(index, error)))
             continue
         accepted += 1
-        geometries.setdefault(key_of(spec, only, options.check), spec)
+        geometries.setdefault(subject(spec).key(only, options.check), spec)
     if refused and not accepted:
         raise UnitcadError(f"every variant is refused, the first: {refused[0].reason}")
     share = count / max(looked, 1)
@@ -86,20 +86,20 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     )
 
 
-def _distinct_parts(specs: list[Made], only: tuple[str, ...]) -> int:
+def _distinct_parts(specs: list[Spec | Array], only: tuple[str, ...]) -> int:
     """Count the different bodies of these specs."""
     keys = set()
     for spec in specs:
         moulds = patch_moulds(spec) if isinstance(spec, Array) else MouldSet(spec)
-        for group in groups(moulds, outputs_of(spec, only)):
+        for group in groups(moulds, subject(spec).outputs(only)):
             keys |= {body_key(moulds, body, "record") for body in group.bodies}
     return len(keys)
 
 
-def _weight(spec: Made, only: tuple[str, ...]) -> tuple[int, int, int, int, int]:
+def _weight(spec: Spec | Array, only: tuple[str, ...]) -> tuple[int, int, int, int, int]:
     """Return (bytes shared, its own, its own deflated, contents, files) of a variant made in memory, without checks."""
     store = MemoryStore()
-    product = product_of(spec, only, False, store, Stages())
+    product = subject(spec).make(only, False, store, Progress())
     shared = {sha: len(store.content(sha)) for sha in product.shared.values()}
     own = sum(map(len, product.own.values()))
     packed = len(zlib.compress(b"".join(product.own.values())))

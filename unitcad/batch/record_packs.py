@@ -20,11 +20,10 @@ from unitcad.batch.batch_records import RecordPlace
 from unitcad.cache import Bundle, DiskStore, MissingContent, SharedStore, digest
 from unitcad.errors import UnitcadError
 from unitcad.json_text import json_bytes
-from unitcad.pipeline.folder import replacing, sync
-from unitcad.pipeline.manifest_records import Manifest
-from unitcad.pipeline.product import Product
-from unitcad.pipeline.subjects import of_data, to_text
-from unitcad.pipeline.versions import code_version
+from unitcad.pipeline.make import Product
+from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.plan import code_version
+from unitcad.pipeline.write import replacing, subject_of_data, sync
 from unitcad.validation import default_template, read
 
 _INSIDE = re.compile(r"[^/\\:\0][^\\:\0]*")
@@ -142,7 +141,7 @@ def store_at(address: str) -> SharedStore:
 @cache
 def _dictionary() -> bytes:
     """Return the text of a spec like most: one that is deflated against it has little more than what differs."""
-    return msgspec.json.encode([to_text(of_data(read(default_template())))])
+    return msgspec.json.encode([subject_of_data(read(default_template())).text])
 
 
 def _key(geometry: str) -> str:

@@ -10,8 +10,8 @@ from unitcad.batch.destination import Folders
 from unitcad.batch.task import Task, VariantOutcome
 from unitcad.cache import Bundle, digest
 from unitcad.files import write_new
-from unitcad.pipeline.folder import replacing, sync
-from unitcad.pipeline.versions import code_version
+from unitcad.pipeline.plan import code_version
+from unitcad.pipeline.write import replacing, sync
 
 
 class Receiver(Folders):

@@ -21,7 +21,7 @@ from unitcad.batch.remote import Receiver
 from unitcad.batch.store_address import note_store, store_noted
 from unitcad.cache import DiskStore, MissingContent, SharedStore, absolute
 from unitcad.errors import UnitcadError, WrongArgument
-from unitcad.pipeline.folder import STORE, placing, whole
+from unitcad.pipeline.write import STORE, placing, whole
 
 FOLDERS_BELOW = 1000
 """Variants below which each has a folder, unless asked otherwise."""

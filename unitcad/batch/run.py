@@ -30,10 +30,9 @@ from unitcad.batch.unread_keys import swept_estimate
 from unitcad.batch.unread_keys import warnings as unread_warnings
 from unitcad.cache import DiskStore, absolute, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
-from unitcad.pipeline.folder import clear_leftovers
-from unitcad.pipeline.product import checked_outputs
-from unitcad.pipeline.subjects import key_of, subject_of, to_text
-from unitcad.pipeline.versions import code_version, kernel_versions
+from unitcad.pipeline.plan import checked_outputs, code_version, kernel_versions
+from unitcad.pipeline.write import clear_leftovers, subject
+from unitcad.workers import WorkerEnded
 
 WINDOW = 2048
 """Variants held in memory: enough to group those that share a geometry."""
@@ -214,14 +213,15 @@ class _Batch:
             except UnitcadError as error:
                 self._finished(VariantOutcome(index, tasks.REFUSED, reason=self.sweep.faults(index, error)))
                 continue
-            first = self.seen.setdefault(int(subject_of(spec).folder_name[-12:], 16), index)
+            wanted = subject(spec)
+            first = self.seen.setdefault(int(wanted.folder_name[-12:], 16), index)
             if first != index:
                 self.journal.add(JournalEntry(index=index, same_as=first, values=self.sweep.values(index)[1]))
                 self._finished(VariantOutcome(index, tasks.OK), fresh=False, before=entry is not None)
                 continue
-            key = key_of(spec, self.only, self.options.check)
+            key = wanted.key(self.only, self.options.check)
             self.groups.setdefault(key, _GeometryJobs()).jobs.append(
-                Job(index, to_text(spec), self.destination.damaged(entry) if entry else "")
+                Job(index, wanted.text, self.destination.damaged(entry) if entry else "")
             )
             self.waiting += 1
         return self.waiting < WINDOW
@@ -259,7 +259,9 @@ class _Batch:
             group = self.groups.get(task.geometry)
             try:
                 outcomes = tasks.outcomes(future.result())
-            except UnitcadError:
+            except WorkerEnded as error:
+                self._lost(task, error)
+            except UnitcadError:  # with NoWorker: where no worker can start, none of the others can be made either
                 raise
             except (Exception, CancelledError) as error:
                 self._lost(task, error)

@@ -20,7 +20,7 @@ from unitcad.batch.store_address import found_at
 from unitcad.batch.sweep import Sweep
 from unitcad.cache import absolute
 from unitcad.errors import UnitcadError, WrongArgument
-from unitcad.pipeline.folder import STORE
+from unitcad.pipeline.write import STORE
 
 RECORD = "shard.json"
 MOST_SHARDS = 9999

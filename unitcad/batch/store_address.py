@@ -8,7 +8,7 @@ from pathlib import Path
 
 from unitcad import files
 from unitcad.cache import absolute
-from unitcad.pipeline.folder import ADDRESS, STORE
+from unitcad.pipeline.write import ADDRESS, STORE
 
 
 def note_store(out: Path, address: str) -> None:

@@ -31,7 +31,7 @@ from unitcad.batch.paths import check_path
 from unitcad.cache import digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import names_device, read_text
-from unitcad.pipeline.subjects import Made, of_data
+from unitcad.pipeline.write import subject_of_data
 from unitcad.spec import check_plain, convert, read_toml
 from unitcad.spec.fields import fields_of
 from unitcad.validation import override, put, read
@@ -175,9 +175,9 @@ class Sweep:
             chosen[axis.path] = axis.values[here]
         return self.bases[base][0], {axis.path: chosen[axis.path] for axis in self.axes}
 
-    def spec(self, index: int) -> Made:
+    def spec(self, index: int) -> Any:
         """Return the effective spec, or the array, of variant `index`. Raises Refusal."""
-        return of_data(self._data(index))
+        return subject_of_data(self._data(index)).of
 
     def faults(self, index: int, first: UnitcadError) -> str:
         """Return what is wrong with a refused variant in one line, `first` being what it was refused for."""

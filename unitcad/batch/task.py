@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import faulthandler
 import pickle
-import sys
 import time
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -21,15 +19,13 @@ from unitcad.batch import record_packs
 from unitcad.batch.batch_records import RecordPlace, Values
 from unitcad.cache import Bundle, DiskStore, MemoryStore, MissingContent, SharedStore, digest
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.pipeline import folder as folders
-from unitcad.pipeline.build import TRIES, build_into
-from unitcad.pipeline.manifest_records import Manifest, failed_codes
-from unitcad.pipeline.product import Product
-from unitcad.pipeline.row import row
-from unitcad.pipeline.stages import Stages
-from unitcad.pipeline.subjects import Made, of_text, outputs_of, product_of, subject_of, unit_of
-from unitcad.pipeline.versions import code_version
+from unitcad.pipeline import write as folders
+from unitcad.pipeline.make import Product, Progress
+from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes, row
+from unitcad.pipeline.plan import code_version
+from unitcad.pipeline.write import TRIES, Subject, subject_of_text
 from unitcad.spec import custom_code
+from unitcad.workers import limit
 
 OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
 """broken: made, but a mould check or a mesh check failed. refused: the spec is invalid. failed: not made."""
@@ -124,7 +120,7 @@ def _each(
     for job in jobs:
         start = time.perf_counter()
         try:
-            with _watch(task.timeout):
+            with limit(task.timeout):
                 outcome = make(job, known)
         except Exception as error:
             outcome = failure(job.index, error)
@@ -156,12 +152,12 @@ def _into_store(task: Task, store: SharedStore) -> list[VariantOutcome]:
 
 def _delivered(job: Job, task: Task, known: Bundle | None, store: SharedStore, anew: bool) -> VariantOutcome:
     """Make a variant in memory, and put the contents that it shares into the store; its own files are still here."""
-    spec = of_text(job.spec)
+    spec = subject_of_text(job.spec)
     maker = _store(task.cache) if task.cache else MemoryStore(known)
     for left in reversed(range(TRIES)):
         before = Counter(maker.counts)
         try:
-            product = product_of(spec, task.only, task.check, maker, Stages())
+            product = spec.make(task.only, task.check, maker, Progress())
             shared = sorted(set(product.shared.values()))
             store.keep_all([maker.content(sha) for sha in shared if anew or not store.noted(sha)], anew=anew)
             break
@@ -216,23 +212,22 @@ def _into_folders(task: Task, out: Path) -> list[VariantOutcome]:
 def _locally(job: Job, task: Task, out: Path, scratch: Path) -> VariantOutcome:
     """Make a variant into its folder in `out`."""
     assert task.cache is not None
-    spec = of_text(job.spec)
-    folder = out / subject_of(spec).folder_name
+    spec = subject_of_text(job.spec)
+    folder = out / spec.folder_name
     manifest = _finished(folder, spec, task, job.damaged)
     if manifest is not None:
         return _outcome(job, spec, folder.name, manifest, _manifest_sha256(folder), Counter({"file reused": 1}))
     store = _store(task.cache)
     before = Counter(store.counts)
-    maker = partial(product_of, spec, task.only, task.check)
-    built = build_into(folder, maker, store, Stages(), placing=partial(folders.placing, scratch=scratch))
+    built = folders.write(folder, partial(spec.make, task.only, task.check, store), store, scratch=scratch)
     return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
 
 
 def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
     """Make a variant in memory and return it: contents that the caller has are only named."""
-    spec = of_text(job.spec)
+    spec = subject_of_text(job.spec)
     store = MemoryStore(known)
-    product = product_of(spec, task.only, task.check, store, Stages())
+    product = spec.make(task.only, task.check, store, Progress())
     outcome = _of_product(job, spec, product, store.counts)
     needed = set(product.shared.values()) & set(store.contents)
     return replace(
@@ -244,7 +239,7 @@ def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
 
 
 def _outcome(
-    job: Job, spec: Made, folder: str, manifest: Manifest, sha256: str, counts: Counter[str]
+    job: Job, spec: Subject, folder: str, manifest: Manifest, sha256: str, counts: Counter[str]
 ) -> VariantOutcome:
     """Return the outcome of a variant that is there; `sha256` is that of its manifest.json."""
     codes = failed_codes(manifest)
@@ -252,7 +247,7 @@ def _outcome(
         job.index,
         BROKEN if codes else OK,
         folder,
-        row(spec, manifest),
+        row(spec.of, manifest),
         f"broken: {', '.join(codes)}" if codes else "",
         manifest=sha256,
         built=counts["file built"] + counts["data built"],
@@ -260,17 +255,17 @@ def _outcome(
     )
 
 
-def _of_product(job: Job, spec: Made, product: Product, counts: Counter[str]) -> VariantOutcome:
+def _of_product(job: Job, spec: Subject, product: Product, counts: Counter[str]) -> VariantOutcome:
     """Return the outcome of a variant that was made in memory."""
     sha256 = digest(product.own["manifest.json"])
-    return _outcome(job, spec, subject_of(spec).folder_name, product.manifest, sha256, counts)
+    return _outcome(job, spec, spec.folder_name, product.manifest, sha256, counts)
 
 
 def _manifest_sha256(folder: Path) -> str:
     return digest(files.read(folder / "manifest.json", links=False))
 
 
-def _finished(folder: Path, spec: Made, task: Task, damaged: str) -> Manifest | None:
+def _finished(folder: Path, spec: Subject, task: Task, damaged: str) -> Manifest | None:
     """Return the manifest of a result that an interrupted run completed, if it is what is wanted now.
 
     Raises UnitcadError for a folder that holds something else.
@@ -281,18 +276,18 @@ def _finished(folder: Path, spec: Made, task: Task, damaged: str) -> Manifest | 
         with contextlib.suppress(UnitcadError):
             if digest(files.read(folder / "manifest.json", links=False)) == damaged:
                 return None
-        folders.earlier_formats(folder, subject_of(spec), ours=True)
+        folders.earlier_formats(folder, spec, ours=True)
         return None
-    formats = folders.earlier_formats(folder, subject_of(spec))
+    formats = folders.earlier_formats(folder, spec)
     manifest = folders.whole(folder, hashes=True)  # the journal lacks it: it may not have reached the disk
     if manifest is None:
         return None
     try:
         same = (
             files.read_json(folder / "timings.json", links=False).get("code") == task.code
-            and set(manifest["outputs"]) == set(outputs_of(spec, task.only))
-            and set(formats) == set(unit_of(spec).output.formats)
-            and task.check != any(left["why"] == folders.UNCHECKED for left in manifest["left_out"])
+            and set(manifest["outputs"]) == set(spec.outputs(task.only))
+            and set(formats) == set(spec.formats)
+            and task.check != any(left["why"] == UNCHECKED for left in manifest["left_out"])
         )
     except (UnitcadError, KeyError, TypeError, AttributeError):
         return None
@@ -303,16 +298,3 @@ def _finished(folder: Path, spec: Made, task: Task, damaged: str) -> Manifest | 
 def _store(root: Path) -> DiskStore:
     """Return the process's store of a cache: contents that it has verified stay verified."""
     return DiskStore(root)
-
-
-@contextlib.contextmanager
-def _watch(timeout: float | None) -> Iterator[None]:
-    """End this process if the block takes longer: by a C thread, which runs even while a kernel holds the GIL."""
-    if timeout is None:
-        yield
-        return
-    faulthandler.dump_traceback_later(timeout, exit=True, file=sys.__stderr__ or sys.stderr)
-    try:
-        yield
-    finally:
-        faulthandler.cancel_dump_traceback_later()

@@ -7,15 +7,15 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Mix
-from unitcad.casting.needs import Need
-from unitcad.casting.tape import side_places, tape_places
-from unitcad.casting.tongue_prop import grip_of, tongue_prop
+from unitcad.casting.drawings import grip_of, side_places, tape_places, tongue_prop
+from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Batch
+from unitcad.casting.steps import NEEDS, BenchStep
 from unitcad.catalogue import Material, motors
+from unitcad.export.threemf import layout
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
-from unitcad.spec import Spec
+from unitcad.shape.column import extent
 from unitcad.text import cell, number
 
 
@@ -32,15 +32,26 @@ class Item:
 
 
 def bill(
-    moulds: MouldSet, mixes: list[tuple[Material, Mix]], named: Sequence[Need], smears: Sequence[Material] = ()
+    moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], smears: Sequence[Material] = ()
 ) -> tuple[Item, ...]:
-    """List pieces, silicone, motor, circuit or wires, tools and consumables (`named`: by steps).
+    """List pieces, silicone, motor, circuit or wires, tools and consumables.
 
     Silicone is every pour's mix, and the least batch for each of `smears`, which are mixed after the pours.
     """
-    consumables = consumed(moulds, [mix for _, mix in mixes], named, len(smears))
-    silicone = _silicone(mixes, smears, moulds.spec.casting.minimum_mix_g)
-    return (*_pieces(moulds), *silicone, *_inside(moulds), *consumables)
+    items = [*_pieces(moulds)]
+    least_g = moulds.spec.casting.minimum_mix_g
+    for material in dict.fromkeys([*(batch.silicone for batch in batches), *smears]):
+        own = [batch.mix for batch in batches if batch.silicone == material]
+        ratio, smeared = float(material.mix_ratio), smears.count(material) * least_g
+        uses = [f"{len(own)} pour{'' if len(own) == 1 else 's'}"] if own else []
+        uses += [f"{number(smeared, 3)} g for the smear"] if smeared else []
+        note = f"{' and '.join(uses)}, mix ratio {number(ratio, 3)} A to 1 B, Shore {material.shore.value}"
+        part_b = smeared / (1 + ratio)
+        part_a, part_b = sum(m.part_a_g for m in own) + ratio * part_b, sum(m.part_b_g for m in own) + part_b
+        items += [
+            Item(f"{material.name} part {part}", g, "g", "bought", note) for part, g in (("A", part_a), ("B", part_b))
+        ]
+    return (*items, *_inside(moulds), *consumed(moulds, batches, steps, len(smears)))
 
 
 def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
@@ -50,7 +61,7 @@ def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
     )
 
 
-def to_csv(items: tuple[Item, ...]) -> str:
+def to_csv(items: Iterable[Item]) -> str:
     """Return the bill as CSV with a header; quantities to four significant digits."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -60,47 +71,37 @@ def to_csv(items: tuple[Item, ...]) -> str:
 
 
 def _pieces(moulds: MouldSet) -> Iterator[Item]:
-    spec, plan = moulds.spec, moulds.plan
-    dims = plan.dimensions
-    kinds: dict[str, list[Body]] = {}
+    lengths, plan = moulds.spec.moulds, moulds.plan
+    dims, kinds = plan.dimensions, dict[str, list[Body]]()
     for tool in plan.pieces:
         # Tongues and stubs are numbered by cell and otherwise alike; cups and lids are not.
         kinds.setdefault(tool.kind if tool.kind in ("tongue", "stub") else tool.name, []).append(tool)
     for name, (tool, *more) in kinds.items():
-        count = 1 + len(more)
+        count, made, item = 1 + len(more), "cut", name
         if tool.kind == "stub":
-            height = dims.core_height - moulds.plate[0]
-            length = f"{height + plan.layout.plate[1] + 10:.0f} mm each, the end bent by a right angle"
-            note = f"{number(spec.moulds.filament_mm, 3)} mm printer filament, {length}"
-            yield Item("filament stub", count, "piece", "cut", note)
+            length = f"{dims.core_height - moulds.plate[0] + plan.layout.plate[1] + 10:.0f} mm each"
+            item = "filament stub"
+            note = f"{number(lengths.filament_mm, 3)} mm printer filament, {length}, the end bent by a right angle"
         elif tool.kind == "blade" and tool.made == "cut":
+            made = "tool"
             note = f"a straight bar of metal, {plan.layout.plate[1] * 2:.0f} mm long or longer: the bed takes no blade"
-            yield Item("blade", 1, "piece", "tool", note)
         elif tool.made == "cut":
-            height = dims.exit.height if dims.exit else 0.0
-            yield Item(name, count, "piece", "cut", f"from film or steel strip of {number(height, 3)} mm")
+            note = f"from film or steel strip of {number(dims.exit.height if dims.exit else 0.0, 3)} mm"
         else:
-            attitude = "printed upside down" if tool.upside_down else "printed as drawn"
-            note = f"{spec.moulds.printer}, layers of {number(spec.moulds.layer_mm, 3)} mm"
-            yield Item(plan.called(name), count, "piece", attitude, note)
-
-
-def _silicone(mixes: list[tuple[Material, Mix]], smears: Sequence[Material], least_g: float) -> Iterator[Item]:
-    for material in dict.fromkeys([*(material for material, _ in mixes), *smears]):
-        own = [mix for other, mix in mixes if other == material]
-        ratio, smeared = float(material.mix_ratio), smears.count(material) * least_g
-        uses = [f"{len(own)} pour{'' if len(own) == 1 else 's'}"] if own else []
-        uses += [f"{number(smeared, 3)} g for the smear"] if smeared else []
-        note = f"{' and '.join(uses)}, mix ratio {number(ratio, 3)} A to 1 B, Shore {material.shore.value}"
-        part_b = smeared / (1 + ratio)
-        yield Item(f"{material.name} part A", sum(m.part_a_g for m in own) + ratio * part_b, "g", "bought", note)
-        yield Item(f"{material.name} part B", sum(m.part_b_g for m in own) + part_b, "g", "bought", note)
+            item, made = plan.called(name), "printed upside down" if tool.upside_down else "printed as drawn"
+            note = f"{lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
+        yield Item(item, count, "piece", made, note)
 
 
 def _inside(moulds: MouldSet) -> Iterator[Item]:
     cells, spec = len(moulds.plan.layout.cells), moulds.spec
-    size = f"{number(spec.motor.diameter_mm, 3)} x {number(spec.motor.thickness_mm, 3)} mm"
-    yield Item(spec.motor.part or "motor", cells, "piece", "bought", ", ".join([size, *_ratings(spec)]))
+    note = f"{number(spec.motor.diameter_mm, 3)} x {number(spec.motor.thickness_mm, 3)} mm"
+    if spec.motor.part:
+        motor = motors(spec.motors)[spec.motor.part]
+        ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}
+        note += "".join(f", {number(value, 3)} {unit}" for unit, value in ratings.items() if value)
+        note += f", mass {number(motor.mass_g, 3)} g" if motor.mass_g else ""
+    yield Item(spec.motor.part or "motor", cells, "piece", "bought", note)
     if any(body.kind == "circuit" for body in moulds.laid_later):
         yield Item("flexible circuit", 1, "piece", "bought", "for all motors, as circuit.dxf and circuit-pads.csv say")
     if fpcb := spec.fpcb:
@@ -108,51 +109,66 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
         tail = f"tail {number(fpcb.tail_width_mm, 3)} wide to {sides}, {number(fpcb.thickness_mm, 3)} thick"
         yield Item("flexible circuit", cells, "piece", "bought", f"pad {number(fpcb.pad_diameter_mm, 3)} mm, {tail}")
     if wires := spec.wires:
-        yield Item(
-            "wire", cells * wires.count, "piece", "bought", f"{number(wires.diameter_mm, 3)} mm over the insulation"
-        )
+        note = f"{number(wires.diameter_mm, 3)} mm over the insulation"
+        yield Item("wire", cells * wires.count, "piece", "bought", note)
 
 
-def _ratings(spec: Spec) -> Iterator[str]:
-    """Yield what the catalogue knows of the motor's rating and mass."""
-    if spec.motor.part:
-        motor = motors(spec.motors)[spec.motor.part]
-        ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}
-        yield from (f"{number(value, 3)} {unit}" for unit, value in ratings.items() if value)
-        if motor.mass_g:
-            yield f"mass {number(motor.mass_g, 3)} g"
-
-
-def injecting(spec: Spec, mixes: Sequence[Mix]) -> Iterator[Item]:
+def injecting(batches: Sequence[Batch]) -> Iterator[Item]:
     """List what pours under a lid take, each with its mix."""
-    size, tip = max(mix.syringe_size_ml for mix in mixes), number(spec.moulds.sprue_mm, 3)
-    yield Item("syringe", len(mixes), "piece", "bought", f"{number(size, 3)} ml, tip up to {tip} mm")
+    size = max(batch.mix.syringe_size_ml for batch in batches)
+    tip = number(batches[0].moulds.spec.moulds.sprue_mm, 3)
+    yield Item("syringe", len(batches), "piece", "bought", f"{number(size, 3)} ml, tip up to {tip} mm")
     yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
 
 
-def consumed(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need], smears: int = 0) -> Iterator[Item]:
-    """List what the steps name, then what only its numbers make an item of this set's; `smears`: mixes beside pours."""
-    pours, lengths = len(moulds.plan.steps), moulds.spec.moulds
+def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], smears: int = 0) -> Iterator[Item]:
+    """List what pours and steps take; `smears`: mixes beside pours."""
+    pours, cups = len(moulds.plan.steps), moulds.plan.of_kind("cup")
     yield Item("mixing cups and sticks", pours + smears, "set", "bought", "no latex, no sulphur clay: they inhibit")
     yield Item("gloves", pours, "pair", "bought", "nitrile or vinyl; latex inhibits")
-    resolution = number(moulds.spec.casting.scale_resolution_g, 3)
-    yield Item("scale", 1, "piece", "tool", f"shows {resolution} g")
-    if cups := moulds.plan.of_kind("cup"):
-        wide = number(2 * PRY_HALF_WIDTH, 3)
-        yield Item("flat screwdrivers", 2, "piece", "tool", f"up to {wide} mm wide, for the pry slots")
-    yield from (Item(need.item, need.quantity, need.unit, need.made, need.note) for need in named)
+    yield Item("scale", 1, "piece", "tool", f"shows {number(moulds.spec.casting.scale_resolution_g, 3)} g")
+    if cups:
+        note = f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide, for the pry slots"
+        yield Item("flat screwdrivers", 2, "piece", "tool", note)
+    for need in sorted({"caliper", *(need for step in steps for need in step.needs)}, key=[*NEEDS].index):
+        yield Item(need, 1, *NEEDS[need])
     if prop := tongue_prop(moulds):
         size = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm, {number(prop.thickness_mm, 3)} mm thick"
-        yield Item(
-            "pad of stacked card", len(prop.pads), "piece", "cut", f"{size}: bears the tongues' {grip_of(moulds)}s"
-        )
+        note = f"{size}: bears the tongues' {grip_of(moulds)}s"
+        yield Item("pad of stacked card", len(prop.pads), "piece", "cut", note)
     if moulds.spec.casting.vacuum:
-        least = CONTAINER * max(mix.millilitres for mix in mixes)  # one mix after the other
+        least = CONTAINER * max(batch.mix.millilitres for batch in batches)  # one mix after the other
         chamber = f"a chamber that reaches {number(VACUUM_INHG, 3)} inHg"
         note = f"at least {number(least, 2)} ml, since silicone foams up; {chamber}; used again for every mix"
         yield Item("degassing container", 1, "piece", "tool", note, least)
-    if lengths.pour == "injected":
-        yield from injecting(moulds.spec, mixes)
+    if moulds.spec.moulds.pour == "injected":
+        yield from injecting(batches)
     elif cups:
         strips = 2 * (len(tape_places(moulds)) + len(side_places(moulds))) * pours
         yield Item("adhesive tape", strips, "strip", "bought", "holds each cup down; 8 mm wide, 30 mm long")
+
+
+def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tuple[Body, ...]]:
+    """Return the bodies of each of the printer's plates by its 3MF: `stem`.3mf, or numbered if there are several.
+
+    In their order, each on the first plate where it lies beside what is there.
+    """
+    bed_x, bed_y = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
+    filled: list[dict[Body, tuple[float, float]]] = []
+    for body in bodies:
+        x0, y0, _, x1, y1, _ = extent(body.shape)
+        for plate in filled:
+            sizes = [*plate.values(), (x1 - x0, y1 - y0)]
+            ends = ((x + w, y + d) for (x, y), (w, d) in zip(layout(sizes, (bed_x, bed_y)), sizes, strict=True))
+            if all(x <= bed_x and y <= bed_y for x, y in ends):
+                break
+        else:
+            filled.append(plate := {})
+        plate[body] = x1 - x0, y1 - y0
+    names = [f"{stem}-{i + 1}.3mf" for i in range(len(filled))] if len(filled) > 1 else [f"{stem}.3mf"]
+    return dict(zip(names, map(tuple, filled), strict=bool(filled)))
+
+
+def mould_plates(moulds: MouldSet) -> dict[str, tuple[Body, ...]]:
+    """Return the printed pieces of each plate by its file in a result's folder."""
+    return plates(moulds, [piece for piece in moulds.plan.pieces if piece.made == "printed"], "moulds/moulds")

@@ -15,14 +15,12 @@ import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import msgspec
 from msgspec import Meta
 
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.spec import Spec, convert
+from unitcad.spec import convert
 from unitcad.spec.asked import Table
-from unitcad.validation import from_data
 
 FORMAT = "unitcad cast record"
 ENDING = ".cast.json"
@@ -132,18 +130,6 @@ def cast_record(data: dict[str, Any]) -> CastRecord:
     for i, unit in enumerate(record.units):
         _expect_once([wall.layer for wall in unit.walls], f"units.{i}.walls.{{}}.layer", "layer")
     return record
-
-
-def spec_of(record: CastRecord) -> Spec:
-    """Return the spec that was cast. Raises Refusal where the record has none, or one that this version refuses."""
-    if record.spec is None:
-        raise Refusal("spec", None, "is required here: the effective spec as a table")
-    return from_data(record.spec)
-
-
-def to_json(record: CastRecord) -> str:
-    """Write a record as JSON, every key there."""
-    return msgspec.json.format(msgspec.json.encode(record), indent=1).decode() + "\n"
 
 
 def _expect_day(text: str) -> None:

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import product
 
+import numpy as np
+
+from unitcad.casting.steps import LATE, STAY
 from unitcad.catalogue import Material, Value
+from unitcad.designs.limits import filament_groove
+from unitcad.designs.rib_leaves import leaf_mm
+from unitcad.moulds.base import plate_bottom, pry_floor
 from unitcad.moulds.cup import window_section
+from unitcad.moulds.layout import groove_depth_of
+from unitcad.moulds.lid import skirt_end
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
+from unitcad.moulds.ribs import Rib, ribs
 from unitcad.shape import exact_volume
 from unitcad.spec import Spec, printer_of
+from unitcad.text import number
 
 GRAVITY = 9.80665
 BUBBLE_MM = 0.2
@@ -19,14 +32,10 @@ CONTAINER = 4.0
 VACUUM_INHG, KPA_PER_INHG = 29.0, 3.386389
 MIXING_MIN, DEGASSING_MIN, POURING_MIN = 3.0, 3.0, 2.0
 """What the pot life is spent on before and after the bubbles (assumed: usual practice)."""
-WIPE_MIN, LAY_IN_MIN, GREASE_MIN, CUP_ON_MIN, TONGUE_MIN, HOLD_MIN, WEIGH_MIN = 2.0, 5.0, 1.0, 2.0, 1.5, 2.0, 5.0
-STRIKE_MIN, PULL_MIN, LIFT_MIN, PEEL_MIN, BRUSH_MIN = 1.0, 1.0, 2.0, 3.0, 1.0
-PER_CAVITY_MIN = 0.5
-"""A person's time for the other steps (assumed): what the time line adds up. Wiping, laying in, greasing, tongues,
-brushing, pulling and peeling are for one cavity; `PER_CAVITY_MIN` is what each further one takes to pour."""
-SORT_MIN, CLEAN_MIN, DRY_FIT_MIN, FILAMENT_MIN, LEVEL_MIN = 5.0, 10.0, 5.0, 3.0, 5.0
-WASH_MIN, DRY_MIN, CLEAR_MIN, CUT_MIN, BAKE_H = 15.0, 30.0, 5.0, 5.0, 8.0
-"""The same before the first pour: once a set, a cup, a cavity or a tongue; drying and baking are waits (assumed)."""
+LAY_IN_MIN, WEIGH_MIN, STRIKE_MIN, PULL_MIN, LIFT_MIN, PEEL_MIN, PER_CAVITY_MIN = 5.0, 5.0, 1.0, 1.0, 2.0, 3.0, 0.5
+"""A person's time for steps that there are several of (assumed), as all `minutes` and waits of the time line.
+Laying in, pulling and peeling are for one cavity; `PER_CAVITY_MIN` is what each further one takes to pour."""
+BAKE_H = 8.0
 STRIKE_AGAIN_MIN = 10.0
 """When what has wept or sunk is topped up and struck off again (assumed)."""
 HELD_BACK_ML = 0.5
@@ -62,6 +71,7 @@ def sourced(value: Value) -> str:
     return f"{value.status}: {value.source}"
 
 
+FOAMS = "assumed: 4 x the mix, it foams up"
 SYRINGES_ML = 5.0, 10.0, 20.0, 30.0, 60.0, 100.0
 """The sizes that syringes are sold in, ml; larger mixes take more than one filling."""
 
@@ -105,11 +115,6 @@ def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
     return Mix(net, total, total * share, total * (1 - share), error(net), error(total), total / density, syringe)
 
 
-def channels_mm3(step: Step) -> float:
-    """Return the volume of a pour's sprues and vents, mm3."""
-    return sum(map(exact_volume, step.channels))
-
-
 def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float:
     """Return the seconds that a bubble takes through a depth by Stokes' law, at the viscosity just mixed: optimistic.
 
@@ -123,16 +128,6 @@ def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE
 def pouring_min(cells: int) -> float:
     """Return the minutes to pour and strike off so many cavities."""
     return POURING_MIN + PER_CAVITY_MIN * (cells - 1)
-
-
-def rest_min(spec: Spec, depth_mm: float, material: Material) -> float:
-    """Return the minutes in which bubbles rise by themselves without a vacuum; 0 where an open pour would wait in vain.
-
-    In a syringe what does not rise in time still gathers at its tip: the whole allowance is waited.
-    """
-    rise = bubble_rise_s(depth_mm, material) / 60
-    allowed = WITHOUT_VACUUM * at_room(float(material.pot_life_min), spec.casting.room_c)
-    return min(rise, allowed) if rise <= allowed or spec.moulds.pour == "injected" else 0.0
 
 
 def at_room(value: float, room_c: float) -> float:
@@ -181,3 +176,296 @@ def wall_range(spec: Spec, layer: int, off_axis_mm: float) -> tuple[float, float
     off = off_axis_mm * (1 if layer == 0 else 2)
     wall = spec.layers[layer].wall_mm
     return max(wall - off, 0.0), wall + off
+
+
+@dataclass(frozen=True)
+class Batch:
+    """The silicone of one pour: `volume_mm3` is that of what it casts, `cells` how many units it is poured for."""
+
+    moulds: MouldSet
+    step: Step
+    silicone: Material
+    volume_mm3: float
+    cells: int
+
+    @cached_property
+    def mix(self) -> Mix:
+        """What to weigh for all cavities and channels."""
+        poured = self.volume_mm3 * len(self.step.layer) / self.moulds.pieces(self.step.name)
+        return mix(self.moulds.spec, self.silicone, poured + self.channels_mm3)
+
+    @property
+    def channels_mm3(self) -> float:
+        """The volume of sprues and vents."""
+        return sum(map(exact_volume, self.step.channels))
+
+    @property
+    def vacuum(self) -> bool:
+        """Whether it is degassed."""
+        return self.moulds.spec.casting.vacuum
+
+    @property
+    def pot_min(self) -> float:
+        """The pot life in the room."""
+        return at_room(float(self.silicone.pot_life_min), self.moulds.spec.casting.room_c)
+
+    @property
+    def cure_h(self) -> float:
+        """The cure in the room."""
+        return at_room(float(self.silicone.cure_h), self.moulds.spec.casting.room_c)
+
+    @property
+    def rise_min(self) -> float:
+        """How long bubbles take to rise out."""
+        return bubble_rise_s(self.step.rim, self.silicone) / 60
+
+    @property
+    def rest_min(self) -> float:
+        """How long bubbles rise by themselves without a vacuum; 0 where an open pour would wait in vain.
+
+        In a syringe what does not rise in time still gathers at its tip: the whole allowance is waited.
+        """
+        allowed, injected = WITHOUT_VACUUM * self.pot_min, self.moulds.spec.moulds.pour == "injected"
+        return min(self.rise_min, allowed) if injected or self.rise_min <= allowed else 0.0
+
+    @property
+    def verdict(self) -> str:
+        """How bubbles leave: in the vacuum, or by themselves, for which a quarter of the pot life is allowed."""
+        work, lid = MIXING_MIN + pouring_min(self.cells), self.step.lid
+        if self.vacuum:
+            work += DEGASSING_MIN
+            said = (
+                f"Degas for {number(DEGASSING_MIN, 3)} min (assumed) at {number(VACUUM_INHG, 3)} inHg, in a "
+                f"container of at least {number(CONTAINER * self.mix.millilitres, 2)} ml: the silicone foams up and "
+                "falls back, then single bubbles rise. Let the air in slowly."
+            )
+        else:
+            work += self.rest_min
+            allowed = WITHOUT_VACUUM * self.pot_min
+            said = (
+                f"No vacuum (casting.vacuum): a bubble of {number(BUBBLE_MM, 3)} mm takes {number(self.rise_min, 2)} "
+                f"min through {number(self.step.rim, 3)} mm (Stokes, at the viscosity just mixed). That is optimistic, "
+                "since silicone thickens from the start: a quarter of the pot life, "
+                f"{number(allowed, 2)} min, is allowed. "
+            )
+            where = "stand the syringe up, its tip up," if lid else "leave the mould alone"
+            brush = "brush a thin coat of the mix now onto all that it will touch, then pour in a thread from one side"
+            stand = f"{where} for {number(allowed, 2)} min, push out the air, and inject slowly"
+            said += (
+                f"Such bubbles should rise out: {where} for {number(self.rise_min, 2)} min."
+                if self.rise_min <= allowed
+                else f"{STAY}: get a vacuum, or {stand if lid else brush}."
+            )
+        over = number(work - self.pot_min, 2)
+        late = f" {LATE} {over} min after the pot life: cool the room, or take a slower silicone."
+        return f"{said}{late if work > self.pot_min else ''}"
+
+    @property
+    def figures(self) -> tuple[Figure, ...]:
+        """All numbers of the pour with their sources."""
+        casting, step, silicone, mix = self.moulds.spec.casting, self.step, self.silicone, self.mix
+        cells = len(self.moulds.plan.layout.cells)
+        by_temperature = "assumed: half the time for every 10 K more; at 23 degC "
+        digit = f"half of {number(casting.scale_resolution_g, 3)} g"
+        practice = "assumed: usual practice"
+        channels = " + sprue and vents" if step.channels else ""
+        # An array's layers are drawn of all units together.
+        whole = len(step.layer) // self.moulds.pieces(step.name) != cells
+        what, times = ("volume of this pour", "volume") if whole else ("volume of one layer", "volume x cavities")
+        taken = f"({times}{channels})" if channels or not whole else times
+        more = f"assumed: {casting.waste:.0%} more, at least {number(casting.minimum_mix_g, 3)} g"
+        held_back = f"net, and {number(HELD_BACK_ML, 2)} ml that tip and plunger keep (assumed)"
+        stokes = "computed: Stokes' law at the viscosity just mixed, so optimistic; the bubble is assumed"
+        ratio = f"mix ratio, {sourced(silicone.mix_ratio)}"
+        kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
+        weep = 100 * weep_mm3(self.moulds, step, silicone) / self.volume_mm3
+        pressure = "; the syringe's pressure comes on top" if step.lid else ""
+        flow = f"computed: flow in the clearance under the pour's own weight{pressure}"
+        rows = (
+            (what, self.volume_mm3, "mm3", "computed: the drawn layer's mesh"),
+            channels and ("sprue and vents", self.channels_mm3, "mm3", "computed: as drawn"),
+            ("density", float(silicone.density_g_cm3), "g/cm3", sourced(silicone.density_g_cm3)),
+            ("in the cavities, net", mix.net_g, "g", f"computed: {taken} x density"),
+            ("to mix", mix.mix_g, "g", more),
+            mix.syringe_ml and ("to draw into the syringe, at least", mix.syringe_ml, "ml", held_back),
+            ("part A", mix.part_a_g, "g", ratio),
+            ("part B", mix.part_b_g, "g", ratio),
+            ("scale's error on a part, net", mix.net_error_pct, "%", digit),
+            ("scale's error on a part, mixed", mix.mix_error_pct, "%", digit),
+            ("pot life in this room", self.pot_min, "min", by_temperature + sourced(silicone.pot_life_min)),
+            ("mixing", MIXING_MIN, "min", practice),
+            ("pouring and striking off", pouring_min(cells), "min", practice),
+            ("viscosity, mixed", float(silicone.mixed_viscosity_cps), "cps", sourced(silicone.mixed_viscosity_cps)),
+            ("depth of this pour", step.rim, "mm", "computed: the rim over the seat"),
+            (f"rise of a {BUBBLE_MM} mm bubble through it", self.rise_min, "min", stokes),
+            self.vacuum and ("degassing", DEGASSING_MIN, "min", practice),
+            self.vacuum and ("degassing container, at least", CONTAINER * mix.millilitres, "ml", FOAMS),
+            self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),
+            ("cure in this room", self.cure_h, "h", by_temperature + sourced(silicone.cure_h)),
+            weep and ("weep by the windows, no grease", weep, "% of a layer", flow),
+        )
+        return tuple(Figure(*row) for row in rows if isinstance(row, tuple))
+
+
+def walls(moulds: MouldSet) -> tuple[Figure, ...]:
+    """Return how far the cups stand off the core's axis, and what that makes of the walls."""
+    spec, made, free = moulds.spec, eccentricity(moulds), eccentricity(moulds, with_ribs=False)
+    lengths, cups = (
+        spec.moulds,
+        [(free, "without ribs", f"clearance of {number(spec.moulds.plinth_clearance_mm, 3)} mm a side x sqrt 2")],
+    )
+    if made.ribs:
+        pressed = "pushed back on leaves" if leaf_mm(printer_of(spec)) else "crushed"
+        depth = f"{pressed} by {number(lengths.rib_interference_mm, 3)} mm"
+        how = f"balance of {made.ribs} ribs that are {depth}, each up to {UNEVEN:.0%} stronger or weaker (assumed)"
+        cups.append((made, "with ribs", how))
+    times = "1 x for Layer 1, 2 x beyond it" if len(spec.layers) > 1 else "1 x"
+    source = f"computed: cups up to {number(made.at_worst_mm, 2)} mm off the axis, {times}"
+    worst = f"where the gap is printed {number(made.off_mm, 3)} mm off, the printer's play"
+    return (
+        *(
+            Figure(
+                f"cups off the core's axis, {what}, at most",
+                cup.as_drawn_mm,
+                "mm",
+                f"computed: {how}; {number(cup.at_worst_mm, 2)} {worst}",
+            )
+            for cup, what, how in cups
+        ),
+        *(
+            Figure(f"layer {i + 1} wall, {extreme}", wall, "mm", source)
+            for i in range(len(spec.layers))
+            for extreme, wall in zip(("thinnest", "thickest"), wall_range(spec, i, made.at_worst_mm), strict=True)
+        ),
+    )
+
+
+UNEVEN = 0.3
+"""By how much a rib may be stronger or weaker than the others, as a share.
+
+Assumed: a line more or less; of a leaf, a tenth of its thickness.
+"""
+
+
+@dataclass(frozen=True)
+class Eccentricity:
+    """The most that a bore stands off the core's axis, mm, where the gap is printed as drawn, and where it is not.
+
+    `off_mm` is what the printer's play makes the gap wider or narrower by, per side.
+    """
+
+    ribs: int
+    as_drawn_mm: float
+    at_worst_mm: float
+    off_mm: float
+
+
+def eccentricity(moulds: MouldSet, *, with_ribs: bool = True) -> Eccentricity:
+    """Return the eccentricity of a set's cups as they are, or as they would be without ribs."""
+    lengths, lay = moulds.spec.moulds, moulds.plan.layout
+    clearance, off, depth = lengths.plinth_clearance_mm, lengths.xy_play_mm, lengths.rib_interference_mm
+    standing = ribs(moulds.spec, lay) if with_ribs else ()
+    if not standing:
+        return Eccentricity(0, math.sqrt(2) * clearance, math.sqrt(2) * (clearance + off), off)
+    cells = tuple((cell.x, cell.y) for cell in lay.cells)
+    # A gap can't be narrower than nothing; one wider than the ribs reach leaves the rest as play.
+    tight = depth + min(off, clearance)
+    loose = math.sqrt(2) * max(off - depth, 0.0)
+    share = shift_per_depth(standing, cells)
+    return Eccentricity(len(standing), share * depth, max(share * tight, loose), off)
+
+
+@lru_cache(maxsize=16)
+def shift_per_depth(standing: tuple[Rib, ...], cells: tuple[tuple[float, float], ...]) -> float:
+    """Return the greatest shift of a cell's bore, over the depth of the ribs, for every choice of their strengths."""
+    outward = -np.array([rib.inwards for rib in standing], dtype=float)
+    at = np.array([(rib.x, rib.y) for rib in standing])
+    # What a shift (x, y) and a small turn of the cup take from each rib's depth, along its normal.
+    rows = np.column_stack([outward, at[:, 0] * outward[:, 1] - at[:, 1] * outward[:, 0]])
+    strengths = np.array(list(product((1 - UNEVEN, 1 + UNEVEN), repeat=len(standing))))
+    weighted = rows * strengths[:, :, None]
+    # Each rib pushes the cup outwards by its depth; moved out by u it is crushed by that much less.
+    moved = np.linalg.solve(np.swapaxes(weighted, 1, 2) @ rows, weighted.sum(axis=1)[:, :, None])
+    x, y, turn = np.moveaxis(moved, 1, 0)
+    cx, cy = np.array(cells).T
+    return float(np.hypot(x - turn * cy, y + turn * cx).max())
+
+
+NEAR = 0.02
+"""Share of a layer within which a height counts as on the grid."""
+
+
+@dataclass(frozen=True)
+class OffGrid:
+    """An edge that no layer ends at: its height above the bed as printed, and the nearest layer's, mm."""
+
+    piece: str
+    edge: str
+    height_mm: float
+    nearest_mm: float
+
+    @property
+    def moved_mm(self) -> float:
+        """How far the slicer moves it."""
+        return self.nearest_mm - self.height_mm
+
+
+@dataclass(frozen=True)
+class UnitHeight:
+    """A height of the unit: as asked for, and as whole layers of base and cups make it, mm."""
+
+    what: str
+    asked_mm: float
+    printed_mm: float
+
+
+def off_grid(moulds: MouldSet) -> list[OffGrid]:
+    """Return the tooling's own edges that are off the grid. Cups lie upside down: heights count from their rims."""
+    spec, dims, plan, (bottom, top) = moulds.spec, moulds.plan.dimensions, moulds.plan, moulds.plate
+    layer, exit = spec.moulds.layer_mm, dims.exit
+    edges = [
+        ("base", "plate", top - bottom),
+        ("base", "seat", -bottom),
+        ("base", "pry slots' floor", pry_floor(spec) - plate_bottom(spec)),
+    ]
+    if plan.of_kind("stub"):
+        edges.append(("base", "filament groove's roof", filament_groove(spec)))
+    if exit:
+        edges += [("base", "ledge", exit.low - bottom), ("tongue", "thickness", exit.height)]
+    for step, rim in zip(plan.steps, dims.heights, strict=True):
+        if step.groove:
+            edges.append((step.cup, "groove's floor", groove_depth_of(spec, rim)))
+        if exit:
+            _, low, high = window_section(spec, exit, rim)
+            edges.append((step.cup, "window's lower edge", rim - low))
+            if high < rim:
+                edges.append((step.cup, "window's upper edge", rim - high))
+        if step.lid and plan.concentric:
+            edges.append((step.lid, "skirt's edge", step.top - skirt_end(spec, dims, step.index - 1)))
+            edges.append((step.lid, "underside", step.top - rim))
+    return [
+        OffGrid(piece, edge, round(height, 4), round(near, 4))
+        for piece, edge, height in edges
+        if abs(height - (near := _whole(height, layer))) > NEAR * layer
+    ]
+
+
+def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
+    """Return the cavity's depth and every layer's height over what it is cast on, where layers make another of them."""
+    dims, concentric, layer = moulds.plan.dimensions, moulds.plan.concentric, moulds.spec.moulds.layer_mm
+    seat = -moulds.plate[0]
+    below = dims.core_height, _whole(seat + dims.core_height, layer) - _whole(seat, layer)
+    heights = [("cavity", *below)] if concentric and dims.heights[0] > below[0] else []
+    for i, asked in enumerate(dims.heights, 1):
+        printed, capped = _whole(asked, layer), concentric and asked > below[0]
+        low, drawn_low = below if capped else (0.0, 0.0)
+        heights.append((f"layer {i}'s {'cap' if capped else 'height'}", asked - low, printed - drawn_low))
+        below = asked, printed
+    heights.append(("height over all", *below))
+    off = ((what, round(asked, 4), round(printed, 4)) for what, asked, printed in heights)
+    return [UnitHeight(*each) for each in off if abs(each[1] - each[2]) > NEAR * layer]
+
+
+def _whole(height: float, layer: float) -> float:
+    """Return the height of the layers that a slicer makes of it, mm: it cuts each at its middle."""
+    return math.floor(height / layer + 0.5 + 1e-6) * layer

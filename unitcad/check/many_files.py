@@ -6,7 +6,6 @@ import contextlib
 import glob
 import os
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -18,7 +17,7 @@ from unitcad.check.options import Options
 from unitcad.check.readers.sniff import kind_of
 from unitcad.check.rules.f_file import F012
 from unitcad.check.rules.f_limits import F011, OutOfTime, Unreadable
-from unitcad.sharing import two_cores
+from unitcad.workers import Pool, WorkerEnded, limit_memory
 
 _GRACE = 5.0  # s, beyond half of the limit more, until code that never looks at the clock is interrupted
 
@@ -100,9 +99,7 @@ def check_files(
     if jobs <= 1 or len(work) <= 1:
         with _bounded(memory_mb):
             for path, options in work:
-                with two_cores():
-                    report = guarded(path, options, then)
-                yield report
+                yield guarded(path, options, then)
         return
     yield from _in_processes(work, min(jobs, len(work)), memory_mb, then)
 
@@ -136,60 +133,22 @@ def _stopped(path: str, why: str) -> FileReport:
 def _in_processes(
     work: Sequence[tuple[str, Options]], jobs: int, memory_mb: int | None, then: Then | None
 ) -> Iterator[FileReport]:
-    # One file needs no processes.
-    from concurrent.futures import ProcessPoolExecutor
-    from concurrent.futures.process import BrokenProcessPool
-    from multiprocessing import get_context
-
-    from unitcad import children
-
-    left = list(work)
-    while left:
-        with children.safe_path():
-            pool = ProcessPoolExecutor(jobs, get_context("spawn"), _limit_memory, (memory_mb,))
-            futures = [pool.submit(guarded, path, options, then) for path, options in left]
-        done = 0
-        try:
-            for future in futures:
-                yield future.result()
-                done += 1
-        except BrokenProcessPool:
-            if len(left) == 1:
-                why = "the process that checked it died (memory, or a fault in native code)"
-                yield _stopped(left[0][0], why)
-            else:  # which file it was is found by checking the first unfinished one alone
-                yield from _in_processes(left[done : done + 1], 1, memory_mb, then)
-            done += 1
-        finally:
-            # Workers with nothing left to do are waited for, or their pipes close under the interpreter's own exit.
-            pool.shutdown(wait=done == len(futures), cancel_futures=True)
-        left = left[done:]
-
-
-def _limit_memory(memory_mb: int | None) -> None:
-    if memory_mb is None or sys.platform == "win32":
-        return
-    import resource
-
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    wanted = memory_mb * 1_000_000
-    with contextlib.suppress(ValueError, OSError):
-        resource.setrlimit(resource.RLIMIT_AS, (wanted if hard < 0 else min(wanted, hard), hard))
+    with Pool(jobs, memory=memory_mb and memory_mb * 1_000_000) as pool:
+        calls = [pool.submit(guarded, path, options, then) for path, options in work]
+        for (path, _), call in zip(work, calls, strict=True):
+            try:
+                yield call.result()
+            except WorkerEnded as end:
+                yield _stopped(path, f"{end} (memory, or a fault in native code)")
 
 
 @contextlib.contextmanager
 def _bounded(memory_mb: int | None) -> Iterator[None]:
-    if memory_mb is None or sys.platform == "win32":
-        yield
-        return
-    import resource
-
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    _limit_memory(memory_mb)
+    before = limit_memory(memory_mb and memory_mb * 1_000_000)
     try:
         yield
     finally:
-        resource.setrlimit(resource.RLIMIT_AS, before)
+        limit_memory(before)
 
 
 @contextlib.contextmanager

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from unitcad.check.detail import detail
 from unitcad.check.findings import Facts, Finding, Location, ending, point
-from unitcad.check.geometry.arranged import Arranged, arranged
-from unitcad.check.geometry.stars import Stars, stars_of
+from unitcad.check.geometry.arranged import arranged
+from unitcad.check.geometry.stars import stars_of
 from unitcad.check.geometry.topology import surface_of, topology_on, works_on
-from unitcad.check.geometry.triangle_mesh import MANY, Mesh, representable
+from unitcad.check.geometry.triangle_mesh import Mesh, representable
 from unitcad.check.rules import registry
 from unitcad.check.rules.f_file import F001
 from unitcad.check.rules.f_limits import Deadline, keeping
@@ -23,7 +22,6 @@ from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import not_finite
 from unitcad.geometry.arrays import extent
 from unitcad.geometry.ticks import Tick
-from unitcad.sharing import shared
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
@@ -69,24 +67,12 @@ def _inspected(mesh: Mesh, tick: Tick, *, cross: bool) -> Inspection:
     """Return a mesh to inspect. Where two cores share it, all that follows from its edges is worked out together."""
     surface = surface_of(mesh, tick)
     cross = cross and len(surface.kept) > 0
-    works: list[Callable[[], Any]] = [partial(work, surface, tick) for work in works_on(surface)]
-    ready: list[Arranged] = []
-
-    def arrange() -> None:
-        if cross:
-            with suppress(MemoryError):  # which comes again where it is wanted
-                ready.append(arranged(surface))
-
-    def stars() -> Stars | None:
-        with suppress(MemoryError):
-            return stars_of(surface)
-
+    ready = None
     if cross:
-        works.insert(0, stars)  # which mostly takes longest
-    found = shared(lambda k: works[k](), len(works), large=len(surface.kept) >= MANY, first=arrange)
-    known = found.pop(0) if cross else None
-    topology = topology_on(surface, found, tick)
-    return Inspection(mesh, topology, tick, cross, ready=(ready[0], known) if ready and known is not None else None)
+        with suppress(MemoryError):  # which comes again where it is wanted
+            ready = arranged(surface), stars_of(surface)
+    found = [work(surface, tick) for work in works_on(surface)]
+    return Inspection(mesh, topology_on(surface, found, tick), tick, cross, ready=ready)
 
 
 def check_on_bed(part: Inspection, printer: Printer) -> tuple[Finding, ...]:

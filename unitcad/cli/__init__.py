@@ -100,7 +100,8 @@ def program() -> NoReturn:
     try:
         main()
     except SystemExit as left:
-        if isinstance(left.code, int) and threading.active_count() == 1:
+        # Workers end with this process, and so do the threads that wait for them.
+        if isinstance(left.code, int) and all(one.daemon for one in threading.enumerate()[1:]):
             with contextlib.suppress(OSError):  # Python's own end meets it again, and says so
                 sys.stdout.flush()
                 sys.stderr.flush()

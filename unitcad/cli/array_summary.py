@@ -11,10 +11,9 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.array_extras import CROSSTALK
 from unitcad.arrays.construction import construction_of
 from unitcad.arrays.crosstalk_words import crosstalk_lines
-from unitcad.casting.in_short import in_short
+from unitcad.casting.steps import in_short
 from unitcad.check.findings import counted
-from unitcad.pipeline.build import Built
-from unitcad.pipeline.folder import PAGE
+from unitcad.pipeline.write import PAGE, Built
 from unitcad.text import number
 
 

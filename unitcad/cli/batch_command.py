@@ -197,7 +197,7 @@ def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: boo
 def _write_page(folder: Path, asked: bool) -> None:
     """Write a batch's page where it is asked for; one that is there is kept up."""
     from unitcad.cli.output import progress
-    from unitcad.pipeline.folder import PAGE
+    from unitcad.pipeline.write import PAGE
 
     if asked or (folder / PAGE).is_file():
         from unitcad.report import write_report

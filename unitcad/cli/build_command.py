@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -28,12 +28,13 @@ from unitcad.cli.shared_options import (
 )
 
 if TYPE_CHECKING:
-    from unitcad.pipeline.beside import Beside
-    from unitcad.pipeline.build import Built
-    from unitcad.pipeline.manifest_records import Manifest
-    from unitcad.pipeline.subjects import Made
-    from unitcad.report.viewer_models import Modelled
+    from unitcad.arrays.array import Array
+    from unitcad.pipeline.manifest import Manifest
+    from unitcad.pipeline.write import Built
+    from unitcad.spec import Spec
     from unitcad.validation import Changes
+
+    Made = Spec | Array
 
 
 def build(
@@ -100,68 +101,52 @@ def _built(
     as_json: bool,
 ) -> bool:
     """Build the specs and print what came out; return whether every check passed."""
-    # The processes first: they load their modules while this one loads its own.
-    with _beside(only, formats) as beside:
-        from unitcad.arrays.array_names import confirm_known
-        from unitcad.cli.output import print_json, progress
-        from unitcad.heap import keep_freed_memory
-        from unitcad.pipeline.folder import PAGE, held
+    from unitcad.pipeline import step_helper
 
-        keep_freed_memory()
-        paged = only is None if page is None else page
-        changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
-        allow_code(code)
-        # Every spec is validated before the first one is built.
-        for spec in specs:
-            confirm_known(spec)
-        wanted = [_loaded(spec, changes) for spec in specs]
-        results: list[Built] = []
-        printing = [""] * len(wanted)
-        if slicing:
-            from unitcad.pipeline.slicing import begin, check_slicing, finish, take
-            from unitcad.pipeline.subjects import subject_of, unit_of
+    outputs_asked = {"unit", "moulds"} if only is None else set(listed(only))
+    if outputs_asked & {"unit", "moulds"} and (formats is None or "step" in listed(formats)):
+        step_helper.start()  # first: it loads its modules while this process loads its own
+    from unitcad.arrays.array_names import confirm_known
+    from unitcad.cli.output import print_json, progress
+    from unitcad.heap import keep_freed_memory
+    from unitcad.pipeline.slicing import check_slicing, slice_tools
+    from unitcad.pipeline.write import PAGE, build, held, subject
+    from unitcad.report import write_report
 
-            for spec in wanted:
-                check_slicing(unit_of(spec), chosen)
-        for i, spec in enumerate(wanted):
-            with progress(spec.name) as say:
-                # Asked for first where that keeps no STEP waiting: pictures that it delays are drawn here.
-                modelled = _modelled(spec, beside) if paged and beside.estimates else None
-                made = partial(_builder(spec), out, only=chosen, check=not no_check, say=say, beside=beside)
-                if slicing:
-                    with begin(unit_of(spec), out / subject_of(spec).folder_name, say) as pieces:
-                        results.append(made(take=take(pieces)))
-                        printing[i] = finish(pieces, results[-1].folder, results[-1].manifest)
-                else:
-                    results.append(made())
-                if paged or (results[-1].folder / PAGE).is_file():
-                    from unitcad.report import write_report
-
-                    say("page")
-                    with held(results[-1].folder):
-                        write_report(results[-1].folder, warn, modelled or _modelled(spec, beside))
+    keep_freed_memory()
+    paged = only is None if page is None else page
+    changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
+    allow_code(code)
+    # Every spec is validated before the first one is built.
+    for spec in specs:
+        confirm_known(spec)
+    wanted = [_loaded(spec, changes) for spec in specs]
+    for spec in wanted if slicing else ():
+        check_slicing(subject(spec).unit, chosen)
+    results: list[Built] = []
+    printing: list[str] = []
+    for spec in wanted:
+        with progress(spec.name) as say:
+            result = build(spec, out, only=chosen, check=not no_check, say=say)
+            if slicing:
+                say("slicing")
+                printing.append(slice_tools(subject(spec).unit, result.folder, result.manifest, say))
+            if paged or (result.folder / PAGE).is_file():
+                say("page")
+                with held(result.folder):
+                    write_report(result.folder, warn)
+        results.append(result)
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:
-        for spec, result, prints in zip(wanted, results, printing, strict=True):
+        for i, (spec, result) in enumerate(zip(wanted, results, strict=True)):
             _print_faults(result.manifest)
             # Standard output has the folder alone, for a script to take.
-            lines = [*_summary(spec, result), *([prints] if prints else [])]
+            lines = [*_summary(spec, result), *printing[i : i + 1]]
             for line in sorted(lines, key=lambda line: line.startswith("open ")):  # what to open comes last
                 warn(f"{spec.name}: {line}")
             typer.echo(str(result.folder))
     return all(result.ok for result in results)
-
-
-def _modelled(of: Made, beside: Beside) -> Modelled:
-    """Ask for what the page shows of a unit's geometry, beside the rest; return what gives it for the spec built."""
-    from unitcad.report.viewer_models import model
-    from unitcad.spec import Spec, with_formats
-
-    if not isinstance(of, Spec):
-        return model
-    built, given = with_formats(of), beside.call(model, of)
-    return lambda there: given() if with_formats(there) == built else model(there)
 
 
 def _loaded(source: str, changes: Changes) -> Made:
@@ -174,27 +159,6 @@ def _loaded(source: str, changes: Changes) -> Made:
     from unitcad.arrays.array_file import load_array
 
     return load_array(source, changes)
-
-
-def _builder(of: Made) -> Callable[..., Built]:
-    """Return what builds a spec or an array."""
-    from unitcad.pipeline.build import build
-    from unitcad.spec import Spec
-
-    if isinstance(of, Spec):
-        return partial(build, of)
-    from unitcad.pipeline.array_build import build_array
-
-    return partial(build_array, of)
-
-
-def _beside(only: str | None, formats: str | None) -> Beside:
-    """Return the processes beside a build, begun before anything else where what they make may be asked for."""
-    from unitcad.pipeline.beside import started
-
-    asked = {"unit", "moulds", "estimate", "casting"} if only is None else set(listed(only))
-    step = bool(asked & {"unit", "moulds"}) and (formats is None or "step" in listed(formats))
-    return started(step, bool(asked & {"estimate", "casting"}) and len(asked) > 1)
 
 
 def _summary(of: Made, built: Built) -> Iterator[str]:
@@ -212,7 +176,7 @@ def _summary(of: Made, built: Built) -> Iterator[str]:
 
 def _print_faults(manifest: Manifest) -> None:
     """Print warnings, failed mould checks, and findings in files."""
-    from unitcad.pipeline.product import NO_KERNEL
+    from unitcad.pipeline.manifest import NO_KERNEL
 
     for warning in manifest["warnings"]:
         warn(f"warning: {warning}")

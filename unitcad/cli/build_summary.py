@@ -6,11 +6,10 @@ import json
 import shlex
 from collections.abc import Iterator
 
-from unitcad.casting.in_short import in_short
+from unitcad.casting.steps import in_short
 from unitcad.check.findings import counted
-from unitcad.pipeline.build import Built
-from unitcad.pipeline.folder import PAGE
-from unitcad.pipeline.row import row
+from unitcad.pipeline.manifest import row
+from unitcad.pipeline.write import PAGE, Built
 from unitcad.spec import Spec
 from unitcad.text import number
 

@@ -19,8 +19,7 @@ def coupon(
 ) -> None:
     """Write a fit coupon to print first, and how to read it. The last line printed is the folder."""
     from unitcad import catalogue
-    from unitcad.casting import coupon as drawn
-    from unitcad.casting.coupon_files import write
+    from unitcad.casting.coupon import Coupon, write
     from unitcad.cli.output import print_json
 
     chosen = catalogue.choose("PRINTER", printer, catalogue.printers())
@@ -28,9 +27,9 @@ def coupon(
     if as_json:
         fits = {
             fit.key: {"feature": fit.feature, "choose": fit.choose, "values_mm": list(fit.values_mm)}
-            for fit in drawn.fits(chosen)
+            for fit in Coupon(chosen).fits.values()
         }
         print_json({"folder": str(folder), "printer": printer, "fits": fits})
     else:
-        typer.echo(drawn.to_markdown(chosen))
+        typer.echo(Coupon(chosen).markdown())
         typer.echo(str(folder))

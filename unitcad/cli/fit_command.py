@@ -27,17 +27,17 @@ def fit(
     Each unit is predicted without it, the null of two levels beside the models. The constants are shrunk towards the
     stored ones by how many units there are. `estimate --fit` and `build --fit` take lab-fit.toml.
     """
+    from unitcad import files
     from unitcad.cli.output import print_json, progress
     from unitcad.lab import fit_files
-    from unitcad.lab.fit_lab import load_fit_lab
-    from unitcad.lab.fitting import fit_lab
+    from unitcad.lab.fitting import fit_lab, load_fit_lab
 
     loaded = load_fit_lab(lab)
     with progress("fit") as stage:
         result = fit_lab(loaded, stage)
         made = fit_files.contents(result) if out is not None else {}
     if out is not None:
-        fit_files.write(out, made)
+        files.replace_all(out, {name: text.encode() for name, text in made.items()}, fit_files.FIT)
     if as_json:
         print_json({**fit_files.as_data(result), **({"folder": str(out)} if out is not None else {})})
         return

@@ -64,7 +64,7 @@ def _entries(kind: str) -> dict[str, Any]:
 
         return {name: _first_comment(path.read_text("utf-8")) for name, path in labs().items()}
     if kind == "phantoms":
-        from unitcad.lab.phantom.description import phantoms
+        from unitcad.lab.phantom.recipe import phantoms
 
         return {name: _first_comment(path.read_text("utf-8")) for name, path in phantoms().items()}
     if kind == "sweeps":

@@ -13,8 +13,8 @@ from unitcad.errors import Refusal, unknown_name
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Material
-    from unitcad.lab.dynamic_test import DynamicResult
-    from unitcad.lab.tensile_result import TensileResult
+    from unitcad.lab.dynamic import DynamicResult
+    from unitcad.lab.tensile import TensileResult
 
 _DELIMITERS = {"tab": "\t", "space": " "}
 _Length = typer.Option(min=0.001, max=10000, callback=finite, help="Of the specimen; goes before the file's header.")
@@ -56,14 +56,15 @@ def material(
     dynamic test. A tensile test gives a quasi-static modulus, which the estimate takes where the spec says
     moduli = "quasi-static" under [estimate].
     """
-    from unitcad import catalogue
+    import json
+
+    from unitcad import catalogue, files
     from unitcad.cli.output import print_json, progress
     from unitcad.lab import material_files as written
-    from unitcad.lab.declared_columns import declared
-    from unitcad.lab.dynamic_test import evaluate_dynamic, read_dynamic
-    from unitcad.lab.readers.recording_layout import Layout
-    from unitcad.lab.tensile_curve import Specimen, read_curve
-    from unitcad.lab.tensile_result import evaluate
+    from unitcad.lab.columns import declared
+    from unitcad.lab.dynamic import evaluate_dynamic, read_dynamic
+    from unitcad.lab.readers import Layout
+    from unitcad.lab.tensile import Specimen, evaluate, read_curve
 
     if not curves and dma is None:
         raise Refusal("FILES", None, "name one tensile curve or more, or --dma with a file")
@@ -100,13 +101,16 @@ def material(
     text = written.material_toml(named, entry, _comments(entry, shipped[base]))
     found = written.data(named, entry, tensile, dynamic, frequency_hz)
     if out is not None:
-        contents = {"material.toml": text, "material.json": written.json_text(found)}
+        contents = {
+            "material.toml": text,
+            "material.json": json.dumps(found, indent=1, allow_nan=False, ensure_ascii=False) + "\n",
+        }
         if tensile:
             contents["tensile.svg"] = written.tensile_chart(named, tensile)
         if dynamic:
             factor = 2 * (1 + float(shipped[base].poisson_ratio)) if dynamic.curve.deformation == "shear" else 1.0
             contents["dynamic.svg"] = written.dynamic_chart(named, dynamic, factor)
-        written.write(out, contents)
+        files.replace_all(out, {key: one.encode() for key, one in contents.items()}, "material.toml")
     if as_json:
         print_json({**found, **({"folder": str(out)} if out is not None else {})})
         return

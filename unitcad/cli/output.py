@@ -93,7 +93,7 @@ def stage_lines() -> Callable[[str], None] | None:
 
     The environment variable UNITCAD_STAGES holds the text that such a line begins with.
     """
-    from unitcad.children import STAGES
+    from unitcad.workers import STAGES
 
     mark = os.environ.get(STAGES)
     return (lambda stage: warn(f"{mark}{stage}")) if mark else None

@@ -10,7 +10,7 @@ import typer
 from unitcad.cli.shared_options import AsJson
 
 if TYPE_CHECKING:
-    from unitcad.lab.phantom.phantom_set import PhantomSet
+    from unitcad.lab.phantom import PhantomSet
 
 
 def phantom(
@@ -27,9 +27,8 @@ def phantom(
     an estimate, and the response to expect. The last line printed is the folder.
     """
     from unitcad.cli.output import print_json, progress, warn
-    from unitcad.lab.phantom import phantom_files
-    from unitcad.lab.phantom.description import load_phantom
-    from unitcad.lab.phantom.phantom_set import phantom_set
+    from unitcad.lab.phantom import phantom_files, phantom_set
+    from unitcad.lab.phantom.recipe import load_phantom
 
     table = load_phantom(source)
     with progress("phantom") as stage:

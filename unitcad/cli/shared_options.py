@@ -41,7 +41,7 @@ def with_fit(sets: list[str] | None, fit: Path | None) -> list[str]:
 def overrides(sets: list[str] | None, formats: str | None) -> list[str]:
     """Return what --set and --formats override in a spec. Raises Refusal for an unknown format."""
     from unitcad.errors import unknown_name
-    from unitcad.pipeline.artifacts import FORMATS
+    from unitcad.pipeline.plan import FORMATS
 
     names = listed(formats)
     for name in names or ():
@@ -52,7 +52,7 @@ def overrides(sets: list[str] | None, formats: str | None) -> list[str]:
 
 def outputs(only: str | None) -> tuple[str, ...]:
     """Return what --only asks for; all without it."""
-    from unitcad.pipeline.artifacts import OUTPUTS
+    from unitcad.pipeline.plan import OUTPUTS
 
     return OUTPUTS if only is None else tuple(name for name in listed(only) if name)
 

@@ -142,6 +142,10 @@ def _wrong_count(dims: Dimensions, spec: Spec) -> str:
     return f"dimensions has {len(dims.radii)} radii and {len(dims.heights)} heights, not {wanted} each"
 
 
+def _texts(made: Any) -> Any:
+    return [getattr(each, "text", each) for each in made] if isinstance(made, list | tuple) else made
+
+
 def _wrong_texts(field: str, many: int = 0) -> Callable[[Any], str]:
     """Return what finds fault with a list of sentences, or of `many` texts together."""
 
@@ -165,7 +169,7 @@ _EXPECTED: dict[str, Callable[[Any], str]] = {
     "advice": _wrong_texts("advice"),
     "pad_radius": _wrong_kind("pad_radius", int | float, "a number"),
     "tooling": _wrong_kind("tooling", Tooling, "a Tooling"),
-    "assembly": _wrong_texts("assembly"),
+    "assembly": lambda made: _wrong_texts("assembly")(_texts(made)),
     "left_out": _wrong_texts("left_out", many=2),
 }
 """For each function of a Design, a check of its result: the fault as text, "" for none."""

@@ -33,6 +33,23 @@ def _inside_cavity(asked: AskedSpec, inner_radius: float) -> float:
 
 
 @dataclass(frozen=True)
+class Fitting:
+    """A sentence of the assembly, and what its step takes.
+
+    needs     tools and consumables, as casting.steps.NEEDS names them
+    silicone  the layer whose silicone it asks for: from 1, -1 the last; 0 for none
+    smear     whether that is a smear, which is mixed after the pours
+    mix       whether it uses the mix of the pour that it is laid into
+    """
+
+    text: str
+    needs: tuple[str, ...] = ()
+    silicone: int = 0
+    smear: bool = False
+    mix: bool = False
+
+
+@dataclass(frozen=True)
 class Design:
     """A kind of unit, all of it in one file.
 
@@ -70,6 +87,6 @@ class Design:
     laid_in: int = 0
     caps: bool = False
     passes: float | None = None
-    assembly: Callable[[Spec, Dimensions], list[str]] = _nothing
+    assembly: Callable[[Spec, Dimensions], Sequence[str | Fitting]] = _nothing
     left_out: Callable[[Spec], list[Reason]] = _nothing_left_out
     default: bool = False

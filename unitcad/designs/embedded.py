@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from unitcad import catalogue
 from unitcad.designs import limits
-from unitcad.designs.design import Design, Reason
+from unitcad.designs.design import Design, Fitting, Reason
 from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
 from unitcad.designs.parts import motor_hold, slots
 from unitcad.errors import Refusal
@@ -88,26 +88,28 @@ def pad_radius(asked: AskedSpec, cavity_radius: float) -> float:
     return asked.diameter_mm / 2 - min(0.5, asked.layers[-1].wall_mm / 2)
 
 
-def assembly(spec: Spec, dims: Dimensions) -> list[str]:
+def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
     """Write how motor and circuit, or wires, go into the ring."""
-    if spec.wires:
-        steps = ["Push the motor into the ring from above, the wires lying in the notch."]
-    elif spec.fpcb:
-        steps = [
+    hold = f" {motor_hold(spec, dims)}" if spec.motor.fill or spec.fpcb else ""
+    if spec.fpcb and not spec.wires:
+        text = (
             "Solder the motor to the circuit's pad. Set the motor into the ring, the pad on top of all layers, and "
             "bond the pad with a thin smear of the last layer's silicone (assumed); it is that bond which holds the "
-            "motor."
-        ]
-    else:
-        steps = ["Push the motor in from the skin's side."]
-    if spec.motor.fill or spec.fpcb:
-        return [*steps[:-1], f"{steps[-1]} {motor_hold(spec, dims)}"]
-    return [
-        *steps,
+            f"motor.{hold}"
+        )
+        return [Fitting(text, ("soldering iron and solder",), silicone=-1, smear=True)]
+    text = "Push the motor in from the skin's side."
+    if spec.wires:
+        text = "Push the motor into the ring from above, the wires lying in the notch."
+    steps = [Fitting(f"{text}{hold}")]
+    if hold:
+        return steps
+    ring = (
         f"Nothing else holds it: lay the body on a greased flat, centre the motor, and fill the ring of "
         f"{number(dims.air_ring, 3)} mm round it with Layer 1's silicone or a silicone adhesive (assumed). "
-        "motor.fill = true draws Layer 1 up to the motor instead.",
-    ]
+        "motor.fill = true draws Layer 1 up to the motor instead."
+    )
+    return [*steps, Fitting(ring, silicone=1)]
 
 
 def left_out(spec: Spec) -> list[Reason]:

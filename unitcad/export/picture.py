@@ -11,15 +11,15 @@ import importlib.util
 import os
 import pickle
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from queue import SimpleQueue
 
 import numpy as np
 
-from unitcad import children
 from unitcad.errors import UnitcadError
+from unitcad.workers import Pool, WorkerEnded, run, run_here
 
 SECONDS = 300
 """The time after which a child that draws is ended."""
@@ -69,9 +69,9 @@ def _ask(request: bytes, environment: dict[str, str]) -> list[bytes] | None:
     """Return the child's pictures; None where it crashed."""
     child = [sys.executable, "-P", "-m", "unitcad.export.picture_child"]
     try:
-        done = children.run(child, content=request, timeout=SECONDS, env=environment)
+        done = run(child, content=request, seconds=SECONDS, env=environment)
         return pickle.loads(done.stdout) if done.returncode == 0 else None
-    except (subprocess.TimeoutExpired, EOFError, pickle.UnpicklingError):
+    except (WorkerEnded, EOFError, pickle.UnpicklingError):
         return None
 
 
@@ -79,6 +79,7 @@ def _ask(request: bytes, environment: dict[str, str]) -> list[bytes] | None:
 def _virtual_display() -> Iterator[str]:
     """Run an X server of our own for a while; yield its display. It picks a free number and prints it."""
     command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
-    with children.started(command, stderr=subprocess.DEVNULL) as server:
-        assert server.stdout is not None
-        yield f":{server.stdout.readline().decode().strip()}"
+    lines: SimpleQueue[tuple[str, str]] = SimpleQueue()
+    with Pool() as pool:
+        pool.submit(run_here, command, lines=True, heard=lambda line: lines.put(line) if line[0] == "out" else None)
+        yield f":{lines.get()[1]}"

@@ -6,7 +6,6 @@ import hashlib
 import os
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
@@ -15,9 +14,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from unitcad import children
 from unitcad.catalogue import Printer
 from unitcad.errors import UnitcadError
+from unitcad.workers import TimedOut, run
 
 Say = Callable[[str], None]
 PROGRAMS = ("prusa-slicer", "prusa-slicer-console", "PrusaSlicer")
@@ -160,8 +159,8 @@ def _run(*arguments: str) -> str:
         raise UnitcadError("PrusaSlicer is not installed")
     try:
         # It ends at once where the user's locale is not installed; this one always is.
-        done = children.run([command, *arguments], timeout=TIMEOUT_S, env={**os.environ, "LC_ALL": "C"})
-    except subprocess.TimeoutExpired:
+        done = run([command, *arguments], seconds=TIMEOUT_S, env={**os.environ, "LC_ALL": "C"})
+    except TimedOut:
         raise UnitcadError(f"PrusaSlicer took more than {TIMEOUT_S} s") from None
     return (done.stdout + done.stderr).decode("utf-8", "replace")
 

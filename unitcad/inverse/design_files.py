@@ -23,7 +23,7 @@ from unitcad.inverse.proposals import Inversion, name_of
 from unitcad.inverse.ranking_order import ordered
 from unitcad.inverse.wishes import limits
 from unitcad.pipeline import Variant
-from unitcad.pipeline import folder as folders
+from unitcad.pipeline import write as folders
 from unitcad.spec import to_toml
 from unitcad.text import cell, markdown, number
 

@@ -1,18 +1,24 @@
-"""The campaign file: which recordings are of which unit and place, by which sensor, and what no file can tell."""
+"""What `[recording]` is for one record: a campaign's own values for some of its files."""
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
 
 from unitcad.errors import Refusal
+from unitcad.files import sha256
+from unitcad.lab.chains import chains_of
 from unitcad.lab.chains.chain import ChainTable
-from unitcad.lab.chains.signal_chains import chains_of
-from unitcad.lab.quantities import Quantity, to_si
-from unitcad.lab.unit_files import Cavity
+from unitcad.lab.readers import expect_ending
+from unitcad.lab.unit_files import Cavity, file_of, source_file
+from unitcad.lab.units import Quantity, to_si
 from unitcad.spec.asked import Table
 from unitcad.spec.convert import convert
 from unitcad.spec.toml import read_toml
@@ -109,14 +115,22 @@ class Campaign(Table, frozen=True, kw_only=True):
 def read_campaign(path: Path) -> Campaign:
     """Return the campaign of a TOML file. Raises Refusal for the first value that is not valid."""
     campaign = convert(read_toml(path), Campaign)
-    if campaign.chain.band_hz[0] >= campaign.chain.band_hz[1]:
-        raise Refusal("chain.band_hz", list(campaign.chain.band_hz), "must rise", [60.0, 250.0])
+    band, motor_channel = campaign.chain.band_hz, campaign.recording.motor_channel
+    if band[0] >= band[1]:
+        raise Refusal("chain.band_hz", list(band), "must rise", [60.0, 250.0])
     chains_of(campaign.chain)
-    to_si(campaign.sensor.unit, campaign.sensor.quantity, "sensor.unit")
-    if campaign.motor_sensor is not None:
-        to_si(campaign.motor_sensor.unit, campaign.motor_sensor.quantity, "motor_sensor.unit")
+    for key, sensor in (("sensor", campaign.sensor), ("motor_sensor", campaign.motor_sensor)):
+        if sensor is not None:
+            to_si(sensor.unit, sensor.quantity, f"{key}.unit")
+    beside = "stands beside recording.motor_channel"
     if campaign.blank is not None and campaign.blank.motor_records:
-        _expect_own_sensor(campaign, campaign.blank.motor_records)
+        records = list(campaign.blank.motor_records)
+        if motor_channel is not None:
+            limit = f"{beside}: the channel of blank.records tells the motor's mains"
+            raise Refusal("blank.motor_records", records, limit)
+        if campaign.motor_sensor is None:
+            limit = "stands without [motor_sensor]: blank.records tells the mains of the one sensor"
+            raise Refusal("blank.motor_records", records, limit)
     names = [unit.name for unit in campaign.unit]
     for i, unit in enumerate(campaign.unit):
         field = f"unit.{i}"
@@ -127,23 +141,112 @@ def read_campaign(path: Path) -> Campaign:
         distances = [point.distance_mm for point in unit.point]
         if len(set(distances)) < len(distances):
             raise Refusal(f"{field}.point", distances, "has a distance twice; put its records together")
-        if unit.reference and campaign.recording.motor_channel is not None:
-            raise Refusal(f"{field}.reference", list(unit.reference), "stands beside recording.motor_channel")
-        if not unit.reference and campaign.recording.motor_channel is None:
-            raise Refusal(f"{field}.reference", None, "is required, or recording.motor_channel")
+        if bool(unit.reference) == (motor_channel is not None):
+            given = list(unit.reference)
+            limit = beside if given else "is required, or recording.motor_channel"
+            raise Refusal(f"{field}.reference", given or None, limit)
     return campaign
 
 
-def _expect_own_sensor(campaign: Campaign, records: tuple[str, ...]) -> None:
-    """Refuse motor-off records of a motor's sensor where none records alone."""
-    if campaign.recording.motor_channel is not None:
-        limit = "stands beside recording.motor_channel: the channel of blank.records tells the motor's mains"
-        raise Refusal("blank.motor_records", list(records), limit)
-    if campaign.motor_sensor is None:
-        limit = "stands without [motor_sensor]: blank.records tells the mains of the one sensor"
-        raise Refusal("blank.motor_records", list(records), limit)
+def blank_files(campaign: Campaign) -> Iterator[tuple[str, str]]:
+    """Yield key and name of the motor-off records."""
+    if campaign.blank is not None:
+        for key in ("records", "motor_records"):
+            for i, name in enumerate(getattr(campaign.blank, key)):
+                yield f"blank.{key}.{i}", name
 
 
-def plain_data(campaign: Campaign) -> dict[str, object]:
-    """Return the campaign as JSON-ready data."""
-    return msgspec.to_builtins(campaign)
+def check_files(campaign: Campaign, folder: Path) -> None:
+    """Check every name of a campaign whose files lie in or below `folder`, and read no record for it.
+
+    Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice in
+    one unit by its path or its bytes, a [[recording.own]] of no record.
+    """
+    names = []
+    for field, name in blank_files(campaign):
+        expect_ending(file_of(folder, name, field), field)
+        names.append(name)
+    records = []
+    for i, unit in enumerate(campaign.unit):
+        places = {"reference": unit.reference, "edge": unit.edge}
+        places |= {f"point.{k}.records": point.records for k, point in enumerate(unit.point)}
+        records.append(
+            [(f"unit.{i}.{at}.{k}", name) for at, several in places.items() for k, name in enumerate(several)]
+        )
+    _check_own(campaign.recording, list(dict.fromkeys([*names, *(name for unit in records for _, name in unit)])))
+    for i, (unit, several) in enumerate(zip(campaign.unit, records, strict=True)):
+        source_file(unit, folder, f"unit.{i}")
+        paths = [file_of(folder, name, field) for field, name in several]
+        for (field, _), path in zip(several, paths, strict=True):
+            expect_ending(path, field)
+        sizes = [path.stat().st_size for path in paths]
+        seen: dict[str, str] = {}
+        for (field, name), path, size in zip(several, paths, sizes, strict=True):
+            for key in (str(path.resolve()), *([sha256(path)] if sizes.count(size) > 1 else [])):
+                if seen.setdefault(key, field) != field:
+                    limit = f"is the record of {seen[key]} again; a repeat is a recording of its own"
+                    raise Refusal(field, name, limit)
+
+
+_TIME_KEYS = ("rate_hz", "time_column", "time_unit")
+"""Keys that say the same of a record: one of them in `[[recording.own]]` sets aside those of `[recording]`."""
+
+
+def recording_of(table: RecordingTable, name: str) -> RecordingTable:
+    """Return how the record of that name is read: `table` with the values of the [[recording.own]] that names it."""
+    given = next((_given(one) for one in table.own if _matching(one, [name])), {})
+    if "rate_hz" in given or "time_column" in given:
+        given = dict.fromkeys(_TIME_KEYS) | given
+    return msgspec.structs.replace(table, own=(), **given) if given else table
+
+
+@contextmanager
+def own_keys(table: RecordingTable, name: str) -> Iterator[None]:
+    """Let a refusal of a key of `[recording]` name the [[recording.own]] that set it for the record, or that could."""
+    try:
+        yield
+    except Refusal as refusal:
+        key = refusal.field.removeprefix("recording.")
+        if refusal.field == key:
+            raise
+        field, limit = refusal.field, f"{refusal.limit}; [[recording.own]] sets it for some records alone"
+        for i, own in enumerate(table.own):
+            if _matching(own, [name]) and key in _given(own):
+                field, limit = f"recording.own.{i}.{key}", refusal.limit
+        raise type(refusal)(field, refusal.value, limit, refusal.nearest) from None
+
+
+def _check_own(table: RecordingTable, names: list[str]) -> None:
+    """Refuse a [[recording.own]] that sets nothing, that names no record of the campaign, or one of another's."""
+    taken: dict[str, int] = {}
+    for i, own in enumerate(table.own):
+        field = f"recording.own.{i}"
+        if not own.records:
+            raise Refusal(f"{field}.records", [], "names no record")
+        given = _given(own)
+        if not given:
+            keys = ", ".join(key for key in msgspec.structs.asdict(own) if key != "records")
+            raise Refusal(field, None, f"sets nothing beside records: {keys}")
+        if "motor_channel" in given and table.motor_channel is None:
+            raise Refusal(f"{field}.motor_channel", given["motor_channel"], "stands without recording.motor_channel")
+        for k, pattern in enumerate(own.records):
+            found = _matching(own, names, pattern)
+            if not found:
+                close = difflib.get_close_matches(pattern, names, n=1)
+                limit = "names no record of the campaign"
+                raise Refusal(f"{field}.records.{k}", pattern, limit, close[0] if close else None)
+            for name in found:
+                if taken.setdefault(name, i) != i:
+                    limit = f"names {name}, which recording.own.{taken[name]} does too"
+                    raise Refusal(f"{field}.records.{k}", pattern, limit)
+
+
+def _given(own: OwnRecordingTable) -> dict[str, Any]:
+    """Return the keys that a table sets, beside the records."""
+    return {key: value for key, value in msgspec.structs.asdict(own).items() if key != "records" and value is not None}
+
+
+def _matching(own: OwnRecordingTable, names: list[str], *patterns: str) -> list[str]:
+    """Return the names that a table's records name, or some of its patterns do."""
+    patterns = patterns or own.records
+    return [name for name in names if any(one == name or fnmatchcase(name, one) for one in patterns)]

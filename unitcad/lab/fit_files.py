@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from unitcad import files
+from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.lab_fit import PERCENT, ModelFit, quantiles
 from unitcad.export.chart import Series, chart
 from unitcad.lab.fitting import Compared, Fitted
-from unitcad.spec.toml import text_of
+from unitcad.spec.toml import text_of, without_none
 
 FIT = "lab-fit.toml"
 
@@ -28,28 +27,30 @@ def contents(result: Fitted) -> dict[str, str]:
     }
 
 
-def write(folder: Path, made: dict[str, str]) -> None:
-    """Write the files, each whole or not at all, into a folder that is made. Raises OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in made.items():
-        files.write(folder / name, text.encode())
-
-
 def fit_toml(result: Fitted) -> str:
     """Return the fit as an estimate takes it (`[estimate] fit`)."""
-    return text_of(_plain(msgspec.to_builtins(result.fit)))
+    return text_of(without_none(msgspec.to_builtins(result.fit)))
 
 
 def as_data(result: Fitted) -> dict[str, Any]:
     """Return everything as JSON-ready data."""
     settings = result.lab.settings
+    scores = {
+        source: {"reason": compared.reason}
+        if compared.reason
+        else {
+            name: {"left_out": one.score, "range": one.range, "held_80": one.held()}
+            for name, one in compared.judged.items()
+        }
+        for source, compared in result.by_source.items()
+    }
     return {
         "name": settings.name,
         "note": settings.note,
         "moduli": settings.moduli,
-        "by_moduli": {source: _scores(one) for source, one in result.by_source.items()},
+        "by_moduli": rounded(scores, 6),
         "units": unit_rows(result),
-        "fit": _plain(msgspec.to_builtins(result.fit)),
+        "fit": without_none(msgspec.to_builtins(result.fit)),
         "prior": prior_text(result),
         "warnings": warnings(result),
     }
@@ -63,18 +64,10 @@ def unit_rows(result: Fitted) -> list[dict[str, Any]]:
     judged, table = chosen.judged[name], chosen.campaigns.table
     rows = []
     for i, unit in enumerate(table.names):
-        low, high = quantiles(judged.df, judged.centre[i], judged.scale[i])
-        rows.append(
-            {
-                "unit": unit,
-                "own": bool(judged.own[i]),
-                "measured": _short(table.levels[i]),
-                "model": name,
-                "predicted": _short(np.exp(judged.centre[i])),
-                "p10": _short(low),
-                "p90": _short(high),
-            }
-        )
+        low, high = map(float, quantiles(judged.df, judged.centre[i], judged.scale[i]))
+        numbers = {"predicted": float(np.exp(judged.centre[i])), "p10": low, "p90": high}
+        row = {"unit": unit, "own": bool(judged.own[i]), "measured": float(table.levels[i]), "model": name, **numbers}
+        rows.append(rounded(row, 6))
     return rows
 
 
@@ -133,6 +126,10 @@ def page(result: Fitted) -> str:
     """Return the result as Markdown."""
     settings, chosen = result.lab.settings, result.chosen
     own = result.fit.units
+
+    def factor(value: float | None) -> str:
+        return "-" if value is None else f"{value:.2f}"
+
     lines = [f"# Models fitted with the units of {settings.name}", ""]
     lines += [settings.note, ""] if settings.note else []
     lines += [
@@ -147,7 +144,7 @@ def page(result: Fitted) -> str:
         one = entry(result, name)
         lines.append(
             f"| {name} | {one.left_out:.2f} ({one.left_out_low:.2f} to {one.left_out_high:.2f}) | "
-            f"{_factor(one.own_left_out)} | {_factor(one.own_by_stored)} | {against_text(one)} | {one.held} | "
+            f"{factor(one.own_left_out)} | {factor(one.own_by_stored)} | {against_text(one)} | {one.held} | "
             f"{constants_text(one)} |"
         )
     lines += [f"\nWarning: {one}." for one in warnings(result)]
@@ -186,15 +183,6 @@ def page(result: Fitted) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _scores(compared: Compared) -> dict[str, Any]:
-    if compared.reason:
-        return {"reason": compared.reason}
-    return {
-        name: {"left_out": _short(one.score), "range": [_short(end) for end in one.range], "held_80": one.held()}
-        for name, one in compared.judged.items()
-    }
-
-
 def _chart(result: Fitted) -> str:
     rows = unit_rows(result)
     series = []
@@ -208,17 +196,3 @@ def _chart(result: Fitted) -> str:
     series.append(Series("predicted = measured", ends, ends, dashed=True))
     title = f"{result.fit.name}: {best(result.chosen)}, each unit left out"
     return chart(series, title, "measured level", "predicted level", log_x=True, log_y=True)
-
-
-def _factor(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
-
-
-def _plain(node: Any) -> Any:
-    if isinstance(node, dict):
-        return {key: _plain(value) for key, value in node.items() if value is not None}
-    return [_plain(value) for value in node] if isinstance(node, list) else node
-
-
-def _short(value: float) -> float:
-    return float(f"{float(value):.6g}")

@@ -2,30 +2,198 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import get_args
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
+from msgspec import Meta, field
 from msgspec.structs import replace
 
+from unitcad import files
+from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.fitted_models import KAPPA, MODELS
-from unitcad.attenuation.edge.lab_fit import LabFit, ModelFit, unit_key
+from unitcad.attenuation.edge.lab_fit import InputFile, LabFit, ModelFit, OwnLevel, unit_key
 from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable, Moduli, measured_table
 from unitcad.attenuation.edge.scores import SEED
-from unitcad.attenuation.edge.shrunk_fit import Campaigns, Judged, Model, Shrunk, judge, models, paired, shrunk
+from unitcad.attenuation.edge.shrunk_fit import (
+    BETWEEN_LABS,
+    Campaigns,
+    Judged,
+    Model,
+    Shrunk,
+    judge,
+    models,
+    paired,
+    shrunk,
+)
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import materials
-from unitcad.errors import Refusal
+from unitcad.catalogue.entries import Frequency, MaterialEntry
+from unitcad.errors import Refusal, unknown_name
 from unitcad.estimating import estimate_input
-from unitcad.lab.fit_lab import FitLab, OwnUnit
-from unitcad.spec import to_data
+from unitcad.lab.unit_files import Cavity, file_of, measured_walls, source_file, specs_of
+from unitcad.spec import Spec, convert, read_toml, to_data
+from unitcad.spec.asked import Table
 from unitcad.validation import from_data
+from unitcad.validation.shipped_files import named_file, shipped_files
+
+Name = Annotated[str, Meta(min_length=1, max_length=100)]
+LevelValue = Annotated[float, Meta(ge=1e-6, le=1e3, description="amplitude at the edge over the motor's")]
+_TWO_SIDED = 1.96
+"""Half-width of a 95 % interval in standard errors."""
+
+
+class LevelTable(Table, frozen=True, kw_only=True):
+    """A level and its 95 % interval."""
+
+    value: LevelValue
+    low: LevelValue | None = None
+    high: LevelValue | None = None
+
+
+class FitUnitTable(Table, frozen=True, kw_only=True):
+    """A measured unit: its spec with changes, or the record of its casting; its level, or the file that has it."""
+
+    name: Name
+    spec: str | None = None
+    cast: str | None = None
+    cavity: Cavity | None = None
+    set: dict[str, Any] = field(default_factory=dict)
+    frequency_hz: Frequency | None = None
+    level: LevelTable | None = None
+    measured: str | None = None
+
+
+class FitLabFile(Table, frozen=True, kw_only=True):
+    """A lab's measured units as typed."""
+
+    name: Name
+    note: Annotated[str, Meta(max_length=1000)] = ""
+    moduli: Literal["dynamic", "quasi-static"] = "dynamic"
+    with_paper: Annotated[bool, Meta(description="the paper's nine units beside the lab's own")] = True
+    between_labs: Annotated[
+        float, Meta(ge=0, le=100, description="scatter of a constant between labs over that between units")
+    ] = BETWEEN_LABS
+    materials: dict[str, MaterialEntry] = field(default_factory=dict)
+    unit: Annotated[tuple[FitUnitTable, ...], Meta(min_length=1, max_length=1000)]
+
+
+@dataclass(frozen=True)
+class OwnUnit:
+    """A measured unit of the lab: its spec as asked and as built, frequency (Hz, None: the spec's), and level."""
+
+    name: str
+    spec: Spec
+    built: Spec
+    frequency_hz: float | None
+    level: LevelTable
+    source: str
+
+    @property
+    def error(self) -> float:
+        """The standard error of ln level; 0 where no interval is given: it is then part of the discrepancy."""
+        if self.level.low is None or self.level.high is None:
+            return 0.0
+        return float(np.log(self.level.high / self.level.low)) / (2 * _TWO_SIDED)
+
+
+@dataclass(frozen=True)
+class FitLab:
+    """A validated lab: settings, units, and the files that were read."""
+
+    settings: FitLabFile
+    units: tuple[OwnUnit, ...]
+    inputs: tuple[InputFile, ...]
+
+
+def shipped_fits() -> dict[str, Path]:
+    """Return the shipped labs by name."""
+    return shipped_files("fits")
+
+
+def load_fit_lab(source: str) -> FitLab:
+    """Return the lab of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
+
+    Raises Refusal or UnitcadError for the first value that is not valid.
+    """
+    path = named_file(source, shipped_fits(), "LAB")
+    data = read_toml(path)
+    settings = convert(data, FitLabFile)
+    names = [unit.name for unit in settings.unit]
+    inputs = {path.name: files.sha256(path)}
+    entries = {f"materials.{name}": entry for name, entry in data.get("materials", {}).items()}
+    units = []
+    for i, table in enumerate(settings.unit):
+        if table.name in names[:i]:
+            raise Refusal(f"unit.{i}.name", table.name, "is the name of two units")
+        units.append(_unit(f"unit.{i}", table, path.parent, entries, inputs))
+    return FitLab(settings, tuple(units), tuple(InputFile(file=f, sha256=h) for f, h in sorted(inputs.items())))
+
+
+def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, Any], inputs: dict[str, str]) -> OwnUnit:
+    if (table.level is None) == (table.measured is None):
+        raise Refusal(f"{where}.level", None, "is required, or measured; not both")
+    if table.spec is None and table.cast is None:
+        raise Refusal(f"{where}.spec", None, "is required, or cast")
+    source = source_file(table, folder, where)
+    asked, built = specs_of(table, folder, where, table.set, entries)
+    if source:
+        inputs[source] = files.sha256(folder / source)
+    level, hertz, said, field = table.level, table.frequency_hz, "as typed", f"{where}.level"
+    if table.measured is not None:
+        field = f"{where}.measured"
+        path = file_of(folder, table.measured, field)
+        level, measured_hz, chain = _measured(field, table, path, inputs.get(source or ""))
+        inputs[table.measured] = files.sha256(path)
+        hertz, said = hertz or measured_hz, f"{table.measured}, chain {chain}"
+    assert level is not None
+    if (level.low is None) != (level.high is None):
+        raise Refusal(f"{field}.{'low' if level.low is None else 'high'}", None, "is required beside the other end")
+    if level.low is not None and level.high is not None and not level.low <= level.value <= level.high:
+        raise Refusal(f"{field}.value", level.value, f"must lie from low {level.low:g} to high {level.high:g}")
+    walls = measured_walls(asked, built)
+    return OwnUnit(table.name, asked, built, hertz, level, f"{said}, {walls}" if walls else said)
+
+
+def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | None) -> tuple[LevelTable, float, str]:
+    """Return level, frequency and chain of a unit's edge in a file of `unitcad measure`, by the file's first chain.
+
+    Raises Refusal for a level that was measured of another template, spec file, cast record or cavity. A campaign may
+    name a spec where the fit names the record of its casting; then nothing is compared.
+    """
+    data = read_toml(path)
+    chain, rows = data.get("chain"), data.get("level")
+    if data.get("status") != "measured" or not isinstance(rows, list):
+        raise Refusal(where, table.measured, "is no file of unitcad measure")
+    edges = [row for row in rows if isinstance(row, dict) and row.get("distance_mm") == 0 and row.get("chain") == chain]
+    row = next((row for row in edges if row.get("unit") == table.name), None)
+    if row is None:
+        raise unknown_name(f"{where} (unit)", table.name, [str(row.get("unit")) for row in edges])
+    level = convert({key: row[key] for key in ("value", "low", "high") if key in row}, LevelTable)
+    hertz = row.get("frequency_hz")
+    if not isinstance(hertz, int | float):
+        raise Refusal(f"{where}.frequency_hz", hertz, "must be a number")
+    key = "cast" if table.cast is not None else "spec"
+    there, here = row.get(key), getattr(table, key)
+    if there is not None:
+        sha256 = next((one.get("sha256") for one in data.get("source", ()) if one.get("file") == there), None)
+        if sha256 and source_sha256 and sha256 != source_sha256:
+            raise Refusal(where, table.measured, f"was measured with another {here}: its SHA-256 differs")
+        if not sha256 and not source_sha256 and there != here:
+            raise Refusal(where, table.measured, f"was measured of the template {there}, not {here}")
+        if row.get("cavity", table.cavity) != table.cavity:
+            raise Refusal(where, table.measured, f"was measured of cavity {row['cavity']}, not {table.cavity}")
+    return level, float(hertz), str(chain)
+
 
 SOURCES: tuple[Moduli, ...] = get_args(Moduli)
 LEAST_ALONE = 4
 """Units of a lab without the paper's: one is left out, two constants are fitted, one degree of freedom is left."""
+_WIDEST = 10.0
+"""Largest half-width of a range of ln constant that is written: beyond it the units say nothing of the constant."""
 _SIDES = 0.95
 """Quantile at the upper end of a constant's range, 90 % wide."""
 
@@ -83,23 +251,20 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
         raise Refusal("moduli", settings.moduli, chosen.reason)
     measured = []
     for unit in lab.units:
-        variant = estimate_input(unit.spec, unit.frequency_hz)
-        measured.append(unit.stored(unit_key(variant), variant.frequency.middle))
-    made = models()
-    entries = {name: _entry(made[name], name, chosen) for name in made}
+        variant, level = estimate_input(unit.spec, unit.frequency_hz), unit.level
+        hertz = variant.frequency.middle
+        measured.append(
+            OwnLevel(
+                unit=unit.name, key=unit_key(variant), value=level.value, low=level.low, high=level.high,
+                frequency_hz=hertz, source=unit.source,
+            )
+        )  # fmt: skip
+    entries = {name: _entry(model, name, chosen) for name, model in models().items()}
     fit = LabFit(
-        format=1,
-        name=settings.name,
-        units=len(lab.units),
-        moduli=settings.moduli,
-        with_paper=settings.with_paper,
-        between_labs=settings.between_labs,
-        seed=SEED,
-        model={name: entries[name] for name in (*MODELS, "crossings")},
-        null=entries["null"],
-        measured=measured,
-        input=list(lab.inputs),
-    )
+        format=1, name=settings.name, units=len(lab.units), moduli=settings.moduli, with_paper=settings.with_paper,
+        between_labs=settings.between_labs, seed=SEED, model={name: entries[name] for name in (*MODELS, "crossings")},
+        null=entries["null"], measured=measured, input=list(lab.inputs),
+    )  # fmt: skip
     return Fitted(lab, by_source, fit)
 
 
@@ -109,11 +274,9 @@ def _compared(lab: FitLab, moduli: Moduli) -> Compared:
         for at, layer in enumerate(variant.layers):
             if not layer.youngs_modulus.known:
                 return Compared(moduli, None, {}, {}, f"unit.{i}.layers.{at}: {layer.material}: no modulus is known")
-    campaigns = campaigns_of(lab, inputs, moduli)
-    made = models()
+    campaigns, made = campaigns_of(lab, inputs, moduli), models()
     judged = {name: judge(model, campaigns) for name, model in made.items()}
-    fitted = {name: shrunk(model, campaigns) for name, model in made.items()}
-    return Compared(moduli, campaigns, judged, fitted)
+    return Compared(moduli, campaigns, judged, {name: shrunk(model, campaigns) for name, model in made.items()})
 
 
 def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Campaigns:
@@ -156,38 +319,21 @@ def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
     judged, found, campaigns = compared.judged[name], compared.fitted[name], compared.campaigns
     assert campaigns is not None
     spread = stdtrit(found.df, _SIDES) * found.sigma * np.sqrt(np.diag(found.covariance))
+    wide = np.exp(np.minimum(spread, _WIDEST))
     paper = ~campaigns.own
-    stored = model.fit(campaigns.table, paper.astype(float)) if paper.any() else None
+    constants = {"constants": found.constants, "low": found.constants / wide, "high": found.constants * wide}
+    constants["stored"] = model.fit(campaigns.table, paper.astype(float)) if paper.any() else ()
     low, high = judged.range
-    against = paired(judged, compared.judged["null"]) if name != "null" else (None, None, None)
+    against, error, p = paired(judged, compared.judged["null"]) if name != "null" else (None, None, None)
+    numbers = {
+        **{key: dict(zip(model.names, map(float, values), strict=False)) for key, values in constants.items()},
+        "discrepancy": found.sigma, "covariance": found.covariance.tolist(), "left_out": judged.score,
+        "left_out_low": low, "left_out_high": high, "own_left_out": judged.own_score,
+        "own_by_stored": judged.stored_score, "against_null": against, "against_null_error": error, "against_null_p": p,
+    }  # fmt: skip
     return ModelFit(
-        constants=_named(model, found.constants),
-        low=_named(model, found.constants * np.exp(-np.minimum(spread, _WIDEST))),
-        high=_named(model, found.constants * np.exp(np.minimum(spread, _WIDEST))),
-        stored={} if stored is None else _named(model, stored),
         degrees_of_freedom=found.df,
-        discrepancy=_short(found.sigma),
-        covariance=[[_short(value) for value in row] for row in found.covariance],
-        left_out=_short(judged.score),
-        left_out_low=_short(low),
-        left_out_high=_short(high),
-        own_left_out=_short(judged.own_score),
-        own_by_stored=None if judged.stored_score is None else _short(judged.stored_score),
-        against_null=None if against[0] is None else _short(against[0]),
-        against_null_error=None if against[1] is None else _short(against[1]),
-        against_null_p=None if against[2] is None else _short(against[2]),
         held=f"{judged.held()} of {judged.errors.size}",
         at_bound=compared.at_bound(name),
+        **rounded(numbers, 6),
     )
-
-
-_WIDEST = 10.0
-"""Largest half-width of a range of ln constant that is written: beyond it the units say nothing of the constant."""
-
-
-def _named(model: Model, values: np.ndarray) -> dict[str, float]:
-    return {name: _short(value) for name, value in zip(model.names, values, strict=True)}
-
-
-def _short(value: float) -> float:
-    return float(f"{float(value):.6g}")

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from pathlib import Path
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.catalogue import MaterialEntry, materials
-from unitcad.errors import UnitcadError
 from unitcad.export.chart import Series, chart
-from unitcad.lab.dynamic_test import DynamicResult
-from unitcad.lab.tensile_result import TensileResult, quasistatic
+from unitcad.lab.dynamic import DynamicResult
+from unitcad.lab.tensile import TensileResult, quasistatic
 from unitcad.text import toml, toml_key
 
 _NAMED = 3
@@ -61,62 +58,55 @@ def data(
 ) -> dict[str, Any]:
     """Return everything as JSON-ready data; moduli in kPa, strains as fractions."""
     found: dict[str, Any] = {"material": name, "table": dict(entry)}
+
+    def kpa(value: float | None) -> float | None:
+        return None if value is None else value / 1e3
+
+    def warnings(result: TensileResult | DynamicResult) -> list[dict[str, str]]:
+        return [asdict(one) for one in result.warnings]
+
     if tensile:
         found["tensile"] = {
             "quasistatic": quasistatic(tensile, hertz),
-            "value_kpa": tensile.value / 1e3,
-            "low_kpa": tensile.low / 1e3,
-            "high_kpa": tensile.high / 1e3,
+            "value_kpa": kpa(tensile.value), "low_kpa": kpa(tensile.low), "high_kpa": kpa(tensile.high),
             "method": tensile.method,
-            "strain_of_use": list(tensile.used),
+            "strain_of_use": tensile.used,
             "uncertainty": {
-                "methods_factor": tensile.spread,
-                "scatter_of_specimens": tensile.scatter,
+                "methods_factor": tensile.spread, "scatter_of_specimens": tensile.scatter,
                 "cross_section": tensile.geometry,
             },
             "methods": [
                 {
-                    "method": row.method,
-                    "value_kpa": None if row.value is None else row.value / 1e3,
-                    "by_specimen_kpa": [None if one is None else one / 1e3 for one in row.by_specimen],
-                    "defensible": row.defensible,
-                    "reason": row.reason,
+                    "method": row.method, "value_kpa": kpa(row.value), "by_specimen_kpa": list(map(kpa, row.by_specimen)),
+                    "defensible": row.defensible, "reason": row.reason,
                 }
                 for row in tensile.rows
             ],
             "fits": [
                 {
-                    "file": curve.name,
-                    "law": one.method,
-                    "constants": dict(one.fit.constants),
+                    "file": curve.name, "law": one.method, "constants": dict(one.fit.constants),
                     "residual": one.fit.residual,
                 }
                 for curve, methods in zip(tensile.curves, tensile.by_curve, strict=True)
                 for one in methods
                 if one.fit
             ],
-            "warnings": [{"code": one.code, "message": one.message} for one in tensile.warnings],
+            "warnings": warnings(tensile),
             "files": [{"name": curve.name, "sha256": curve.sha256} for curve in tensile.curves],
-        }
+        }  # fmt: skip
     if dynamic:
+        curve = dynamic.curve
         found["dynamic"] = {
             "law": "E0 (1 + (i w tau)^n)",
-            "static_kpa": dynamic.static / 1e3,
-            "tau_s": dynamic.tau,
-            "n": dynamic.n,
-            "residual": dynamic.residual,
-            "measured_hz": [float(dynamic.curve.frequency[0]), float(dynamic.curve.frequency[-1])],
+            "static_kpa": kpa(dynamic.static), "tau_s": dynamic.tau, "n": dynamic.n, "residual": dynamic.residual,
+            "measured_hz": [float(curve.frequency[0]), float(curve.frequency[-1])],
             "frequency_hz": dynamic.frequency_hz,
-            "storage_kpa": dynamic.storage / 1e3,
-            "loss_factor": dynamic.loss_factor,
-            "error": dynamic.error,
-            "loss_factor_error": dynamic.loss_error,
-            "fit_error": dynamic.fit_error,
-            "extrapolated": dynamic.extrapolated,
-            "upper_half_predicted_error": dynamic.held_out_error,
-            "warnings": [{"code": one.code, "message": one.message} for one in dynamic.warnings],
-            "files": [{"name": dynamic.curve.name, "sha256": dynamic.curve.sha256}],
-        }
+            "storage_kpa": kpa(dynamic.storage), "loss_factor": dynamic.loss_factor,
+            "error": dynamic.error, "loss_factor_error": dynamic.loss_error, "fit_error": dynamic.fit_error,
+            "extrapolated": dynamic.extrapolated, "upper_half_predicted_error": dynamic.held_out_error,
+            "warnings": warnings(dynamic),
+            "files": [{"name": curve.name, "sha256": curve.sha256}],
+        }  # fmt: skip
     return rounded(found)
 
 
@@ -163,55 +153,28 @@ def dynamic_chart(name: str, result: DynamicResult, factor: float) -> str:
     return chart(series, title, "frequency, Hz", "modulus, kPa", log_x=True, log_y=True, shaded=shaded)
 
 
-def write(folder: Path, contents: Mapping[str, str]) -> None:
-    """Write all files, or none: each is written under another name first. Raises UnitcadError where that fails."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with files.scratch(folder) as fresh:
-            for name, text in contents.items():
-                files.write_new(fresh / name, text.encode())
-            for name in contents:
-                (fresh / name).replace(folder / name)
-    except OSError as error:
-        raise UnitcadError(f"{folder}: {error.strerror or error}") from None
-
-
-def json_text(found: Mapping[str, Any]) -> str:
-    """Return the data as the text of a JSON file."""
-    return json.dumps(found, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-
-
 def _dynamic(result: DynamicResult) -> dict[str, Any]:
-    low, high = (float(np.exp(sign * result.error)) for sign in (-1, 1))
-    narrow, wide = (float(np.exp(sign * result.loss_error)) for sign in (-1, 1))
     ends = result.curve.frequency[0], result.curve.frequency[-1]
     way = "extrapolated from" if result.extrapolated else "within"
     source = f"{result.curve.name}, {result.frequency_hz:g} Hz, {way} {ends[0]:g} to {ends[1]:g} Hz"
-    method = "storage modulus of a fractional Kelvin-Voigt law"
-    storage, loss = result.storage / 1e3, result.loss_factor
-    rest = {"status": "measured", "source": source, "method": "fractional Kelvin-Voigt law"}
+    law = {"status": "measured", "source": source, "method": "fractional Kelvin-Voigt law"}
+
+    def ranged(value: float, error: float, method: str) -> dict[str, Any]:
+        return _value(value, value * float(np.exp(-error)), value * float(np.exp(error)), method, source)
+
+    constants = {"mu0_kpa": result.static / 3e3, "tau_us": result.tau * 1e6, "n": result.n}
     return {
-        "youngs_modulus_kpa": _value(storage, storage * low, storage * high, method, source),
-        "loss_factor": _value(loss, loss * narrow, loss * wide, "loss over storage of the same law", source),
-        "fractional_mu0_kpa": {"value": _four(result.static / 3e3), **rest},
-        "fractional_tau_us": {"value": _four(result.tau * 1e6), **rest},
-        "fractional_n": {"value": _four(result.n), **rest},
+        "youngs_modulus_kpa": ranged(
+            result.storage / 1e3, result.error, "storage modulus of a fractional Kelvin-Voigt law"
+        ),
+        "loss_factor": ranged(result.loss_factor, result.loss_error, "loss over storage of the same law"),
+        **{f"fractional_{name}": {"value": rounded(value, 4), **law} for name, value in constants.items()},
     }
 
 
 def _value(value: float, low: float, high: float, method: str, source: str) -> dict[str, Any]:
-    return {
-        "value": _four(value),
-        "low": _four(low),
-        "high": _four(high),
-        "status": "measured",
-        "method": method,
-        "source": source[:500],
-    }
-
-
-def _four(value: float) -> float:
-    return float(f"{value:.4g}")
+    ends = rounded({"value": value, "low": low, "high": high}, 4)
+    return {**ends, "status": "measured", "method": method, "source": source[:500]}
 
 
 def _named(names: list[str]) -> str:

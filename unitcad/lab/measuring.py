@@ -1,35 +1,84 @@
-"""A campaign measured: every record, then the level of each unit at its edge and along the skin."""
+"""A campaign measured: every record, then the level of each unit at its edge and along the skin.
+
+A level is amplitudes over the motor's, from repeats, with an interval of 95 %. The mean of ratios with their standard
+deviation covers the truth too rarely: ratios are skewed, and three repeats say little of their own scatter. So
+logarithms are averaged, and Student's t widens the interval for the few repeats.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
+from unitcad.errors import Refusal
 from unitcad.files import sha256
-from unitcad.lab.campaign import Campaign, UnitTable
-from unitcad.lab.campaign_files import blank_files, check_files
-from unitcad.lab.chains.chain import Chain
-from unitcad.lab.chains.line import Mains
-from unitcad.lab.chains.signal_chains import chains_of
-from unitcad.lab.lab_rules import LabFinding, found
-from unitcad.lab.levels import LEAST_REPEATS, Level, level, paired_level
-from unitcad.lab.measured_record import measure_record
-from unitcad.lab.motor_off import mains_of_blanks
-from unitcad.lab.record_result import RecordResult
-from unitcad.lab.unit_files import file_of, source_file
+from unitcad.lab.campaign import Campaign, RecordingTable, UnitTable, blank_files, check_files, own_keys, recording_of
+from unitcad.lab.chains import chains_of
+from unitcad.lab.chains.chain import Chain, Mains
+from unitcad.lab.chains.line import mains_columns, mains_orders, solve, trend_columns
+from unitcad.lab.readers import Layout, open_recording
+from unitcad.lab.record import LabFinding, RecordResult, found, measure_record, open_signal
+from unitcad.lab.unit_files import source_file
 
+COVERAGE = 0.95
+LEAST_REPEATS = 3
 MOST_DISAGREEMENT = 0.15
 """Standard deviation of the repeats' logarithms: three times the usual one."""
 NEAR_MOTOR = 0.2
 """Part of the motor's frequency, to either side, in which a unit's line is looked for."""
-
 MOST_APART = 0.1
 """Part of the motor's frequency by which the unit's may differ: beyond, it is another motor's."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """A level with the ends of its interval of 95 %, the repeats above and below the line, and degrees of freedom.
+
+    `scatter` is the standard deviation of the repeats' logarithms, the larger of both sides'.
+    """
+
+    value: float
+    low: float
+    high: float
+    repeats: tuple[int, int]
+    freedom: float
+    scatter: float
+
+
+def level(amplitudes: Sequence[float], references: Sequence[float] | None = None, shared: float = 0.0) -> Level:
+    """Return the level of repeated amplitudes over repeated amplitudes of the motor, measured apart.
+
+    Without `references` the amplitudes are ratios to a motor that was recorded at the same time. The two scatters may
+    differ (Welch 1947, Satterthwaite 1946). `shared` is a relative standard uncertainty that all repeats have in
+    common. Raises Refusal for fewer than three repeats of either.
+    """
+    from scipy.stats import norm, t
+
+    sides = []
+    for field, values in (("points", amplitudes), ("reference", references)):
+        if values is None:
+            continue
+        if len(values) < LEAST_REPEATS:
+            limit = f"has {len(values)} usable repeats; a level needs {LEAST_REPEATS} or more"
+            raise Refusal(field, None, limit)
+        sides.append(np.log(values))
+    counts, means = [len(logs) for logs in sides], [float(np.mean(logs)) for logs in sides]
+    variances = [float(np.var(logs, ddof=1)) for logs in sides]
+    parts = [variance / count for variance, count in zip(variances, counts, strict=True)]
+    weights = sum(part**2 / (count - 1) for part, count in zip(parts, counts, strict=True))
+    freedom = sum(parts) ** 2 / weights if weights > 0 else float(sum(counts) - len(counts))
+    log = means[0] - sum(means[1:])
+    quantile = (1 + COVERAGE) / 2
+    half = math.hypot(float(t.ppf(quantile, freedom)) * math.sqrt(sum(parts)), float(norm.ppf(quantile)) * shared)
+    ends = (math.exp(log), math.exp(log - half), math.exp(log + half))
+    return Level(*ends, (counts[0], counts[-1]), freedom, math.sqrt(max(variances)))
 
 
 @dataclass(frozen=True)
@@ -70,14 +119,13 @@ class Measured:
         return {name: value for chain in self.chains for name, value in chain.assumed.items()}
 
 
-def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambda stage: None) -> Measured:
-    """Measure a campaign whose files lie in or below `folder`, as its TOML file gives them.
+def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambda name: None) -> Measured:
+    """Measure a campaign whose files lie in or below `folder`; `say` is told each record.
 
-    Raises Refusal for a file that is not there or can't be read without a guess.
+    Raises Refusal for what can't be read.
     """
     check_files(campaign, folder)
-    mains = mains_of_blanks(campaign, folder)
-    paired = campaign.recording.motor_channel is not None
+    mains = _mains_of_blanks(campaign, folder)
     levels: list[PlaceLevel] = []
     records: dict[str, tuple[RecordResult, ...]] = {}
     findings: list[LabFinding] = []
@@ -85,85 +133,123 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     for i, unit in enumerate(campaign.unit):
         if name := source_file(unit, folder, f"unit.{i}"):
             specs[name] = sha256(folder / name)
-        one = _unit(unit, f"unit.{i}", campaign, folder, mains, say)
-        records[unit.name] = tuple(one)
+        records[unit.name] = tuple(one := _records(unit, campaign, folder, mains, say))
         findings += [finding for record in one for finding in record.findings]
-        found_levels, more = _levels(unit, one, campaign, paired)
-        levels += found_levels
-        findings += more
+        for role, distance in _places(unit):
+            more, said = _levels(unit, role, distance, one, campaign)
+            levels += more
+            findings += said
     return Measured(campaign, tuple(levels), records, tuple(findings), specs, mains[0].blank, mains[1].blank)
 
 
-def _unit(
-    unit: UnitTable,
-    field: str,
-    campaign: Campaign,
-    folder: Path,
-    mains: tuple[Mains, Mains],
-    say: Callable[[str], None],
+def _mains_of_blanks(campaign: Campaign, folder: Path) -> tuple[Mains, Mains]:
+    """Return the mains of the unit's sensor and of the motor's, by multiple the largest amplitude of all records.
+
+    The motor's are of the motor's channel if blank.records have it, of blank.motor_records if its sensor records alone,
+    and the unit's if both have one sensor. Raises Refusal for a record that can't be read.
+    """
+    hertz, table, blank = campaign.chain.mains_hz, campaign.recording, campaign.blank
+
+    def mains(names: Sequence[str], of_motor: bool) -> Mains:
+        largest: dict[int, float] = {}
+        sensor = campaign.motor_sensor if of_motor and campaign.motor_sensor else campaign.sensor
+        for name in names:
+            own = recording_of(table, name)
+            if of_motor and own.motor_channel is not None:
+                own = msgspec.structs.replace(own, channel=own.motor_channel, motor_channel=None)
+            with own_keys(table, name):
+                signal = open_signal(folder / name, own, (sensor,), name)
+            samples = next(signal.sections())[:, 0]
+            good = np.isfinite(samples)
+            time = np.arange(len(samples)) / signal.rate
+            orders = mains_orders(hertz, signal.rate, (), float(time[-1]))
+            columns = np.concatenate([mains_columns(time, hertz, orders), trend_columns(time)])
+            values = solve(columns, np.where(good, samples, 0.0), good)[0]
+            for i, order in enumerate(orders):
+                largest[order] = max(largest.get(order, 0.0), float(np.hypot(*values[2 * i : 2 * i + 2])))
+        return Mains(hertz, tuple(sorted(largest.items())))
+
+    if blank is None:
+        return Mains(hertz), Mains(hertz)
+    unit = mains(blank.records, False)
+    if table.motor_channel is not None:
+        return unit, mains(
+            [name for name in blank.records if _has_motor(folder / name, recording_of(table, name))], True
+        )
+    if campaign.motor_sensor in (None, campaign.sensor):
+        return unit, unit
+    return unit, mains(blank.motor_records, True)
+
+
+def _has_motor(path: Path, table: RecordingTable) -> bool:
+    """Tell whether a motor-off record has the motor's channel; one of the unit's sensor alone need not."""
+    channel = table.motor_channel
+    channels = open_recording(path, Layout(table.delimiter, table.decimal, table.skip_lines)).channels
+    return channel <= len(channels) if isinstance(channel, int) else channel in [one.name for one in channels]
+
+
+def _places(unit: UnitTable) -> list[tuple[str, float]]:
+    """Return role and distance of a unit's places, the nearest first."""
+    points = sorted((point.distance_mm, f"{point.distance_mm:g} mm") for point in unit.point)
+    return [("edge", 0.0)] * bool(unit.edge) + [(role, distance) for distance, role in points]
+
+
+def _records(
+    unit: UnitTable, campaign: Campaign, folder: Path, mains: tuple[Mains, Mains], say: Callable[[str], None]
 ) -> list[RecordResult]:
     """Measure a unit's records: the motor's first, whose frequency the others' lines are looked for near."""
-    motor_sensor = campaign.motor_sensor or campaign.sensor
-    paired = campaign.recording.motor_channel is not None
+    motor = campaign.motor_sensor or campaign.sensor
     band = campaign.chain.band_hz
+    sensors = (campaign.sensor, motor) if campaign.recording.motor_channel is not None else (campaign.sensor,)
     out = []
-    for i, name in enumerate(unit.reference):
+    for name in unit.reference:
         say(name)
-        path = file_of(folder, name, f"{field}.reference.{i}")
-        out.append(measure_record(path, "reference", campaign, (motor_sensor,), mains[1:], band, name, unit.lines))
+        out.append(measure_record(folder / name, "reference", campaign, (motor,), mains[1:], band, name, unit.lines))
     hertz = [record.frequency_hz for record in out if record.usable]
     if hertz:
         middle = float(np.median(hertz))
         band = (max(band[0], middle * (1 - NEAR_MOTOR)), min(band[1], middle * (1 + NEAR_MOTOR)))
-    sensors = (campaign.sensor, motor_sensor) if paired else (campaign.sensor,)
-    places = [("edge", f"{field}.edge", unit.edge)]
-    places += [(f"{p.distance_mm:g} mm", f"{field}.point.{k}.records", p.records) for k, p in enumerate(unit.point)]
-    for role, where, names in places:
-        for i, name in enumerate(names):
+    places = [("edge", unit.edge), *((f"{point.distance_mm:g} mm", point.records) for point in unit.point)]
+    for role, names in places:
+        for name in names:
             say(name)
-            path = file_of(folder, name, f"{where}.{i}")
-            out.append(measure_record(path, role, campaign, sensors, mains, band, name, unit.lines))
+            out.append(measure_record(folder / name, role, campaign, sensors, mains, band, name, unit.lines))
     return out
 
 
 def _levels(
-    unit: UnitTable, records: list[RecordResult], campaign: Campaign, paired: bool
+    unit: UnitTable, role: str, distance: float, records: list[RecordResult], campaign: Campaign
 ) -> tuple[list[PlaceLevel], list[LabFinding]]:
-    levels, findings = [], []
-    places = [("edge", 0.0)] if unit.edge else []
-    places += [(f"{point.distance_mm:g} mm", point.distance_mm) for point in unit.point]
-    for role, distance in sorted(places, key=lambda place: place[1]):
-        there = [record for record in records if record.role == role and record.usable]
-        motor = [record for record in records if record.role == "reference" and record.usable]
-        few = [len(side) for side in ([there] if paired else [there, motor]) if len(side) < LEAST_REPEATS]
-        where = f"{unit.name}, {role}"
-        if few:
-            findings.append(found("L112", where, f"{few[0]} usable records; a level needs {LEAST_REPEATS}"))
-            continue
-        shared = max(record.shared for record in (*there, *motor))
-        here: list[PlaceLevel] = []
-        for chain in chains_of(campaign.chain):
-            for hertz, values, below in _sides(chain, there, there if paired else motor):
-                at = f"{where}, {hertz:.2f} Hz, by {chain.name}"
-                if not values:
-                    none = found("L116", where, f"nothing near the motor's {hertz:.2f} Hz")
-                    findings += [] if none in findings else [none]  # the same of every chain
-                elif min(len(values), len(below)) < LEAST_REPEATS:
-                    count = min(len(values), len(below))
-                    findings.append(found("L112", at, f"{count} usable records; a level needs {LEAST_REPEATS}"))
-                else:
-                    result = paired_level(values, shared) if paired else level(values, below, shared)
-                    here.append(PlaceLevel(unit.name, distance, chain.name, result, hertz))
-                    if result.scatter > MOST_DISAGREEMENT:
-                        findings.append(
-                            found("L109", where, f"by {chain.name}: logarithms scatter by {result.scatter:.2f}")
-                        )
-        levels += here
-        if len({one.chain for one in here}) == len(here):
-            for one, other in combinations(here, 2):
-                if one.level.high < other.level.low or other.level.high < one.level.low:
-                    said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
-                    findings.append(found("L115", where, said))
+    """Return a unit's levels at one place, by every chain and of every line, with what is wrong with them."""
+    there = [record for record in records if record.role == role and record.usable]
+    motor = [record for record in records if record.role == "reference" and record.usable]
+    paired = campaign.recording.motor_channel is not None
+    where = f"{unit.name}, {role}"
+    for side in (there,) if paired else (there, motor):
+        if len(side) < LEAST_REPEATS:
+            return [], [found("L112", where, f"{len(side)} usable records; a level needs {LEAST_REPEATS}")]
+    shared = max(record.shared for record in (*there, *motor))
+    levels: list[PlaceLevel] = []
+    findings: list[LabFinding] = []
+    for chain in chains_of(campaign.chain):
+        for hertz, values, below in _sides(chain, there, there if paired else motor):
+            at, count = f"{where}, {hertz:.2f} Hz, by {chain.name}", min(len(values), len(below))
+            if not values:
+                none = found("L116", where, f"nothing near the motor's {hertz:.2f} Hz")
+                findings += [] if none in findings else [none]  # the same of every chain
+            elif count < LEAST_REPEATS:
+                findings.append(found("L112", at, f"{count} usable records; a level needs {LEAST_REPEATS}"))
+            else:
+                result = level(values, None if paired else below, shared)
+                levels.append(PlaceLevel(unit.name, distance, chain.name, result, hertz))
+                if result.scatter > MOST_DISAGREEMENT:
+                    message = f"by {chain.name}: logarithms scatter by {result.scatter:.2f}"
+                    findings.append(found("L109", where, message))
+    if len({one.chain for one in levels}) == len(levels):
+        for one, other in combinations(levels, 2):
+            if one.level.high < other.level.low or other.level.high < one.level.low:
+                said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
+                findings.append(found("L115", where, said))
     return levels, findings
 
 
@@ -174,28 +260,25 @@ def _sides(
 
     A chain that tells no lines apart has one entry. No values at all: no record has a line near the motor's.
     """
+
+    def near(records: list[RecordResult], hertz: float, most: float) -> list[tuple[float, float]]:
+        """Return of each record its nearest line to a frequency, of records that have one close enough."""
+        lines = [min(one.by_line, key=lambda line: abs(line[0] - hertz)) for one in records if one.by_line]
+        return [line for line in lines if abs(line[0] - hertz) < most]
+
+    def sizes(lines: list[tuple[float, float]]) -> list[float]:
+        return [value for _, value in lines]
+
     lines = sorted(hertz for hertz, _ in max(motor, key=lambda one: len(one.by_line)).by_line)
     if chain.each_line and len(lines) > 1:
-        gap = min(b - a for a, b in pairwise(lines))
-        return [(hertz, _near(there, hertz, gap / 2), _near(motor, hertz, gap / 2)) for hertz in lines]
+        gap = min(b - a for a, b in pairwise(lines)) / 2
+        return [(hertz, sizes(near(there, hertz, gap)), sizes(near(motor, hertz, gap))) for hertz in lines]
     middle = float(np.median([one.frequency_hz for one in motor]))
-    values = _near(there, middle, MOST_APART * middle)
+    values = near(there, middle, MOST_APART * middle)
     if not values or chain.each_line:
-        nearest = [min((hz for hz, _ in one.by_line), key=lambda hz: abs(hz - middle), default=middle) for one in there]
-        hertz = float(np.median(nearest)) if values else middle
-        return [(hertz, values, _near(motor, middle, MOST_APART * middle))]
+        hertz = float(np.median([hz for hz, _ in near(there, middle, np.inf)])) if values else middle
+        return [(hertz, sizes(values), sizes(near(motor, middle, MOST_APART * middle)))]
     values, below = (
         [one.by_chain[chain.name] for one in side if chain.name in one.by_chain] for side in (there, motor)
     )
-    hertz = float(np.median([one.frequency_hz for one in there]))
-    return [(hertz, values, below)] if values else []
-
-
-def _near(records: list[RecordResult], hertz: float, most: float) -> list[float]:
-    """Return of each record the value of the line nearest to a frequency, of records that have one close enough."""
-    out = []
-    for record in records:
-        at, value = min(record.by_line, key=lambda one: abs(one[0] - hertz), default=(np.inf, 0.0))
-        if abs(at - hertz) < most:
-            out.append(value)
-    return out
+    return [(float(np.median([one.frequency_hz for one in there])), values, below)] if values else []

@@ -25,14 +25,9 @@ Cavity = Annotated[int, Meta(ge=1, le=999, description="the unit of a cast recor
 class UnitNames(Protocol):
     """A table that names what a unit is: a template or spec file, or a cast record and a cavity of it."""
 
-    @property
-    def spec(self) -> str | None: ...
-
-    @property
-    def cast(self) -> str | None: ...
-
-    @property
-    def cavity(self) -> int | None: ...
+    spec: str | None
+    cast: str | None
+    cavity: int | None
 
 
 def file_of(folder: Path, name: str, field: str) -> Path:
@@ -109,21 +104,20 @@ def _cast(unit: UnitNames, folder: Path, field: str) -> tuple[CastRecord, CastUn
         record = read_cast_record(path)
     except UnitcadError as error:
         raise Refusal(where, name, str(error)) from None
-    cavities = [one.cavity for one in record.units]
+    units = {one.cavity: one for one in record.units}
     usable = [one for one in record.units if one.usable]
-    if unit.cavity is None:
-        if len(cavities) > 1 and len(usable) != 1:
-            limit = f"is required: {name} has the cavities {', '.join(map(str, cavities))}"
-            raise Refusal(f"{field}.cavity", None, limit)
-        found = (usable or [*record.units, None])[0]
+    listed, field = ", ".join(map(str, units)), f"{field}.cavity"
+    if unit.cavity is not None:
+        found = units.get(unit.cavity)
+        if found is None and units:
+            nearest = min(units, key=lambda cavity: abs(cavity - unit.cavity))  # type: ignore[operator]
+            raise Refusal(field, unit.cavity, f"{name} has no such unit; it has {listed}", nearest)
+    elif len(units) > 1 and len(usable) != 1:
+        raise Refusal(field, None, f"is required: {name} has the cavities {listed}")
     else:
-        found = record.unit(unit.cavity)
-        if found is None and cavities:
-            limit = f"{name} has no such unit; it has {', '.join(map(str, cavities))}"
-            nearest = min(cavities, key=lambda cavity: abs(cavity - unit.cavity))  # type: ignore[operator]
-            raise Refusal(f"{field}.cavity", unit.cavity, limit, nearest)
+        found = next(iter([*usable, *record.units]), None)
     if found is not None and not found.usable:
-        raise Refusal(f"{field}.cavity", found.cavity, f"{name} says that this unit is not usable")
+        raise Refusal(field, found.cavity, f"{name} says that this unit is not usable")
     return record, found
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from msgspec import structs
 
 from unitcad.designs import Design, Dimensions, design_of, unit_bodies
+from unitcad.designs.design import Fitting
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.plan import Plan, Step, plan
 from unitcad.moulds.ribs import rib_spaces
@@ -166,9 +167,10 @@ class MouldSet:
         return "spec.toml"
 
     @property
-    def assembly(self) -> tuple[str, ...]:
+    def assembly(self) -> tuple[Fitting, ...]:
         """How motor and circuit go into the body, or into the mould, in the design's words; () where it has none."""
-        return tuple(self.design.assembly(self.spec, self.plan.dimensions))
+        said = self.design.assembly(self.spec, self.plan.dimensions)
+        return tuple(each if isinstance(each, Fitting) else Fitting(each) for each in said)
 
     @property
     def plate(self) -> tuple[float, float]:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from unitcad import files
 from unitcad.errors import Missing, Refusal, UnitcadError
 from unitcad.export import slicer
-from unitcad.pipeline.folder import held
-from unitcad.pipeline.manifest_records import Manifest
-from unitcad.pipeline.stages import Say, Take
+from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.write import held
 from unitcad.spec import Spec, printer_of
 
 SLICED = "slicer.json"
@@ -31,23 +30,7 @@ def check_slicing(spec: Spec, only: Sequence[str]) -> None:
         raise Refusal("moulds.printer", printer.name, "prints no filament: leave out --slice", "fdm-0.4")
 
 
-def begin(spec: Spec, folder: Path, say: Say = lambda message: None) -> slicer.Pieces:
-    """Return the slicing of a spec's pieces; those that the folder's slicer.json has are not sliced again."""
-    return slicer.Pieces(printer_of(spec), _earlier(folder / SLICED), say)
-
-
-def take(pieces: slicer.Pieces) -> Take:
-    """Return what `build` gives its files to, so that tools are sliced while the rest is made."""
-
-    def taken(path: str, content: bytes) -> None:
-        folder, _, name = path.rpartition("/")
-        if folder == "moulds" and name.endswith(".stl"):
-            pieces.add(name, content)
-
-    return taken
-
-
-def finish(pieces: slicer.Pieces, folder: Path, manifest: Manifest) -> str:
+def slice_tools(spec: Spec, folder: Path, manifest: Manifest, say: Callable[[str], object]) -> str:
     """Write the slicer.json of a built folder's tools and return in a sentence what they take.
 
     A file that the slicer refuses is named and no error, since another slicer may take it.
@@ -57,7 +40,7 @@ def finish(pieces: slicer.Pieces, folder: Path, manifest: Manifest) -> str:
         for part in manifest["parts"]
         if part["role"] == "tool" and "stl" in part["files"] and part["files"]["stl"]["path"].startswith("moulds/")
     ]
-    with held(folder):
+    with held(folder), slicer.Pieces(printer_of(spec), _earlier(folder / SLICED), say) as pieces:
         try:
             report = pieces.report({path.name: path.read_bytes() for path in tools})
         except UnitcadError as error:

@@ -10,6 +10,7 @@ from unitcad import notebook
 from unitcad.catalogue import materials
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.plan import unit_section
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
 from unitcad.validation import Source, load
@@ -83,10 +84,7 @@ class Variant(MouldSet):
 
     def section(self) -> str:
         """Return the drawing of the unit cut along its tail, with dimensions in mm, as SVG."""
-        from unitcad.export.svg import unit_section
-
-        concentric = self.design.tooling == "concentric"
-        return unit_section(self.unit, self.dimensions, self.segments, concentric=concentric)
+        return unit_section(self)
 
     def __repr__(self) -> str:
         return f"Variant({self.spec.summary})"

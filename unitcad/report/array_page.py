@@ -13,12 +13,12 @@ from unitcad import files
 from unitcad.arrays.array_file import array_of
 from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.arrays.layouts import layouts
-from unitcad.casting.time_line import duration
+from unitcad.casting.steps import duration
 from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
 from unitcad.mould_checks import mould_checks
-from unitcad.pipeline.folder import ARRAY, BENCH, PAGE
-from unitcad.pipeline.manifest_records import ArrayManifest
+from unitcad.pipeline.manifest import ArrayManifest
+from unitcad.pipeline.write import ARRAY, BENCH, PAGE
 from unitcad.report.array_view import array_model
 from unitcad.report.plain_page import VIEW, drawing, picture, plain_page
 from unitcad.report.records import expect

@@ -11,7 +11,7 @@ from unitcad.arrays.patch import PatchPart, patch_parts
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.arrays.patch_pictures import laid_elsewhere, taken_apart
 from unitcad.moulds.plan import Step
-from unitcad.pipeline.bodies import glb_content, patch_glb
+from unitcad.pipeline.plan import glb_content, patch_glb
 from unitcad.report.html_page import compressed
 from unitcad.shape import union
 from unitcad.shape.body import Body

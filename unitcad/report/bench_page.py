@@ -13,8 +13,8 @@ import msgspec
 from unitcad import __version__, files
 from unitcad.casting.cast_record import ENDING, FORMAT, HASH_DIGITS
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.folder import BENCH
-from unitcad.pipeline.manifest_records import Manifest
+from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.write import BENCH
 from unitcad.report.html_page import html_page
 from unitcad.report.records import expect
 from unitcad.report.step_pictures import step_pictures

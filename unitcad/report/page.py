@@ -13,7 +13,7 @@ from unitcad import __version__
 from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
 from unitcad.files import write
-from unitcad.pipeline.folder import BENCH, PAGE
+from unitcad.pipeline.write import BENCH, PAGE
 from unitcad.report import batch_table, read_results
 from unitcad.report.bench_page import write_bench
 from unitcad.report.html_page import asset, html_page

@@ -19,8 +19,8 @@ from unitcad import files
 from unitcad.casting.cast_record import ENDING, read_cast_record
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import TEMPORARY
-from unitcad.pipeline.folder import ADDRESS, ARRAY, PAGE, STORE
-from unitcad.pipeline.manifest_records import Manifest
+from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.write import ADDRESS, ARRAY, PAGE, STORE
 from unitcad.report.records import ResultsTable, VariantRecord, expect
 from unitcad.report.step_pictures import step_pictures
 from unitcad.report.viewer_models import model_key, spec_in

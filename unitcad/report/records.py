@@ -9,7 +9,7 @@ import msgspec
 from msgspec import UNSET, Struct, UnsetType, structs
 
 from unitcad.errors import UnitcadError, misfit
-from unitcad.pipeline.manifest_records import Manifest
+from unitcad.pipeline.manifest import Manifest
 from unitcad.report.pool import REFERENCE
 
 DEEPEST = 40

@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.artifacts import GEOMETRIC
-from unitcad.pipeline.bodies import glb_content
-from unitcad.pipeline.geometry import build_key
+from unitcad.pipeline.plan import GEOMETRIC, build_key, glb_content
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
 from unitcad.report.html_page import compressed
 from unitcad.spec import Spec, read_toml, with_formats

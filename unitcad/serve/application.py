@@ -25,10 +25,10 @@ from unitcad.serve.gate import Gate, Limits
 from unitcad.serve.jobs import Jobs
 from unitcad.serve.keys import Keys
 from unitcad.serve.live_page import HEADER_POLICY, live_page
-from unitcad.serve.live_worker import WorkerLost
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
 from unitcad.text import toml
+from unitcad.workers import NoWorker, WorkerEnded
 
 T = TypeVar("T", bound=msgspec.Struct)
 CAMPAIGN_S = 300.0
@@ -97,13 +97,12 @@ class Live:
     @contextlib.asynccontextmanager
     async def lifespan(self, app: Starlette) -> AsyncIterator[None]:
         """Warm the workers up at the start, end workers and jobs at the end."""
-        warm = () if self.setting.campaign else ANSWER_S
-        warming = [asyncio.create_task(self.questions.warm(what)) for what in warm]
+        for what in () if self.setting.campaign else ANSWER_S:
+            self.questions.pool(what)
         try:
             yield
         finally:
             await self.close()
-            await asyncio.gather(*warming)
 
     async def close(self) -> None:
         """End jobs and workers; a question under way is answered that the server is ending."""
@@ -132,14 +131,14 @@ class Live:
 
     async def _campaign(self, path: Path) -> Response:
         """Answer with the page of a campaign, measured anew; a change of its file is seen by loading it again."""
-        worker, status = self.questions.workers["estimate"], 422
-        async with worker.turn:
+        status = 422
+        async with self.questions.turns["estimate"]:
             try:
-                content = await worker.ask(
-                    "unitcad.serve.campaign_page:measured", str(path).encode(), seconds=CAMPAIGN_S
+                content = await self.questions.call(
+                    "estimate", "unitcad.serve.campaign_page:measured", str(path).encode(), seconds=CAMPAIGN_S
                 )
                 given = msgspec.json.decode(content)
-            except WorkerLost as error:
+            except (WorkerEnded, NoWorker) as error:
                 given, status = {"refused": str(error)}, 500
         if "page" in given:
             return self._html(given["page"])
@@ -166,7 +165,7 @@ class Live:
         refused = None
         try:
             await self._effective(save.text)
-        except (UnitcadError, WorkerLost) as error:
+        except UnitcadError as error:
             refused = str(error)
         return msgspec.json.encode(
             {"path": str(path), "sha256": hashlib.sha256(content).hexdigest(), "refused": refused}
@@ -212,11 +211,11 @@ class Live:
 
         Raises UnitcadError for a text that is refused.
         """
-        worker = self.questions.workers["unit"]
-        async with worker.turn:
-            content = await worker.ask(
-                "unitcad.serve.answers:effective", text.encode("utf-8", "replace"), self.questions.trusted, seconds=10.0
-            )
+        async with self.questions.turns["unit"]:
+            content = await self.questions.call(
+                "unit", "unitcad.serve.answers:effective", text.encode("utf-8", "replace"), self.questions.trusted,
+                seconds=10.0,
+            )  # fmt: skip
         given = msgspec.json.decode(content)
         if "refused" in given:
             raise UnitcadError(given["refused"])
@@ -280,7 +279,7 @@ async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaita
     except Superseded:
         # No fault: a browser would tell of one in its console.
         return _json(msgspec.json.encode({"superseded": True}))
-    except WorkerLost as error:
+    except (WorkerEnded, NoWorker) as error:
         return _json(msgspec.json.encode({"faults": [Fault(str(error))], "again": True}), 500)
     except Refusal as error:
         return _json(msgspec.json.encode({"faults": [Fault(str(error), error.field, error.as_dict()["nearest"])]}), 422)

@@ -152,9 +152,9 @@ def _patch(array: Array, answer: Answer) -> None:
 def _tools(array: Array, answer: Answer) -> None:
     from unitcad.arrays.array_procedure import array_procedure
     from unitcad.arrays.patch_moulds import patch_moulds
-    from unitcad.casting.in_short import in_short
+    from unitcad.casting.steps import in_short
     from unitcad.mould_checks import check_moulds
-    from unitcad.pipeline.array_product import unit_folders
+    from unitcad.pipeline.arrays import unit_folders
     from unitcad.report.array_view import tools_model
 
     moulds = patch_moulds(array)

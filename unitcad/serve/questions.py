@@ -4,17 +4,28 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from pkgutil import resolve_name
 
 import msgspec
 
-from unitcad.serve.live_worker import TimeIsUp, Worker, WorkerLost
+from unitcad.errors import UnitcadError
 from unitcad.serve.messages import Ask, Trusted, What
+from unitcad.workers import Pool, TimedOut, WorkerEnded
 
 ANSWER_S: dict[What, float] = {"unit": 20.0, "moulds": 60.0, "estimate": 30.0}
 """Seconds that a question may take, by what is asked."""
 GRACE_S = 1.5
 """Seconds after which an overtaken question is ended: before, its answer is nearer than another worker."""
 _UNDONE: dict[What, str] = {"unit": "not made", "moulds": "not judged", "estimate": "not estimated"}
+MEMORY = 4 << 30
+"""Bytes of address space that a worker may take."""
+PRELOAD = (
+    "unitcad.serve.answers",
+    "unitcad.mould_checks",
+    "unitcad.estimating",
+    "unitcad.export.svg",
+    "unitcad.casting.procedure",
+)
 _MOST_PAGES = 100
 """Pairs of a page and a question whose newest one is remembered."""
 
@@ -24,46 +35,66 @@ class Superseded(Exception):
 
 
 class Questions:
-    """The workers, one for each kind of question; they are warmed up with the first text."""
+    """The workers: for each kind of question one that answers, and one that is warm when that one is ended."""
 
     def __init__(self, text: str, trusted: Trusted) -> None:
-        self.workers = {what: Worker() for what in ANSWER_S}
         self.trusted = msgspec.json.encode(trusted)
         self._text = text
+        self._pools: dict[What, Pool] = {}
+        self.turns = {what: asyncio.Lock() for what in ANSWER_S}
         self._newest: dict[tuple[str, What], asyncio.Event] = {}
 
-    async def warm(self, what: What) -> None:
-        """Have a worker answer about the first text."""
-        worker = self.workers[what]
-        with contextlib.suppress(WorkerLost):
-            async with worker.turn:
-                await worker.ask(*self._parts(Ask(text=self._text, what=what)), seconds=ANSWER_S[what])
+    def pool(self, what: What) -> Pool:
+        """Return the workers of a kind, which start with the first look."""
+        if what not in self._pools:
+            warm = (warmed, *self._parts(Ask(text=self._text, what=what)))
+            self._pools[what] = Pool(2, memory=MEMORY, load=PRELOAD, prepare=warm)
+        return self._pools[what]
 
     async def ask(self, ask: Ask) -> bytes:
-        """Return the answer to a question. Raises Superseded where a newer one of its page came, WorkerLost."""
-        worker = self.workers[ask.what]
+        """Return the answer to a question. Raises Superseded if a newer one of its page came, WorkerEnded, NoWorker."""
         overtaken = self._overtake(ask)
-        async with worker.turn:
+        async with self.turns[ask.what]:
             if overtaken.is_set():
                 raise Superseded
-            answer = asyncio.create_task(worker.ask(*self._parts(ask), seconds=ANSWER_S[ask.what]))
+            answer = asyncio.create_task(self.call(ask.what, *self._parts(ask), seconds=ANSWER_S[ask.what]))
             try:
                 await asyncio.wait([answer], timeout=GRACE_S)
                 if not answer.done():
-                    worker.prepare(*self._parts(Ask(text=self._text, what=ask.what)))
                     await _either(answer, overtaken)
                 if not answer.done():
                     raise Superseded
                 return await answer
-            except TimeIsUp as error:
-                raise WorkerLost(f"{_UNDONE[ask.what]}: it took more than {error.seconds:g} s") from None
+            except TimedOut:
+                raise WorkerEnded(f"{_UNDONE[ask.what]}: it took more than {ANSWER_S[ask.what]:g} s") from None
             finally:
-                answer.cancel()  # which ends its worker, where it is under way
+                answer.cancel()  # which ends its worker if it is under way
                 await asyncio.wait([answer])
 
+    async def call(self, what: What, function: str, *parts: bytes, seconds: float) -> bytes:
+        """Call a function "module:name" in the worker of a kind; once more if the worker ends by itself."""
+        for left in (1, 0):
+            call = self.pool(what).submit(function, *parts, seconds=seconds)
+            try:
+                return await asyncio.wrap_future(call)
+            except TimedOut:
+                raise
+            except WorkerEnded:  # it may have ended while it had nothing to do
+                if not left:
+                    raise
+            except MemoryError:
+                raise WorkerEnded("it takes more memory than a worker may have") from None
+            except (UnitcadError, asyncio.CancelledError):
+                raise
+            except Exception as error:
+                raise WorkerEnded(f"internal error: {type(error).__name__}: {error} (a bug)") from error
+            finally:
+                call.stop()
+        raise AssertionError
+
     async def close(self) -> None:
-        """End the workers; a question under way is answered that the server is ending."""
-        await asyncio.gather(*(worker.close() for worker in self.workers.values()))
+        """End the workers; a question under way is answered that its worker was stopped."""
+        await asyncio.gather(*(asyncio.to_thread(pool.shutdown) for pool in self._pools.values()))
 
     def _overtake(self, ask: Ask) -> asyncio.Event:
         """Tell the older question of the same page; returns what a newer one will set."""
@@ -87,3 +118,9 @@ async def _either(answer: asyncio.Task[bytes], event: asyncio.Event) -> None:
         await asyncio.wait([answer, waiting], return_when=asyncio.FIRST_COMPLETED)
     finally:
         waiting.cancel()
+
+
+def warmed(function: str, *parts: bytes) -> None:
+    """Answer a question whose answer is not wanted."""
+    with contextlib.suppress(Exception):
+        resolve_name(function)(*parts)

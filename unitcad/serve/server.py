@@ -14,7 +14,7 @@ from unitcad.arrays.array_names import array_templates, is_array
 from unitcad.arrays.array_units import expanded
 from unitcad.errors import Missing, Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text
-from unitcad.pipeline.folder import ARRAY
+from unitcad.pipeline.write import ARRAY
 from unitcad.report.page import page_data
 from unitcad.report.read_results import is_array_folder, is_variant
 from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown

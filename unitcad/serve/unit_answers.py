@@ -85,7 +85,7 @@ def _unit(spec: Spec, answer: Answer) -> None:
     from unitcad.estimating import motor_mass
     from unitcad.export.svg import unit_section
     from unitcad.moulds.mould_set import MouldSet
-    from unitcad.pipeline.bodies import glb_content
+    from unitcad.pipeline.plan import glb_content
     from unitcad.pipeline.scenes import unit_apart
     from unitcad.validation import warnings
 
@@ -121,10 +121,10 @@ def _grams(spec: Spec, volumes: list[float]) -> list[float]:
 
 
 def _moulds(spec: Spec, answer: Answer) -> None:
-    from unitcad.casting.in_short import in_short
+    from unitcad.casting.steps import in_short
     from unitcad.mould_checks import check_moulds
     from unitcad.moulds.mould_set import MouldSet
-    from unitcad.pipeline.bodies import glb_content
+    from unitcad.pipeline.plan import glb_content
     from unitcad.pipeline.scenes import moments, taken_apart
     from unitcad.report.viewer_models import cells
 
@@ -148,7 +148,7 @@ def unit_procedure(moulds: MouldSet) -> Procedure:
 
 def printed_mm3(moulds: MouldSet) -> float:
     """Return the volume of all printed tools."""
-    from unitcad.pipeline.bodies import is_printed
+    from unitcad.pipeline.plan import is_printed
 
     return sum(moulds.mesh(tool).volume() for tool in moulds.plan.tools if is_printed(tool))
 

@@ -40,7 +40,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
 
 def to_data(spec: Spec) -> dict[str, Any]:
     """Return the spec as plain data without what is None; validated again, it is the same spec."""
-    data = _without_none(msgspec.to_builtins(spec))
+    data = without_none(msgspec.to_builtins(spec))
     for layer in data["layers"]:
         if not layer["cap_mm"]:
             del layer["cap_mm"]
@@ -94,7 +94,7 @@ def text_of(data: Mapping[str, Any]) -> str:
     return tomli_w.dumps(data)
 
 
-def _without_none(node: Any) -> Any:
+def without_none(node: Any) -> Any:
     if isinstance(node, dict):
-        return {key: _without_none(value) for key, value in node.items() if value is not None}
-    return [_without_none(value) for value in node] if isinstance(node, list | tuple) else node
+        return {key: without_none(value) for key, value in node.items() if value is not None}
+    return [without_none(value) for value in node] if isinstance(node, list | tuple) else node

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import lru_cache
+from math import isfinite
 from typing import Any
 
 from msgspec.structs import replace
@@ -264,14 +265,17 @@ def _quantity(quantity: Quantity, factor: float) -> dict[str, Any]:
     return {**scaled, **({"note": quantity.note} if quantity.note else {})}
 
 
-def rounded(data: Any) -> Any:
-    """Return `data` with its floats to nine significant digits, so that the last bits of a platform do not show."""
+def rounded(data: Any, digits: int = SIGNIFICANT_DIGITS) -> Any:
+    """Return `data` with its floats to `digits` significant digits, and None for what is not finite.
+
+    So the last bits of a platform do not show.
+    """
     if isinstance(data, str):  # the most frequent
         return data
     if isinstance(data, float):
-        return float(f"{data:.{SIGNIFICANT_DIGITS}g}")
+        return float(f"{data:.{digits}g}") if isfinite(data) else None
     if isinstance(data, dict):
-        return {key: rounded(value) for key, value in data.items()}
+        return {key: rounded(value, digits) for key, value in data.items()}
     if isinstance(data, (list, tuple)):  # a union would be made anew at each call
-        return [rounded(value) for value in data]
+        return [rounded(value, digits) for value in data]
     return data

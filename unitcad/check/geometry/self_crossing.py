@@ -25,7 +25,6 @@ from unitcad.check.geometry.triangle_mesh import MANY, same_place
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct
 from unitcad.geometry.boxes import Slabs, box_pairs, meeting_parts
 from unitcad.geometry.ticks import Interrupted, Tick
-from unitcad.sharing import shared
 
 LEAST_SHELLS = 200  # compared shell by shell, where they are small
 _BLOCK = 1 << 17
@@ -140,7 +139,7 @@ def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, 
         # Each begins with nothing known: which process does it has no say in what is found.
         return _met(faces, slabs, walks[k], Crossings(None, Contacts(topology.n_shells, every), parts=len(walks)), tick)
 
-    for met in shared(part, len(walks)):
+    for met in map(part, range(len(walks))):
         crossings.crossing += met.crossing
         crossings.covering += met.covering
         crossings.leaning += met.leaning

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from unitcad import children
 from unitcad.check.findings import Facts, Finding, number
 from unitcad.check.options import Options
 from unitcad.check.rules.f_file import F003, F012
 from unitcad.check.rules.f_limits import F011
 from unitcad.check.rules.g_crossing import G001
 from unitcad.check.rules.g_shells import G007, T008, expected
+from unitcad.workers import Pool, TimedOut, WorkerEnded
 
 NEEDS = "STEP needs the extra step: in a clone, pip install '.[step]'"
 
@@ -51,26 +47,20 @@ def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Fin
 
 
 def _from_child(path: Path, seconds: float) -> dict[str, Any]:
-    """Return what `measure` finds, in a process of its own: OCCT dies of some malformed files, and it prints."""
-    with TemporaryDirectory() as folder:
-        out = Path(folder, "measured.json")
-        try:
-            done = children.run([sys.executable, "-P", "-c", _CHILD, str(path), str(out)], timeout=seconds)
-        except subprocess.TimeoutExpired as error:
-            raise F011.unreadable(f"not finished within --timeout {seconds:g} s") from error
-        if done.returncode == 0 and out.exists():
-            return json.loads(out.read_text("utf-8"))
-    last = done.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
-    if last.startswith(("ImportError", "ModuleNotFoundError")):
-        raise F012.unreadable(f"{NEEDS} ({last[:200]})")
-    raise F003.unreadable(f"the STEP reader died of the file (exit code {done.returncode})")
+    """Return what `measure` finds, in a worker: OCCT dies of some malformed files, and it prints."""
+    try:
+        with Pool() as pool:
+            return pool.submit(measure, str(path), seconds=seconds).result()
+    except TimedOut as error:
+        raise F011.unreadable(f"not finished within --timeout {seconds:g} s") from error
+    except WorkerEnded as error:
+        raise F003.unreadable(f"the STEP reader died of the file ({error})") from error
+    except ImportError as error:
+        raise F012.unreadable(f"{NEEDS} ({error})"[:200]) from error
 
 
-_CHILD = "import sys; from unitcad.check.readers.read_step import measure; measure(sys.argv[1], sys.argv[2])"
-
-
-def measure(path: str, out: str) -> None:
-    """Write validity, solids, volume (mm3), area (mm2) and box of a STEP file as JSON; {} where it holds no shape."""
+def measure(path: str) -> dict[str, Any]:
+    """Return validity, solids, volume (mm3), area (mm2) and box of a STEP file; {} if it holds no shape."""
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
@@ -92,7 +82,7 @@ def measure(path: str, out: str) -> None:
         BRepGProp.SurfaceProperties_s(shape, area)
         measures = {"valid": BRepCheck_Analyzer(shape).IsValid(), "solids": solids, "box": _box(shape)}
         measures |= {"volume": float(volume.Mass()), "area": float(area.Mass())}
-    Path(out).write_text(json.dumps(measures, allow_nan=False), "utf-8")
+    return measures
 
 
 def _box(shape: Any) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:

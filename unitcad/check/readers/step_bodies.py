@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from unitcad import children
 from unitcad.errors import UnitcadError
+from unitcad.workers import Pool, TimedOut
 
-_CHILD = (
-    "import sys; from unitcad.check.readers.step_bodies import write_bodies;"
-    " write_bodies(sys.argv[1], sys.argv[2], float(sys.argv[3]))"
-)
 _ANGLE = 0.35
 """Largest angle between neighbouring facets of a curved face, radians."""
 
@@ -27,24 +20,17 @@ def step_bodies(path: Path, tolerance: float, seconds: float) -> list[tuple[str,
     No facet lies farther than `tolerance` (mm) from its surface. Vertices of neighbouring B-rep faces are not joined.
     Raises UnitcadError where OCCT fails, or takes longer than `seconds`: it runs in a process of its own.
     """
-    with TemporaryDirectory() as folder:
-        out = Path(folder, "bodies.npz")
-        try:
-            done = children.run(
-                [sys.executable, "-P", "-c", _CHILD, str(path), str(out), repr(tolerance)], timeout=seconds
-            )
-        except subprocess.TimeoutExpired:
-            raise UnitcadError(f"OCCT needs more than {seconds:g} s for it") from None
-        if done.returncode or not out.exists():
-            last = done.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
-            raise UnitcadError(f"OCCT can't turn it into a mesh: {last[:200] or f'exit code {done.returncode}'}")
-        with np.load(out) as held:
-            names = [str(name) for name in held["names"]]
-            return [(name, held[f"vertices{i}"], held[f"faces{i}"]) for i, name in enumerate(names)]
+    try:
+        with Pool() as pool:
+            return pool.submit(read_bodies, str(path), tolerance, seconds=seconds).result()
+    except TimedOut:
+        raise UnitcadError(f"OCCT needs more than {seconds:g} s for it") from None
+    except Exception as error:
+        raise UnitcadError(f"OCCT can't turn it into a mesh: {str(error)[:200]}") from error
 
 
-def write_bodies(path: str, out: str, tolerance: float) -> None:
-    """Write what `step_bodies` returns as an npz file."""
+def read_bodies(path: str, tolerance: float) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Return what `step_bodies` does, in this process."""
     from OCP.STEPCAFControl import STEPCAFControl_Reader
     from OCP.TCollection import TCollection_ExtendedString
     from OCP.TDF import TDF_LabelSequence
@@ -58,13 +44,11 @@ def write_bodies(path: str, out: str, tolerance: float) -> None:
     reader.Transfer(document)
     roots = TDF_LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
-    held: dict[str, Any] = {}
-    names = []
-    for root in range(1, roots.Length() + 1):
-        for name, solid in _solids(roots.Value(root), "", TopLoc_Location()):
-            held[f"vertices{len(names)}"], held[f"faces{len(names)}"] = _triangles(solid, tolerance)
-            names.append(name)
-    np.savez(out, names=np.array(names, dtype=str), **held)
+    return [
+        (name, *_triangles(solid, tolerance))
+        for root in range(1, roots.Length() + 1)
+        for name, solid in _solids(roots.Value(root), "", TopLoc_Location())
+    ]
 
 
 def _solids(label: Any, called: str, place: Any) -> list[tuple[str, Any]]:

@@ -9,8 +9,77 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from unitcad.geometry.arrays import Floats
-from unitcad.lab.chains.line_fit import LineFit
 from unitcad.spec.asked import Table
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A line's phase in rad over time in s, and by how many parameters it was fitted."""
+
+    at: Callable[[Floats], Floats]
+    parameters: int
+
+    def later(self, by_s: float) -> Phase:
+        """Return the phase of the same line over a time that begins later by so many seconds."""
+        return Phase(lambda t: self.at(t + by_s), self.parameters)
+
+
+@dataclass(frozen=True)
+class Mains:
+    """The mains' frequency in Hz, and by multiple the amplitude that a motor-off record has, in the signal's unit."""
+
+    frequency_hz: float = 50.0
+    blank: tuple[tuple[int, float], ...] = ()
+
+    def amplitude(self, order: int) -> float | None:
+        """Return a multiple's amplitude in the motor-off record; None without such a record."""
+        return dict(self.blank).get(order, 0.0) if self.blank else None
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line: frequency in Hz, amplitude (peak) and its standard uncertainty in the signal's unit."""
+
+    frequency_hz: float
+    amplitude: float
+    u: float
+
+
+@dataclass(frozen=True)
+class LineFit:
+    """A record's line: amplitude (peak) with its standard uncertainty, in the signal's unit.
+
+    `u_noise` is the part of `u` that the noise beside the line gives, `u_mains` the part that every repeat shares.
+    `value` is the complex amplitude against `phase`. `drift` is the range of the frequency over its mean, `snr` the
+    amplitude over the residual's standard deviation, `scatter` the standard deviation of the amplitude of blocks over
+    their mean. `masked` is the part of the samples left out by their residual, `dropped` the same where one of them
+    lies further off than noise does, else 0; `missing` the part that are no numbers. `clipped` is the level at which
+    the signal is cut off over its true amplitude (infinite where it isn't). `lines` are all lines where several were
+    fitted together, the strongest first.
+    """
+
+    amplitude: float
+    u: float
+    u_noise: float
+    u_mains: float
+    value: complex
+    frequency_hz: float
+    drift: float
+    snr: float
+    scatter: float
+    start_s: float
+    end_s: float
+    masked: float = 0.0
+    dropped: float = 0.0
+    missing: float = 0.0
+    clipped: float = float("inf")
+    mains_hz: float = 0.0
+    """The multiple of the mains' frequency that the record can't tell from the line; 0 where there is none."""
+    lines: tuple[Line, ...] = ()
+    phase: Phase | None = field(default=None, compare=False, repr=False)
+    blocks: tuple[complex, ...] = field(default=(), repr=False)
+    """The line's complex amplitude in equal blocks of the span."""
+
 
 Hertz = Annotated[float, Meta(ge=1, le=500)]
 ChainName = Annotated[str, Meta(min_length=1, max_length=40)]

@@ -8,22 +8,17 @@ noise's density at the line over the record's length, of the scatter of blocks, 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats
-from unitcad.lab.chains import demodulation, hidden_mains, least_squares, uncertainty
-from unitcad.lab.chains.censored import solve_censored
-from unitcad.lab.chains.chain import Chain, ChainTable
-from unitcad.lab.chains.clipping import LOWEST, NEAR, clip_mask
-from unitcad.lab.chains.demodulation import Phase
-from unitcad.lab.chains.line_fit import LineFit
-from unitcad.lab.chains.running_part import MOST_RUNNING, running_part
-from unitcad.lab.chains.several import several_lines
+from unitcad.lab.chains.chain import Chain, ChainTable, Line, LineFit, Mains, Phase
 
 BAND_HZ = (60.0, 250.0)
+HARMONICS = 3
 FAR = 4.5
 """Robust standard deviations of the residual beyond which a sample is left out, which noise exceeds here and there."""
 FALSE_ALARM = 1e-3
@@ -32,24 +27,54 @@ LEAST_FOLLOWED = 1.0
 """Signal to noise from which short spectra tell the line's frequency to a hertz."""
 ROUNDS = 6
 LEAST_SAMPLES = 16
+RESOLVED = 1.5
+"""Periods of the difference that a record must hold for two lines to be told apart."""
 
 
-@dataclass(frozen=True)
-class Mains:
-    """The mains' frequency in Hz, and by multiple the amplitude that a motor-off record has, in the signal's unit."""
+def chain(table: ChainTable) -> Chain:
+    """Return the chain, whose amplitude is that of the fit that every record has."""
+    return Chain("line", lambda x, rate, fit: fit.amplitude, each_line=True)
 
-    frequency_hz: float = 50.0
-    blank: tuple[tuple[int, float], ...] = ()
 
-    def amplitude(self, order: int) -> float | None:
-        """Return a multiple's amplitude in the motor-off record; None without such a record."""
-        return dict(self.blank).get(order, 0.0) if self.blank else None
+def fit_line(
+    x: Floats,
+    rate: float,
+    band: tuple[float, float] = BAND_HZ,
+    mains: Mains = Mains(),
+    full_scale: float | None = None,
+    phase: Phase | None = None,
+    span: tuple[float, float] | None = None,
+) -> LineFit | None:
+    """Return the line of samples x (n) at `rate` in Hz; None where the band holds no line.
+
+    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude. Where
+    the line is there for less than about two thirds of the samples, it is fitted to the longest stretch that has it.
+    """
+    good = np.isfinite(x)
+    if span is not None:
+        short = span[1] - span[0] <= MOST_RUNNING * len(x) / rate
+        part = (int(span[0] * rate), int(np.ceil(span[1] * rate)) + 1) if short else None
+    elif good.sum() < LEAST_SAMPLES:
+        return None
+    else:
+        part = running_part(x - np.median(x[good]), good, rate, band, mains.frequency_hz)
+    if part is None:
+        return _fit_running(x, rate, band, mains, full_scale, phase, span)
+    start = part[0] / rate
+    within = None if span is None else (span[0] - start, span[1] - start)
+    fit = _fit_running(x[slice(*part)], rate, band, mains, full_scale, phase and phase.later(start), within)
+    if fit is None or fit.phase is None:
+        return fit
+    return replace(fit, start_s=fit.start_s + start, end_s=fit.end_s + start, phase=phase or fit.phase.later(-start))
 
 
 @dataclass(frozen=True)
 class _Solution:
     """One least-squares solution of a record."""
 
+    phase: Phase
+    span: tuple[float, float]
+    frequency: float
     value: complex
     residual: Floats
     mains: Floats
@@ -63,45 +88,7 @@ class _Solution:
     """Whether a sample that was left out lies further off than noise does."""
 
 
-def chain(table: ChainTable) -> Chain:
-    """Return the chain, whose amplitude is that of the fit that every record has."""
-    return Chain("line", lambda x, rate, fit: fit.amplitude, each_line=True)
-
-
-def fit_line(
-    x: Floats,
-    rate: float,
-    band: tuple[float, float] = BAND_HZ,
-    mains: Mains | None = None,
-    full_scale: float | None = None,
-    phase: Phase | None = None,
-    span: tuple[float, float] | None = None,
-) -> LineFit | None:
-    """Return the line of samples x (n) at `rate` in Hz; None where the band holds no line.
-
-    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude. Where
-    the line is there for less than about two thirds of the samples, it is fitted to the longest stretch that has it.
-    """
-    mains = mains or Mains()
-    good = np.isfinite(x)
-    if span is not None:
-        short = span[1] - span[0] <= MOST_RUNNING * len(x) / rate
-        part = (int(span[0] * rate), int(np.ceil(span[1] * rate)) + 1) if short else None
-    elif good.sum() < LEAST_SAMPLES:
-        return None
-    else:
-        part = running_part(x - np.median(x[good]), good, rate, band, mains.frequency_hz)
-    if part is None:
-        return _fit_line(x, rate, band, mains, full_scale, phase, span)
-    start = part[0] / rate
-    within = None if span is None else (span[0] - start, span[1] - start)
-    fit = _fit_line(x[slice(*part)], rate, band, mains, full_scale, phase and phase.later(start), within)
-    if fit is None or fit.phase is None:
-        return fit
-    return replace(fit, start_s=fit.start_s + start, end_s=fit.end_s + start, phase=phase or fit.phase.later(-start))
-
-
-def _fit_line(
+def _fit_running(
     x: Floats,
     rate: float,
     band: tuple[float, float],
@@ -117,222 +104,136 @@ def _fit_line(
         return None
     middle = float(np.median(x[good]))
     x = np.where(good, x - middle, 0.0)
-    cut, _, part = clip_mask(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
+    cut, part = clip_mask(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
     if part < LOWEST:  # nothing is left that says how high the line went
         cut = np.zeros(len(x), bool)
     deviation = 1.4826 * np.median(np.abs(x[good]))
-    known = good & ~cut
+    allowed = known = good & ~cut
     if deviation > 0 and part >= LOWEST:
-        known &= np.abs(x) < 6 * deviation
+        known = known & (np.abs(x) < 6 * deviation)
     time = np.arange(len(x)) / rate
-    removed = 0.0
-    found: tuple[_Solution, Phase, tuple[float, float]] | None = None
-    for attempt in range(2):
-        if phase is not None and span is not None:
-            frequency = _frequency(phase, span)[0]
-            solution = _solve(x, time, rate, known, good & ~cut, cut, span, phase, frequency, mains)
-            found = (solution, phase, span) if solution else None
-        else:
-            frequency = demodulation.coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
-            found = _twice(x, time, rate, known, good & ~cut, cut, frequency, mains) if frequency > 0 else None
-        if found is None:
+
+    def solved(phase: Phase, span: tuple[float, float]) -> _Solution | None:
+        """Fit a line of given phase over a span, without the samples whose residual is far off; None without samples.
+
+        Of samples that are `cut` the fit knows that the line lies beyond them. To leave them out, and those near them
+        by their own noise, would bias it; and where the rate is a small multiple of the frequency, too few are left.
+        """
+        inside = _within(time, span)
+        here, part = time[inside], x[inside]
+        frequencies = _frequencies(phase, span)
+        frequency = float(frequencies.mean())
+        orders = mains_orders(mains.frequency_hz, rate, (frequency,), span[1] - span[0], float(np.ptp(frequencies)))
+        line = line_columns(phase.at(here), frequency, rate)
+        columns = np.concatenate([line, mains_columns(here, mains.frequency_hz, orders), trend_columns(here)])
+        use, beyond = known[inside].copy(), cut[inside].copy()
+        if use.sum() < LEAST_SAMPLES:
             return None
-        hidden = None if attempt else _hidden(found[0], time, rate, found[2], found[1], mains, phase is None)
-        if hidden is None:
-            break
-        x, removed = x - hidden[0], hidden[1]
-    assert found is not None
-    solution, phase, span = found
-    fit = _summary(solution, time, rate, phase, span, mains, removed)
-    masked = float(np.mean(~solution.good[good & ~cut]))
+        side = np.where(beyond, np.sign(part), 0.0)
+        ends = [(1 - NEAR) * float(np.max(sign * x[cut], initial=0.0)) for sign in (1, -1)]
+        for _ in range(ROUNDS):
+            if beyond.any():
+                plateau = np.where(side > 0, ends[0], -ends[1])
+                found, covariance = solve_censored(columns, part, use | beyond, side, plateau)
+            else:
+                found, covariance = solve(columns, part, use)
+            residual = part - found @ columns
+            limit = FAR * 1.4826 * np.median(np.abs(residual[use]))
+            beyond &= residual * side < limit  # a drop-out may touch the plateau too
+            far = (np.abs(residual) > limit) & ~beyond if limit > 0 else np.zeros(len(part), bool)
+            far[1:] |= far[:-1].copy()
+            far[:-1] |= far[1:].copy()
+            fresh = allowed[inside] & ~far
+            if fresh.sum() < 0.3 * len(part) or np.array_equal(fresh, use):
+                break
+            use = fresh
+        deviation = 1.4826 * float(np.median(np.abs(residual[use])))
+        left_out = np.abs(residual[allowed[inside] & ~beyond])
+        hum, shape, left, kept = np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x)), known.copy()
+        count = len(line)
+        hum[inside] = found[count:-2] @ columns[count:-2]
+        shape[inside] = found[:count] @ line + found[-2:] @ columns[-2:]
+        kept[inside] = use
+        left[inside] = np.where(use, residual, 0.0)
+        towards = found[:2] / max(float(np.hypot(*found[:2])), 1e-300)
+        widening = np.sqrt(max(float(towards @ covariance[:2, :2] @ towards) * use.sum() / 2, 1.0))
+        beyond_span = found[count:-2] @ mains_columns(time, mains.frequency_hz, orders)
+        far_off = deviation > 0 and np.any(left_out > most_of_noise(len(left_out)) * deviation)
+        value = complex(found[0], -found[1])
+        return _Solution(
+            phase, span, frequency, value, left, hum, beyond_span, shape, kept, float(widening), bool(far_off)
+        )
+
+    if phase is not None and span is not None:
+        found = solved(phase, span)
+    else:  # demodulate and fit; then again without the mains and the drop-outs of the first fit
+        found, clean, use = None, x, known
+        frequency = coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
+        for _ in range(2 if frequency > 0 else 0):
+            at, line = envelope(clean, use, rate, frequency)
+            if len(at) < 4:
+                return None
+            span = steady_span(at, line, len(x) / rate)
+            inside = (at >= span[0]) & (at <= span[1])
+            best = _best_phase(clean, time, rate, use, span, phases(at[inside], line[inside], frequency))
+            fresh = best and solved(best, span)
+            if fresh is None:
+                break
+            found, frequency = fresh, fresh.frequency
+            left_out = (time >= span[0]) & (time <= span[1]) & ~found.good
+            clean, use = np.where(left_out, found.line, x - found.mains), use | left_out
+    if found is None:
+        return None
+    fit = _summary(found, time, rate, mains)
+    masked = float(np.mean(~found.good[allowed]))
     fit = replace(
-        fit,
-        masked=masked,
-        dropped=masked if solution.beyond_noise else 0.0,
-        missing=float(np.mean(~good)),
-        clipped=part,
+        fit, masked=masked, dropped=masked if found.beyond_noise else 0.0, missing=float(np.mean(~good)), clipped=part
     )
-    inside = (time >= span[0]) & (time <= span[1])
     if fit.snr > LEAST_FOLLOWED:
-        clean = np.where(solution.good, x - solution.mains_beyond, solution.line)
-        beyond = demodulation.frequencies_beyond(clean, rate, span, fit.frequency_hz)
-        fit = replace(fit, drift=_drift_while_running(fit, beyond))
-    use = inside & solution.good
-    return several_lines(x - solution.mains, solution.residual, time, use, fit, rate, mains.frequency_hz) or fit
+        clean = np.where(found.good, x - found.mains_beyond, found.line)
+        beyond = frequencies_beyond(clean, rate, found.span, fit.frequency_hz)
+        if beyond:
+            drift = np.ptp([*_frequencies(found.phase, found.span), *beyond]) / fit.frequency_hz
+            fit = replace(fit, drift=float(drift))
+    use = (time >= found.span[0]) & (time <= found.span[1]) & found.good
+    return several_lines(x - found.mains, found.residual, time, use, fit, rate, mains.frequency_hz) or fit
 
 
-def _drift_while_running(fit: LineFit, beyond: list[float]) -> float:
-    """Return the range of the frequency over its mean, with what it is where the line runs on beyond its span."""
-    assert fit.phase is not None
-    if not beyond:
-        return fit.drift
-    within = _frequencies(fit.phase, (fit.start_s, fit.end_s))
-    return float(np.ptp([*within, *beyond])) / fit.frequency_hz
+def _summary(found: _Solution, time: Floats, rate: float, mains: Mains) -> LineFit:
+    """Return a solution's figures with their uncertainty.
 
-
-def _hidden(
-    solution: _Solution, time: Floats, rate: float, span: tuple[float, float], phase: Phase, mains: Mains, free: bool
-) -> tuple[Floats, float] | None:
-    """Return the mains that the record alone can't tell from the line, and what they leave in its amplitude's u.
-
-    None where there are none, or nothing is known of them. `free`: the phase was fitted to the line.
+    Mains that the record can't tell from the line have any phase: their part in u is what a motor-off record has.
     """
-    order = _hidden_order(phase, span, rate, mains)
-    amplitude = mains.amplitude(order) if order else None
-    if not amplitude:
-        return None
+    span = found.span
     inside = (time >= span[0]) & (time <= span[1])
-    here, good = time[inside], solution.good[inside]
-    angle = phase.at(here)
-    residual = solution.residual[inside] * np.exp(-1j * angle)
-    deviation = uncertainty.noise(residual, good, rate) * np.sqrt(good.sum())
-    line, weight = uncertainty.blocks_of(solution.value, residual, good, rate, hidden_mains.BLOCK_S)
-    middle = uncertainty.blocks_of(0.0, here, np.ones(len(here), bool), rate, hidden_mains.BLOCK_S)[0] / 2
-    kept = weight > 0
-    turned = np.interp(middle, here, angle)
-    hertz = order * mains.frequency_hz
-    noise = deviation / np.sqrt(weight[kept])
-    found = hidden_mains.hidden_mains(line[kept], middle[kept], turned[kept], noise, hertz, amplitude, free)
-    wave = 2 * np.pi * hertz * time
-    return found.cosine * np.cos(wave) + found.sine * np.sin(wave), found.u
-
-
-def _hidden_order(phase: Phase, span: tuple[float, float], rate: float, mains: Mains) -> int:
-    """Return the multiple of the mains' frequency that a record can't tell from its line; 0 where there is none."""
-    frequency, spread = _frequency(phase, span)
+    good = found.good[inside]
+    residual = found.residual[inside] * np.exp(-1j * found.phase.at(time[inside]))
+    noise = found.widening * noise_beside(residual, good, rate)
+    blocks = block_means(found.value, residual, good, rate)
+    amplitude = abs(found.value)
+    towards = np.real(blocks * np.conj(found.value)) / max(amplitude, 1e-300)
+    wander, scatter = of_mean(towards, noise**2 * len(towards))
+    frequency, spread = found.frequency, float(np.ptp(_frequencies(found.phase, span)))
     order = round(frequency / mains.frequency_hz)
-    told = least_squares.mains_orders(mains.frequency_hz, rate, (frequency,), span[1] - span[0], spread)
-    return 0 if order in told else order
-
-
-def _twice(
-    x: Floats,
-    time: Floats,
-    rate: float,
-    known: Bools,
-    allowed: Bools,
-    cut: Bools,
-    frequency: float,
-    mains: Mains,
-) -> tuple[_Solution, Phase, tuple[float, float]] | None:
-    """Demodulate and fit; then again without the mains and the drop-outs of the first fit."""
-    clean, use, found = x, known, None
-    for _ in range(2):
-        at, line = demodulation.envelope(clean, use, rate, frequency)
-        if len(at) < 4:
-            return None
-        span = demodulation.steady_span(at, line, len(x) / rate)
-        inside = (at >= span[0]) & (at <= span[1])
-        phase = _best_phase(clean, time, rate, use, span, demodulation.phases(at[inside], line[inside], frequency))
-        if phase is None:
-            return found
-        frequency = _frequency(phase, span)[0]
-        solution = _solve(x, time, rate, known, allowed, cut, span, phase, frequency, mains)
-        if solution is None:
-            return found
-        found = solution, phase, span
-        left_out = (time >= span[0]) & (time <= span[1]) & ~solution.good
-        clean, use = np.where(left_out, solution.line, x - solution.mains), use | left_out
-    return found
-
-
-def _best_phase(
-    x: Floats, time: Floats, rate: float, use: Bools, span: tuple[float, float], candidates: Iterable[Phase]
-) -> Phase | None:
-    """Return the phase that explains the samples best for its number of parameters (Schwarz's criterion), if any."""
-    inside = slice(int(np.searchsorted(time, span[0])), int(np.searchsorted(time, span[1], side="right")))
-    here, part, weight = time[inside], x[inside], use[inside].astype(float)
-    scores = []
-    for candidate in candidates:
-        line = least_squares.line_columns(candidate.at(here), 0.5 * rate, rate)
-        columns = np.concatenate([line, least_squares.trend_columns(here)])
-        left = part - least_squares.solve(columns, part, weight) @ columns
-        squares = float(np.sum(weight * left**2)) / max(weight.sum(), 1)
-        score = weight.sum() * np.log(max(squares, 1e-300)) + candidate.parameters * np.log(max(weight.sum(), 2))
-        scores.append((score, len(scores), candidate))
-    return min(scores)[-1] if scores else None
-
-
-def _frequency(phase: Phase, span: tuple[float, float]) -> tuple[float, float]:
-    """Return the mean of a phase's frequency over a span, and the range of its half-second means, in Hz."""
-    steps = _frequencies(phase, span)
-    return float(steps.mean()), float(np.ptp(steps))
-
-
-def _frequencies(phase: Phase, span: tuple[float, float]) -> Floats:
-    """Return the half-second means of a phase's frequency over a span, in Hz."""
-    edges = np.linspace(*span, max(round((span[1] - span[0]) / 0.5), 2) + 1)
-    return np.diff(phase.at(edges)) / np.diff(edges) / (2 * np.pi)
-
-
-def _solve(
-    x: Floats,
-    time: Floats,
-    rate: float,
-    known: Bools,
-    allowed: Bools,
-    cut: Bools,
-    span: tuple[float, float],
-    phase: Phase,
-    frequency: float,
-    mains: Mains,
-) -> _Solution | None:
-    """Fit a line of given phase over a span, without the samples whose residual is far off; None without samples.
-
-    Of samples that are `cut` the fit knows that the line lies beyond them. To leave them out, and those near them by
-    their own noise, would bias it; and where the rate is a small multiple of the frequency, too few phases are left.
-    """
-    first, last = np.searchsorted(time, span[0]), np.searchsorted(time, span[1], side="right")
-    inside = slice(int(first), int(last))
-    here, part = time[inside], x[inside]
-    spread = _frequency(phase, span)[1]
-    orders = least_squares.mains_orders(mains.frequency_hz, rate, (frequency,), span[1] - span[0], spread)
-    columns = np.concatenate(
-        [
-            least_squares.line_columns(phase.at(here), frequency, rate),
-            least_squares.mains_columns(here, mains.frequency_hz, orders),
-            least_squares.trend_columns(here),
-        ]
-    )
-    use, beyond = known[inside].copy(), cut[inside].copy()
-    if use.sum() < LEAST_SAMPLES:
-        return None
-    side = np.where(beyond, np.sign(part), 0.0)
-    ends = [(1 - NEAR) * float(np.max(sign * x[cut], initial=0.0)) for sign in (1, -1)]
-    for _ in range(ROUNDS):
-        if beyond.any():
-            plateau = np.where(side > 0, ends[0], -ends[1])
-            found, covariance = solve_censored(columns, part, use | beyond, side, plateau)
-        else:
-            found, covariance = least_squares.solve_with_covariance(columns, part, use.astype(float))
-        residual = part - found @ columns
-        limit = FAR * 1.4826 * np.median(np.abs(residual[use]))
-        beyond &= residual * side < limit  # a drop-out may touch the plateau too
-        far = (np.abs(residual) > limit) & ~beyond if limit > 0 else np.zeros(len(part), bool)
-        far[1:] |= far[:-1].copy()
-        far[:-1] |= far[1:].copy()
-        fresh = allowed[inside] & ~far
-        if fresh.sum() < 0.3 * len(part) or np.array_equal(fresh, use):
-            break
-        use = fresh
-    deviation = 1.4826 * float(np.median(np.abs(residual[use])))
-    left_out = np.abs(residual[allowed[inside] & ~beyond])
-    beyond_noise = bool(deviation > 0 and np.any(left_out > most_of_noise(len(left_out)) * deviation))
-    removed, line = np.zeros(len(x)), np.zeros(len(x))
-    lines = len(columns) - 2 - 2 * len(orders)
-    removed[inside] = found[lines:-2] @ columns[lines:-2]
-    beyond_span = removed if span == (0.0, len(x) / rate) else np.zeros(len(x))
-    if orders and beyond_span is not removed:
-        beyond_span = found[lines:-2] @ least_squares.mains_columns(time, mains.frequency_hz, orders)
-    line[inside] = found[:lines] @ columns[:lines] + found[-2:] @ columns[-2:]
-    kept = known.copy()
-    kept[inside] = use
-    left = np.zeros(len(x))
-    left[inside] = np.where(use, residual, 0.0)
-    towards = found[:2] / max(float(np.hypot(*found[:2])), 1e-300)
-    widening = np.sqrt(max(float(towards @ covariance[:2, :2] @ towards) * use.sum() / 2, 1.0))
-    return _Solution(
-        complex(found[0], -found[1]), left, removed, beyond_span, line, kept, float(widening), beyond_noise
+    if order in mains_orders(mains.frequency_hz, rate, (frequency,), span[1] - span[0], spread):
+        order = 0
+    share = (mains.amplitude(order) or 0.0) / np.sqrt(2) if order else 0.0
+    deviation = float(np.sqrt(np.mean(found.residual[inside][good] ** 2)))
+    return LineFit(
+        amplitude=amplitude,
+        u=float(np.sqrt(noise**2 + wander**2 + share**2)),
+        u_noise=float(noise),
+        u_mains=float(share),
+        value=found.value,
+        frequency_hz=frequency,
+        drift=spread / frequency,
+        snr=amplitude / deviation if deviation > 0 else float("inf"),
+        scatter=scatter / amplitude if amplitude > 0 else float("inf"),
+        start_s=span[0],
+        end_s=span[1],
+        mains_hz=order * mains.frequency_hz,
+        phase=found.phase,
+        blocks=tuple(complex(b) for b in blocks),
     )
 
 
@@ -347,35 +248,592 @@ def most_of_noise(count: int) -> float:
     return float(norm.isf(FALSE_ALARM / 4 / count)) * (1 + 3 * 1.17 / np.sqrt(count))
 
 
-def _summary(
-    solution: _Solution, time: Floats, rate: float, phase: Phase, span: tuple[float, float], mains: Mains, share: float
-) -> LineFit:
-    """Return a solution's figures with their uncertainty; `share` is the part by mains that can't be told apart."""
-    inside = (time >= span[0]) & (time <= span[1])
-    good = solution.good[inside]
-    turn = np.exp(-1j * phase.at(time[inside]))
-    residual = solution.residual[inside] * turn
-    noise = solution.widening * uncertainty.noise(residual, good, rate)
-    blocks = uncertainty.blocks(solution.value, residual, good, rate)
-    amplitude = abs(solution.value)
-    towards = np.real(blocks * np.conj(solution.value)) / max(amplitude, 1e-300)
-    wander, scatter = uncertainty.of_mean(towards, noise**2 * len(towards))
-    frequency, spread = _frequency(phase, span)
-    order = _hidden_order(phase, span, rate, mains)
-    deviation = float(np.sqrt(np.mean(solution.residual[inside][good] ** 2)))
-    return LineFit(
-        amplitude=amplitude,
-        u=float(np.sqrt(noise**2 + wander**2 + share**2)),
-        u_noise=float(noise),
-        u_mains=share,
-        value=solution.value,
-        frequency_hz=frequency,
-        drift=spread / frequency,
-        snr=amplitude / deviation if deviation > 0 else float("inf"),
-        scatter=scatter / amplitude if amplitude > 0 else float("inf"),
-        start_s=span[0],
-        end_s=span[1],
-        mains_hz=order * mains.frequency_hz,
-        phase=phase,
-        blocks=tuple(complex(b) for b in blocks),
-    )
+def _best_phase(
+    x: Floats, time: Floats, rate: float, use: Bools, span: tuple[float, float], candidates: Iterator[Phase]
+) -> Phase | None:
+    """Return the phase that explains the samples best for its number of parameters (Schwarz's criterion), if any."""
+    inside = _within(time, span)
+    here, part, weight = time[inside], x[inside], use[inside]
+    best, least = None, np.inf
+    for candidate in candidates:
+        columns = np.concatenate([line_columns(candidate.at(here), 0.5 * rate, rate), trend_columns(here)])
+        left = part - solve(columns, part, weight)[0] @ columns
+        squares = float(np.sum(weight * left**2)) / max(weight.sum(), 1)
+        score = weight.sum() * np.log(max(squares, 1e-300)) + candidate.parameters * np.log(max(weight.sum(), 2))
+        if score < least:
+            best, least = candidate, score
+    return best
+
+
+def _within(time: Floats, span: tuple[float, float]) -> slice:
+    """Return the samples whose time lies in a span, ends included."""
+    return slice(int(np.searchsorted(time, span[0])), int(np.searchsorted(time, span[1], side="right")))
+
+
+def _frequencies(phase: Phase, span: tuple[float, float]) -> Floats:
+    """Return the half-second means of a phase's frequency over a span, in Hz."""
+    edges = np.linspace(*span, max(round((span[1] - span[0]) / 0.5), 2) + 1)
+    return np.diff(phase.at(edges)) / np.diff(edges) / (2 * np.pi)
+
+
+# Least squares.
+
+
+def solve(columns: Floats, x: Floats, weight: Floats | Bools) -> tuple[Floats, Floats]:
+    """Return the coefficients of `columns` (k, n) that leave the least weighted squares of x (n), and their covariance.
+
+    The covariance (k, k) is that of white noise of unit variance.
+    """
+    weighted = columns * weight
+    gram = weighted @ columns.T
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    inverse = np.linalg.pinv(gram / scale / scale[:, None], rcond=1e-11, hermitian=True) / scale / scale[:, None]
+    return inverse @ (weighted @ x), inverse
+
+
+def _waves(turns: Floats) -> Floats:
+    """Return cosine and sine (2 k, n) of complex turns (k, n)."""
+    return np.stack([turns.real, turns.imag], 1).reshape(2 * len(turns), turns.shape[1])
+
+
+def line_columns(phase: Floats, frequency: float, rate: float) -> Floats:
+    """Return cosine and sine (k, n) of a phase and of its harmonics below half the rate."""
+    count = max(min(HARMONICS, int(0.5 * rate / max(frequency, 1e-9))), 1)
+    return _waves(np.exp(1j * np.arange(1, count + 1)[:, None] * phase))
+
+
+def mains_orders(
+    mains_hz: float, rate: float, lines: tuple[float, ...], length_s: float, spread_hz: float = 0.0
+) -> list[int]:
+    """Return the multiples of the mains' frequency that a record can tell from the lines and their harmonics.
+
+    A line whose frequency moves by `spread_hz` needs as much more distance.
+    """
+    highest = int(min(0.45 * rate, 8 * mains_hz) / mains_hz)
+    taken = [line * k for line in lines for k in range(1, HARMONICS + 1)]
+    away = RESOLVED / length_s + spread_hz / 2
+    return [m for m in range(1, highest + 1) if all(abs(m * mains_hz - one) > away for one in taken)]
+
+
+def mains_columns(time: Floats, mains_hz: float, orders: list[int]) -> Floats:
+    """Return cosine and sine (2 orders, n) of multiples of the mains' frequency."""
+    return _waves(np.exp(2j * np.pi * mains_hz * np.array(orders, float)[:, None] * time))
+
+
+def trend_columns(time: Floats) -> Floats:
+    """Return a constant and a slope (2, n)."""
+    return np.array([np.ones(len(time)), (time - time.mean()) / max(np.ptp(time), 1e-300)])
+
+
+# Samples that are cut off at a level, by a converter or by the range that was set.
+
+NEAR = 0.02
+"""Part of the peak below it in which samples are counted."""
+LOWEST = 0.7
+"""Part of the amplitude down to which a cut-off sine can be fitted by the rest."""
+CROWD = 0.13
+"""Part of the samples within NEAR of a peak beyond which it is a plateau: twice what a sine has there."""
+LEAST_VALUES = 8
+"""Different values below which a channel shows its converter's steps and no motion that a limit could cut off."""
+
+
+def clip_mask(x: Floats, good: Bools, full_scale: tuple[float, float] | None = None) -> tuple[Bools, float]:
+    """Return the samples of a record about zero that lie on a plateau, and the lowest plateau's part.
+
+    One plateau is enough. The part is of the amplitude that a sine would have which is cut off as often, 0 where that
+    is half of the time or more; infinite without a plateau.
+    `full_scale` is the height of the positive and the negative limit, where they are known.
+    """
+    cut, part = np.zeros(len(x), bool), float("inf")
+    low, high = np.quantile(x[good], [0.05, 0.95])
+    fine = len(np.unique(x[good])) >= LEAST_VALUES
+    for sign, limit in zip((1.0, -1.0), full_scale or (None, None), strict=True):
+        signed = sign * x
+        peak = float(signed[good].max())
+        below = NEAR * peak
+        if 4 * peak <= high - low:  # cut off near the middle: the median is on the plateau, the band one of the range
+            if high <= low:
+                continue
+            below = NEAR * (high - low) / 2
+        elif peak <= 0:
+            continue
+        near = good & (signed >= peak - below)
+        at_limit = limit is not None and peak >= 0.999 * limit
+        if at_limit or (fine and (near.sum() > CROWD * good.sum() or (peak > 0 and _repeats(signed[good], peak)))):
+            cut |= near
+            part = min(part, max(float(np.cos(np.pi * near.sum() / good.sum())) / (1 - NEAR), 0.0))
+    return cut, part
+
+
+def _repeats(x: Floats, peak: float) -> bool:
+    """Tell whether the largest value comes more often than the resolution of the samples explains for a sine."""
+    at_peak = np.count_nonzero(x == peak)
+    if at_peak < max(8, 0.01 * len(x)):
+        return False
+    steps = np.diff(np.unique(x[x > 0.5 * peak]))
+    step = float(np.median(steps)) if len(steps) else peak
+    return at_peak > len(x) * (0.01 + 2 * np.arccos(max(1 - step / peak, -1.0)) / np.pi)
+
+
+def solve_censored(columns: Floats, x: Floats, use: Bools, side: Floats, limit: Floats) -> tuple[Floats, Floats]:
+    """Return the coefficients (k) of `columns` (k, n), and their covariance (k, k) for noise of unit variance.
+
+    Of the samples x (n) in `use`, those whose `side` is 1 lie above their `limit`, -1 below it; 0 are known (Tobin
+    1958). In the coefficients over the deviation and the inverse of the deviation the likelihood has one maximum (Olsen
+    1978).
+    """
+    from scipy.optimize import minimize
+    from scipy.special import log_ndtr
+
+    known, beyond = use & (side == 0), use & (side != 0)
+    y = np.where(side == 0, x, limit)
+    start = np.linalg.lstsq(columns[:, use].T, y[use], rcond=None)[0]
+    inverse = 1 / max(float(np.std((y - start @ columns)[use])), 1e-12 * float(np.ptp(x[known])))
+    # Rows that multiply (coefficients / deviation, 1 / deviation): the residual, and how far the line is beyond.
+    rows = np.concatenate([-columns, y[None]])[:, known]
+    ahead = (np.concatenate([columns, -y[None]]) * side)[:, beyond]
+    count, gram = rows.shape[1], rows @ rows.T
+
+    def hidden(at: Floats) -> tuple[Floats, Floats, Floats]:
+        far = at @ ahead
+        logs = log_ndtr(far)
+        return far, logs, np.exp(-0.5 * far**2 - 0.5 * np.log(2 * np.pi) - logs)
+
+    def loss(at: Floats) -> tuple[float, Floats]:
+        if at[-1] <= 0:
+            return np.inf, at
+        _, logs, mills = hidden(at)
+        slope = gram @ at - ahead @ mills
+        slope[-1] -= count / at[-1]
+        return float(0.5 * at @ gram @ at - logs.sum() - count * np.log(at[-1])), slope
+
+    def bend(at: Floats) -> Floats:
+        far, _, mills = hidden(at)
+        bent = gram + (ahead * (mills * (mills + far))) @ ahead.T
+        bent[-1, -1] += count / at[-1] ** 2
+        return bent
+
+    at = minimize(
+        loss,
+        np.append(start * inverse, inverse),
+        jac=True,
+        hess=bend,
+        method="trust-exact",
+        options={"gtol": 1e-6, "maxiter": 200},
+    ).x
+    found = at[:-1] / at[-1]
+    # The coefficients are a quotient; times the inverse deviation gives the covariance for unit variance.
+    to_coefficients = np.concatenate([np.eye(len(found)), -found[:, None]], axis=1)
+    return found, to_coefficients @ np.linalg.pinv(bend(at), hermitian=True) @ to_coefficients.T
+
+
+# From samples to a line's slowly varying phase.
+
+WINDOW_S = 0.25
+"""Length of the Hann window that smooths a demodulated signal; it passes about 4 Hz to either side."""
+STEADY = 0.9
+"""Part of the median envelope that a line reaches before its record is used, and keeps to its end."""
+RUNNING = 0.85
+"""Part of its size in the steady span that a line has in a short spectrum as long as the motor runs."""
+FOLLOWED_HZ = 12.0
+"""How far a line's frequency may lie from that of the window beside it, to be followed."""
+SPIN_UP_HZ_PER_S = 8.0
+"""How fast a frequency changes that is a spin-up's, where the steady span has less than a third of it."""
+NO_LINE = 1e-6
+"""Part of a line's largest envelope below which its phase says nothing."""
+KNOTS_S = (0.5, 0.25)
+"""Distances of the knots of the phase's splines that are tried."""
+
+
+def coarse_frequency(x: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> float:
+    """Return the frequency of the strongest line in a band, in Hz, by the peak of a spectrum with a Hann window.
+
+    A multiple of the mains' frequency is taken where it is more than three times as strong as any other line.
+    """
+    frequency, size = spectrum(x, rate)
+    inside = (frequency >= band[0]) & (frequency <= min(band[1], 0.45 * rate))
+    if not inside.any() or not np.any(size[inside] > 0):
+        return 0.0
+    width = 1.5 * rate / len(x)
+    off = inside & (np.abs(frequency - mains_hz * np.round(frequency / mains_hz)) > width)
+    peak = int(np.argmax(np.where(inside, size, 0.0)))
+    if off.any() and (other := int(np.argmax(np.where(off, size, 0.0)))) != peak and size[other] > size[peak] / 3:
+        peak = other
+    place = float(peak)  # and between the bins, by a parabola through the logarithms
+    if 0 < peak < len(size) - 1 and min(size[peak - 1 : peak + 2]) > 0:
+        low, top, high = np.log(size[peak - 1 : peak + 2])
+        bend = low - 2 * top + high
+        place += 0.5 * (low - high) / bend if bend < 0 else 0.0
+    return place * rate / _length(len(x))
+
+
+def spectrum(x: Floats, rate: float) -> tuple[Floats, Floats]:
+    """Return frequencies in Hz and amplitudes in the signal's unit, by a Hann window, padded to twice the length."""
+    window = np.hanning(len(x))
+    size = np.abs(np.fft.rfft((x - x.mean()) * window, _length(len(x)))) * 2 / window.sum()
+    return np.fft.rfftfreq(_length(len(x)), 1 / rate), size
+
+
+def _length(count: int) -> int:
+    return 2 ** (int(count - 1).bit_length() + 1)
+
+
+def envelope(x: Floats, good: Bools, rate: float, frequency: float) -> tuple[Floats, Floats]:
+    """Return times in s and the line's complex amplitude there; samples that are not `good` count for nothing."""
+    from scipy.signal import oaconvolve
+
+    count = min(max(int(WINDOW_S * rate), 8), len(x) // 2)
+    window = np.hanning(count + 2)[1:-1]
+    time = np.arange(len(x)) / rate
+    turned = np.where(good, x, 0.0) * np.exp(-2j * np.pi * frequency * time)
+    weight = oaconvolve(good.astype(float), window, mode="same")
+    step = max(count // 8, 1)
+    full = weight[::step] > 0.5 * window.sum()
+    if full.sum() < 4:
+        return np.empty(0), np.empty(0, complex)
+    centre = oaconvolve(good * time, window, mode="same")[::step][full] / weight[::step][full]
+    return centre, 2 * oaconvolve(turned, window, mode="same")[::step][full] / weight[::step][full]
+
+
+def steady_span(time: Floats, line: Floats, length_s: float) -> tuple[float, float]:
+    """Return the span in s in which the line has spun up: the ends where it is below STEADY of its median are cut."""
+    size = np.abs(line)
+    enough = np.flatnonzero(size >= STEADY * np.median(size))
+    first, last = int(enough[0]), int(enough[-1])
+    start = float(time[first] + WINDOW_S / 2) if first else 0.0
+    end = float(time[last] - WINDOW_S / 2) if last < len(time) - 1 else length_s
+    return (start, end) if end - start > 0.25 * length_s else (0.0, length_s)
+
+
+def frequencies_beyond(x: Floats, rate: float, span: tuple[float, float], frequency: float) -> list[float]:
+    """Return the line's frequency in short windows before and after its steady span, as far as it runs on there.
+
+    A line that leaves the demodulator's band is cut off as if it had stopped: here it is followed from window to
+    window. A spin-up is not: it changes its frequency fast, and then levels off.
+    """
+    count = int(WINDOW_S * rate)
+    step = max(count // 4, 1)
+    starts = np.arange(0, len(x) - count + 1, step)
+    middles = (starts + count / 2) / rate
+    inside = np.flatnonzero((middles >= span[0]) & (middles <= span[1]))
+    if len(inside) in (0, len(starts)) or count < 16:
+        return []
+    window = np.hanning(count + 2)[1:-1]
+    points = 4 * _length(count)
+    hertz = np.fft.rfftfreq(points, 1 / rate)
+
+    def peak(i: int, near: float) -> tuple[float, float]:
+        size = np.abs(np.fft.rfft(x[starts[i] : starts[i] + count] * window, points))
+        at = int(np.argmax(np.where(np.abs(hertz - near) < FOLLOWED_HZ, size, 0.0)))
+        return float(hertz[at]), float(size[at])
+
+    sample = inside[np.unique(np.linspace(0, len(inside) - 1, 20).astype(int))]
+    peaks = np.array([peak(int(i), frequency) for i in sample])
+    least = RUNNING * float(np.median(peaks[:, 1]))
+    own = abs(peaks[-1, 0] - peaks[0, 0]) / max(int(inside[-1] - inside[0]), 1)
+    fastest = max(3 * own, SPIN_UP_HZ_PER_S * step / rate)
+    out: list[float] = []
+    for there, most in (
+        (range(int(inside[0]) - 1, -1, -1), fastest),
+        (range(int(inside[-1]) + 1, len(starts)), np.inf),
+    ):
+        near = float(peaks[0 if most < np.inf else -1, 0])
+        low = 0
+        for i in there:
+            hertz_here, size = peak(i, near)
+            low = low + 1 if size < least else 0
+            if low > count // step + 1:  # more windows than one jump of the frequency reaches
+                break
+            if not low:
+                if abs(hertz_here - near) <= most:
+                    out.append(hertz_here)
+                near = hertz_here
+    return out
+
+
+def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
+    """Yield the line's phase, of rising flexibility: constant frequency, linear, cubic, splines.
+
+    None at all where fewer than three points have a line. A spline has a point between any two of its knots.
+    """
+    from scipy.interpolate import make_lsq_spline
+
+    there = np.abs(line) > NO_LINE * np.abs(line).max(initial=0.0)
+    time, line = time[there], line[there]
+    if len(time) < 3:
+        return
+    angle = np.unwrap(np.angle(line))
+    weight = np.abs(line) / np.abs(line).max()
+    middle, half = (time[0] + time[-1]) / 2, max((time[-1] - time[0]) / 2, 1e-9)
+    omega = 2 * np.pi * frequency
+    for degree in (1, 2, 4):
+        if degree + 1 < len(time):
+            fitted = np.polynomial.Polynomial.fit(time, angle, degree, w=weight, domain=[middle - half, middle + half])
+            yield Phase(lambda t, fitted=fitted: omega * t + fitted(t), degree + 1)
+    for distance in KNOTS_S:
+        pieces = round((time[-1] - time[0]) / distance)
+        if pieces < 2 or pieces + 4 > len(time) / 2:
+            continue
+        ends = np.linspace(time[0], time[-1], pieces + 1)
+        if np.histogram(time, ends)[0].min() == 0:  # a gap: what the spline does there is not known
+            continue
+        inner = ends[1:-1]
+        knots = np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4])
+        spline = make_lsq_spline(time, angle, knots, 3, w=weight)
+
+        def straight_beyond(t: Floats, spline: Callable[..., Floats] = spline) -> Floats:
+            inside = np.clip(t, time[0], time[-1])
+            return omega * t + spline(inside) + (t - inside) * np.where(t != inside, spline(inside, 1), 0.0)
+
+        yield Phase(straight_beyond, pieces + 3)
+
+
+# The part of a record in which a motor runs, where it is silent for so long that medians are of the silence.
+
+MOST_RUNNING = 0.65
+"""Part of a record up to which the running part is fitted alone: beyond, medians of all samples are of the line."""
+ON = 0.5
+"""Part of the envelope's largest value from which the motor runs."""
+SILENT = 0.2
+"""Part of it below which the envelope stays in the silence, once it has had FALL_S to fall; a beat falls slowly."""
+QUIET = 0.4
+"""The same for what the silence holds beside the mains: a line that has only changed its frequency is louder."""
+LOWEST_HZ = 20.0
+FALL_S = 0.75 * WINDOW_S
+"""How long the envelope of a line that ends takes to fall, with a margin."""
+LEAST_SILENT = 0.2
+"""Part of a record that is silent at least."""
+LOUDEST, BEYOND_LOUDEST = 0.92, 1.5
+"""Quantile of the samples' size, and how many times it a sample counts at most: drop-outs are no motion."""
+
+
+def running_part(
+    x: Floats, good: Bools, rate: float, band: tuple[float, float], mains_hz: float
+) -> tuple[int, int] | None:
+    """Return the first sample of the longest stretch in which the line of a record runs, and the one after its last.
+
+    `x` has no offset; samples that are not `good` count for nothing. None where the line runs for most of the record,
+    or the rest is not silent.
+    """
+    most = BEYOND_LOUDEST * float(np.quantile(np.abs(x[good]), LOUDEST))
+    x = np.clip(np.where(good, x, 0.0), -most, most)
+    frequency = coarse_frequency(x, rate, band, mains_hz)
+    if not frequency > 0:
+        return None
+    time, line = envelope(x, good, rate, frequency)
+    if len(time) < 4:
+        return None
+    size = np.abs(line)
+    on = size >= ON * size.max()
+    if on.mean() > MOST_RUNNING:
+        return None
+    near = np.zeros(len(on), bool)
+    for first, last in _runs(on):
+        near |= (time >= time[first] - FALL_S) & (time <= time[last] + FALL_S)
+    if (~near).mean() < LEAST_SILENT or size[~near].max() > SILENT * size.max():
+        return None
+    first, last = max(_runs(~near), key=lambda run: run[1] - run[0])
+    silence = x[int(time[first] * rate) : int(time[last] * rate) + 1]
+    if _loudest(silence, rate, band, mains_hz) > QUIET * size.max():
+        return None
+    first, last = max(_runs(on), key=lambda run: run[1] - run[0])
+    start = 0 if first == 0 else int(time[first] * rate)
+    return start, len(x) if last == len(on) - 1 else int(time[last] * rate) + 1
+
+
+def _runs(on: Bools) -> list[tuple[int, int]]:
+    """Return the first and the last index of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
+    return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
+
+
+def _loudest(x: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> float:
+    """Return the amplitude of a line with all power of samples in a band, or of the strongest line outside, if more.
+
+    The mains and what is slower than LOWEST_HZ are left out.
+    """
+    if len(x) < 16:
+        return 0.0
+    window = np.hanning(len(x) + 2)[1:-1]
+    turned = np.abs(np.fft.rfft((x - x.mean()) * window))
+    hertz = np.fft.rfftfreq(len(x), 1 / rate)
+    own = np.abs(hertz - mains_hz * np.round(hertz / mains_hz)) > 2 * rate / len(x)
+    inside = own & (hertz >= band[0]) & (hertz <= band[1])
+    whole = 2 * float(np.sqrt(np.sum(turned[inside] ** 2) / (len(x) * np.sum(window**2))))
+    strongest = 2 * float(turned[own & (hertz > LOWEST_HZ)].max(initial=0.0)) / window.sum()
+    return max(whole, strongest)
+
+
+# The standard uncertainty of a line's amplitude, from what its fit leaves.
+
+NOISE_HZ = 15.0
+"""To either side of the line, where the noise's density is taken."""
+BLOCK_S = 0.2
+LEAST_BLOCKS = 6
+
+
+def noise_beside(residual: Floats, good: Bools, rate: float) -> float:
+    """Return the standard deviation of the amplitude that the noise beside the line gives.
+
+    `residual` (n) is what the fit leaves, turned back by the line's phase and 0 where a sample was left out. The noise
+    N of the sum over n samples has the mean square of the sums at neighbouring frequencies; the amplitude is 2/n times
+    its real part.
+    """
+    count, used = len(residual), int(good.sum())
+    power = np.abs(np.fft.fft(residual)) ** 2
+    away = np.abs(np.fft.fftfreq(count, 1 / rate))
+    least = 2 * rate / count
+    beside = (away > least) & (away < max(NOISE_HZ, 12 * least))
+    if not beside.any():
+        beside = away > 0
+    values = power[beside]
+    density = float(np.median(values)) / np.log(2) if len(values) >= 20 else float(values.mean())
+    density = max(density, min(float(values.mean()), 1.5 * density))
+    return float(np.sqrt(2 * density / used) / np.sqrt(used))
+
+
+def of_mean(values: Floats, noise_variance: float) -> tuple[float, float]:
+    """Return the standard uncertainty of the mean of successive values beyond their noise, and their own deviation.
+
+    The correlation of neighbours makes fewer of them independent; its estimate is too small in short series by about
+    (1 + 3 r)/n (Kendall 1954). Few values make the deviation uncertain: it is widened as Student's t is.
+    """
+    from scipy.stats import t as student
+
+    count = len(values)
+    left = values - values.mean()
+    total = float(left @ left)
+    variance = total / (count - 1)
+    slow = variance - noise_variance
+    if slow <= 0 or total <= 0:
+        return 0.0, float(np.sqrt(variance))
+    found = float(left[1:] @ left[:-1]) / total
+    correlation = min(max(found + (1 + 3 * max(found, 0.0)) / count, 0.0), 0.9)
+    independent = max(count * (1 - correlation) / (1 + correlation), 2.0)
+    widened = float(student.ppf(0.97725, max(independent - 1, 1.5))) / 2
+    return float(np.sqrt(slow / independent) * widened), float(np.sqrt(variance))
+
+
+def block_means(value: complex, residual: Floats, good: Bools, rate: float) -> Floats:
+    """Return the line's complex amplitude in equal blocks: the whole record's and the mean of what is left there."""
+    count = max(round(len(residual) / rate / BLOCK_S), LEAST_BLOCKS)
+    edges = np.linspace(0, len(residual), count + 1).astype(int)[:-1]
+    return value + 2 * np.add.reduceat(residual, edges) / np.maximum(np.add.reduceat(good.astype(float), edges), 1)
+
+
+# Several lines at once, each of constant frequency.
+
+BESIDE_HZ = 15.0
+"""To either side of the strongest line, where others are looked for."""
+LEAST_LINE = 0.05
+"""Part of the strongest line's amplitude from which another one counts."""
+MOST_LINES = 6
+MOST_LEFT = 0.5
+"""Part of the one line's squares that several must leave at most, to be taken in its place."""
+STEPS = 12
+SAME_PLACE, SAME_SIZE, SAME_PHASE = 0.4, 0.25, 0.4
+"""How far lines to either side may be from a modulation's: periods of a record, logarithm of a ratio, rad."""
+
+
+def several_lines(
+    x: Floats, residual: Floats, time: Floats, use: Bools, fit: LineFit, rate: float, mains_hz: float
+) -> LineFit | None:
+    """Return the fit of several lines to samples x without mains, of which one line leaves `residual`.
+
+    None where one line explains them as well. The amplitude is then the strongest line's.
+    """
+    if not fit.snr > 0:
+        return None
+    first, last = np.flatnonzero(use)[[0, -1]]
+    inside = slice(first, last + 1)
+    good = use[inside]
+    x, time, weight = np.where(good, x[inside], 0.0), time[inside], good.astype(float)
+    length = time[-1] - time[0]
+    noise = fit.amplitude / fit.snr if np.isfinite(fit.snr) else 0.0
+    least = max(LEAST_LINE * fit.amplitude, 8 * noise * np.sqrt(2 / max(weight.sum(), 1)))
+    frequency, size = spectrum(residual[inside] * weight, rate)
+    beside = np.abs(frequency - fit.frequency_hz) < BESIDE_HZ
+    if not np.any(size[beside] > least):
+        return None
+    hertz, values, left = np.empty(0), np.empty(0, complex), x
+    for _ in range(MOST_LINES):
+        size = np.where(beside, spectrum(left * weight, rate)[1], 0.0)
+        peak = int(np.argmax(size))
+        if size[peak] < least or np.any(np.abs(frequency[peak] - hertz) < 0.5 / length):
+            break
+        hertz, values, left = _refined(x, time, weight, np.append(hertz, frequency[peak]))
+    if len(hertz) < 2:
+        return None
+    # Harmonics of the lines, sums of some of them and the mains are no noise.
+    orders = mains_orders(mains_hz, rate, tuple(hertz), length)
+    known = [order * mains_hz for order in orders]
+    for count in range(2, HARMONICS + 1):
+        for one in map(sum, combinations_with_replacement(hertz, count)):
+            if one < 0.5 * rate and all(abs(one - other) > 0.5 / length for other in known):
+                known.append(one)
+    base = np.concatenate([mains_columns(time - time.mean(), 1.0, known), trend_columns(time)])
+    left = left - solve(base, left, weight)[0] @ base
+    deviation = float(np.sqrt(np.mean(left[good] ** 2)))
+    order = np.argsort(-np.abs(values))
+    strong = order[np.abs(values[order]) > LEAST_LINE * abs(values[order[0]])]
+    if deviation**2 > MOST_LEFT * noise**2 or len(strong) < 2:
+        return None
+    hertz, values = hertz[strong], values[strong]
+    if (swing := _modulation(hertz, values, length)) > 0:
+        ratio = fit.amplitude / deviation if deviation > 0 else float("inf")
+        return replace(fit, scatter=max(fit.scatter, swing), snr=ratio)
+    lines = []
+    for frequency_hz, value in zip(hertz, values, strict=True):
+        turned = left * weight * np.exp(-2j * np.pi * frequency_hz * (time - time.mean()))
+        noise = noise_beside(turned, good, rate)
+        towards = np.real(block_means(value, turned, good, rate) * np.conj(value)) / abs(value)
+        wander, _ = of_mean(towards, noise**2 * len(towards))
+        lines.append(Line(float(frequency_hz), float(abs(value)), float(np.hypot(noise, wander))))
+    main = lines[0]
+    return replace(
+        fit, amplitude=main.amplitude, u=float(np.hypot(main.u, fit.u_mains)), value=complex(values[0]),
+        frequency_hz=main.frequency_hz, drift=0.0, snr=main.amplitude / deviation if deviation > 0 else float("inf"),
+        lines=tuple(lines),
+    )  # fmt: skip
+
+
+def _modulation(hertz: Floats, values: Floats, length_s: float) -> float:
+    """Return the standard deviation of an amplitude whose modulation the lines are, over its mean; 0 where they aren't.
+
+    `hertz` and `values` have the strongest line first. The others are then pairs of equal strength as far below it as
+    above, in phase with each other about its phase: of lines that have nothing to do with each other few are.
+    """
+    rest = list(range(1, len(values)))
+    power = 0.0
+    while rest:
+        i = rest.pop(0)
+        off = [abs(hertz[k] + hertz[i] - 2 * hertz[0]) for k in rest]
+        if not rest or min(off) > SAME_PLACE / length_s:
+            return 0.0
+        one, other = values[i], values[rest.pop(int(np.argmin(off)))]
+        if abs(np.log(abs(one / other))) > SAME_SIZE or abs(np.angle(one * other / values[0] ** 2)) > SAME_PHASE:
+            return 0.0
+        power += (abs(one) + abs(other)) ** 2 / 2
+    return float(np.sqrt(power) / abs(values[0]))
+
+
+def _refined(x: Floats, time: Floats, weight: Floats, hertz: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return frequencies (k), complex amplitudes at the middle and what is left, after Gauss-Newton steps over all."""
+    omega, time = 2 * np.pi * hertz, time - time.mean()
+    length = max(np.ptp(time), 1e-9)
+    for step in range(STEPS + 1):
+        turns = np.exp(1j * omega[:, None] * time)
+        base = np.concatenate([_waves(turns), trend_columns(time)])
+        found = solve(base, x, weight)[0]
+        values = found[: 2 * len(omega) : 2] - 1j * found[1 : 2 * len(omega) : 2]
+        left = x - found @ base
+        if step == STEPS:
+            break
+        # d/d omega of a cos + b sin is t (-a sin + b cos)
+        slopes = time * np.real(1j * values[:, None] * turns)
+        change = solve(np.concatenate([base, slopes]), x, weight)[0][-len(omega) :]
+        change = np.clip(change, -np.pi / length, np.pi / length)
+        omega = omega + change
+        if np.all(np.abs(change) * length < 1e-6):
+            break
+    return omega / (2 * np.pi), values, left

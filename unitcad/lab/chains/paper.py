@@ -6,16 +6,14 @@ does not say the filter's order, the comb's Q, whether the filters run forwards 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from unitcad.errors import Refusal
 from unitcad.geometry.arrays import Floats
-from unitcad.lab.chains.chain import Chain, ChainTable
-from unitcad.lab.chains.line_fit import LineFit
+from unitcad.lab.chains.chain import Chain, ChainTable, LineFit
 
 RATE_HZ = 2000.0
 LOW_HZ, HIGH_HZ, COMB_HZ = 40.0, 200.0, 50.0
@@ -25,66 +23,52 @@ MOST_MASKED = 2e-4
 """Part of the samples that may be missing or drop-outs in a record that the chain takes: it has no robust step."""
 
 
-@dataclass(frozen=True)
-class PaperChain:
-    """The parameters that the paper leaves open, with what is assumed for them.
+def gain(table: ChainTable, frequency_hz: float) -> float:
+    """Return the filters' gain of an amplitude at a frequency in Hz."""
+    from scipy.signal import freqz, sosfreqz
 
-    `order` is the Butterworth prototype's, `q` the comb's quality at 50 Hz; `zero_phase` filters forwards and
-    backwards; `measure` takes RMS times the root of 2, or half the peak-to-peak; `trim_s` is cut from either end.
+    band, comb = _filters(table)
+    size = abs(sosfreqz(band, [frequency_hz], fs=RATE_HZ)[1][0] * freqz(*comb, [frequency_hz], fs=RATE_HZ)[1][0])
+    return float(size**2 if table.zero_phase else size)
+
+
+def amplitude(table: ChainTable, x: Floats, rate: float) -> float:
+    """Return the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit.
+
+    Samples of another rate than 2 kHz go through a polyphase filter. Raises Refusal for a record shorter than what is
+    trimmed, or without a sample.
     """
+    from scipy.signal import filtfilt, lfilter, resample_poly, sosfilt, sosfiltfilt
 
-    order: int = 4
-    q: float = 30.0
-    zero_phase: bool = True
-    measure: Literal["rms", "peak"] = "rms"
-    trim_s: float = 0.25
-
-    def gain(self, frequency_hz: float) -> float:
-        """Return the filters' gain of an amplitude at a frequency in Hz."""
-        from scipy.signal import freqz, sosfreqz
-
-        band, comb = _filters(self.order, self.q)
-        at = [frequency_hz]
-        through_band = sosfreqz(band, at, fs=RATE_HZ)[1]  # type: ignore[arg-type]
-        through_comb = freqz(*comb, at, fs=RATE_HZ)[1]  # type: ignore[arg-type]
-        size = abs(complex(through_band[0]) * complex(through_comb[0]))  # type: ignore[index]
-        return float(size**2 if self.zero_phase else size)
-
-    def amplitude(self, x: Floats, rate: float) -> float:
-        """Return the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit.
-
-        Raises Refusal for a record shorter than what is trimmed, or without a sample.
-        """
-        from scipy.signal import filtfilt, lfilter, sosfilt, sosfiltfilt
-
-        x = resampled(np.where(np.isfinite(x), x, 0.0), rate)
-        trim = round(self.trim_s * RATE_HZ)
-        if len(x) < 2 * trim + 200:
-            raise Refusal(
-                "paper.trim_s", self.trim_s, f"leaves less than 0.1 s of a record of {len(x) / RATE_HZ:.2g} s"
-            )
-        band, comb = _filters(self.order, self.q)
-        x = x - x.mean()
-        if self.zero_phase:
-            pad = min(3 * len(comb[0]), len(x) - 1)
-            x = np.asarray(filtfilt(*comb, sosfiltfilt(band, x, padlen=pad), padlen=pad))
-        else:
-            x = np.asarray(lfilter(*comb, sosfilt(band, x)))
-        x = x[trim : len(x) - trim]
-        return float(np.sqrt(2) * np.std(x)) if self.measure == "rms" else float(np.ptp(x) / 2)
+    x = np.where(np.isfinite(x), x, 0.0)
+    if abs(rate / RATE_HZ - 1) >= 1e-6:
+        ratio = Fraction(RATE_HZ / rate).limit_denominator(2000)
+        x = np.asarray(resample_poly(x, ratio.numerator, ratio.denominator, window=("kaiser", 9.0)))
+    trim = round(table.trim_s * RATE_HZ)
+    if len(x) < 2 * trim + 200:
+        limit = f"leaves less than 0.1 s of a record of {len(x) / RATE_HZ:.2g} s"
+        raise Refusal("paper.trim_s", table.trim_s, limit)
+    band, comb = _filters(table)
+    x = x - x.mean()
+    if table.zero_phase:
+        pad = min(3 * len(comb[0]), len(x) - 1)
+        x = np.asarray(filtfilt(*comb, sosfiltfilt(band, x, padlen=pad), padlen=pad))
+    else:
+        x = np.asarray(lfilter(*comb, sosfilt(band, x)))
+    x = x[trim : len(x) - trim]
+    return float(np.sqrt(2) * np.std(x)) if table.measure == "rms" else float(np.ptp(x) / 2)
 
 
 def chain(table: ChainTable) -> Chain:
     """Return the chain with a campaign's parameters."""
-    filters = PaperChain(table.order, table.q, table.zero_phase, table.measure, table.trim_s)
     return Chain(
         "paper",
-        lambda x, rate, fit: filters.amplitude(x, rate),
+        lambda x, rate, fit: amplitude(table, x, rate),
         unfit=_unfit,
-        gain=filters.gain,
+        gain=lambda hertz: gain(table, hertz),
         zeros_hz=COMB_HZ,
         pass_hz=(LOW_HZ, HIGH_HZ),
-        assumed={name: getattr(filters, name) for name in ASSUMED},
+        assumed={name: getattr(table, name) for name in ASSUMED},
     )
 
 
@@ -102,18 +86,8 @@ def _unfit(fits: list[LineFit]) -> str:
     return ""
 
 
-def resampled(x: Floats, rate: float) -> Floats:
-    """Return samples at 2 kHz, by a polyphase filter where they have another rate."""
-    from scipy.signal import resample_poly
-
-    if abs(rate / RATE_HZ - 1) < 1e-6:
-        return x
-    ratio = Fraction(RATE_HZ / rate).limit_denominator(2000)
-    return np.asarray(resample_poly(x, ratio.numerator, ratio.denominator, window=("kaiser", 9.0)))
-
-
-def _filters(order: int, q: float) -> tuple[Any, tuple[Any, Any]]:
+def _filters(table: ChainTable) -> tuple[Any, tuple[Any, Any]]:
     from scipy.signal import butter, iircomb
 
-    band = butter(order, (LOW_HZ, HIGH_HZ), "bandpass", fs=RATE_HZ, output="sos")
-    return band, iircomb(COMB_HZ, q, fs=RATE_HZ)
+    band = butter(table.order, (LOW_HZ, HIGH_HZ), "bandpass", fs=RATE_HZ, output="sos")
+    return band, iircomb(COMB_HZ, table.q, fs=RATE_HZ)

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 from unitcad.casting.bill import Item
 from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room, bubble_rise_s
-from unitcad.lab.phantom.phantom_response import THINNER_MM
-from unitcad.lab.phantom.phantom_set import PhantomSet, printed
+from unitcad.lab.phantom import THINNER_MM, PhantomSet, printed
+from unitcad.lab.phantom.box import bolts
 from unitcad.lab.phantom.recipe import stiffening
-from unitcad.lab.phantom.screed_box import bolts
 from unitcad.text import markdown
 
 NEAR_LAYER = 0.02

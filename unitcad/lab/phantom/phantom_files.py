@@ -13,14 +13,12 @@ import numpy as np
 from unitcad import check, files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import to_csv
-from unitcad.errors import UnitcadError
 from unitcad.export import stl, svg, threemf
 from unitcad.export.chart import Series, chart
 from unitcad.export.picture import Drawn, Scene, draw
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, bounds, realise
-from unitcad.lab.phantom import bench
-from unitcad.lab.phantom.phantom_set import SEGMENTS, PhantomSet, printed, tissue_table
+from unitcad.lab.phantom import SEGMENTS, PhantomSet, bench, printed, tissue_table
 from unitcad.shape.body import Body
 from unitcad.text import toml, toml_key
 
@@ -42,8 +40,11 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
     bed = float(phantom.printer.bed_x_mm), float(phantom.printer.bed_y_mm)
     found["moulds/moulds.3mf"] = threemf.content(parts, bed)
     stage("pages")
+    # The box filled, cut through the pegs of one side and, of the lid, nothing: frames, layers and plate.
+    shown = [body for body in phantom.tools if body.kind in ("base", "frame") or body.made == "cut"]
+    regions = svg.cut([*shown, *phantom.layers], SEGMENTS)
     texts = {
-        "section.svg": _section(phantom),
+        "section.svg": svg.section(regions, title=f"Phantom {phantom.table.name}: box and layers", ground=""),
         "response.svg": _response_chart(phantom),
         "response.json": json.dumps(rounded(asdict(phantom.expected)), indent=1, allow_nan=False) + "\n",
         "tissue.toml": tissue_toml(phantom),
@@ -59,7 +60,13 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
 def box_picture(phantom: PhantomSet) -> bytes:
     """Draw the box taken apart as a PNG file. Raises NoPicture where this machine can't draw."""
     shown = [body for body in phantom.tools if body.kind not in ("blade", "coupon")]
-    bodies = sorted([*shown, *phantom.layers], key=lambda body: _middle(phantom, body))
+
+    def place(body: Body) -> tuple[float, bool]:
+        """Return a body's place in the stack: its top's height, but the tray's foot, and a layer after its frame."""
+        _, _, low, _, _, high = bounds(realise(body.shape, SEGMENTS))
+        return (low if body.kind in ("base", "holder") else high, body.kind == "layer")
+
+    bodies = sorted([*shown, *phantom.layers], key=place)
     parts, height = [], 0.0
     for body in bodies:
         vertices, faces = arrays(realise(body.shape, SEGMENTS))
@@ -67,12 +74,6 @@ def box_picture(phantom: PhantomSet) -> bytes:
         parts.append(Drawn(body.colour, vertices + np.array([0.0, 0.0, height - low]), faces, body.name))
         height += (high - low) + APART_MM
     return draw([Scene(tuple(parts), (1.0, -2.0, 0.7))])[0]
-
-
-def _middle(phantom: PhantomSet, body: Body) -> tuple[float, bool]:
-    """Return a body's place in the stack: its top's height, but the tray's foot, and a layer after its frame."""
-    _, _, low, _, _, high = bounds(realise(body.shape, SEGMENTS))
-    return (low if body.kind in ("base", "holder") else high, body.kind == "layer")
 
 
 def tissue_toml(phantom: PhantomSet) -> str:
@@ -117,34 +118,16 @@ def casting_data(phantom: PhantomSet) -> dict[str, Any]:
 def write(folder: Path, found: Mapping[str, bytes], printer: str) -> list[str]:
     """Write the files into a folder, then check the meshes there; return the findings that are errors, as lines.
 
-    All are written under another name first; the procedure is put in place last. Raises UnitcadError where that fails.
+    All are written under another name first; the procedure is put in place last. Raises OSError where that fails.
     """
-    try:
-        (folder / "moulds").mkdir(parents=True, exist_ok=True)
-        with files.scratch(folder) as fresh:
-            (fresh / "moulds").mkdir()
-            for name, content in found.items():
-                files.write_new(fresh / name, content)
-            (folder / FINISHED).unlink(missing_ok=True)
-            for name in found:
-                (fresh / name).replace(folder / name)
-    except OSError as error:
-        raise UnitcadError(f"{folder}: {error.strerror or error}") from None
+    files.replace_all(folder, found, FINISHED)
     meshes = sorted(str(folder / name) for name in found if name.endswith((".stl", ".3mf")))
-    result = check.check(*meshes, printer=printer)
     return [
         f"{Path(report.path).name}: {finding.code} {finding.message}"
-        for report in result.reports
+        for report in check.check(*meshes, printer=printer).reports
         for finding in report.findings
         if finding.severity == "error"
     ]
-
-
-def _section(phantom: PhantomSet) -> str:
-    """Draw the box filled, cut through the pegs of one side and, of the lid, nothing: frames, layers and plate."""
-    shown = [body for body in phantom.tools if body.kind in ("base", "frame") or body.made == "cut"]
-    regions = svg.cut([*shown, *phantom.layers], SEGMENTS)
-    return svg.section(regions, title=f"Phantom {phantom.table.name}: box and layers", ground="")
 
 
 def _response_chart(phantom: PhantomSet) -> str:

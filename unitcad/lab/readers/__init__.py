@@ -1,1 +1,200 @@
-"""Readers of recordings, one file a format; `formats.open_recording` chooses by the file's name and first bytes."""
+"""Recordings: channels of numbers in a file. Its ending chooses the reader, one module of this package a format."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import os
+import pkgutil
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from unitcad import files
+from unitcad.errors import Missing, Refusal, UnitcadError
+from unitcad.geometry.arrays import Floats
+from unitcad.lab.units import TIMES, plain
+from unitcad.workers import Pool, TimedOut, WorkerEnded
+
+LARGEST = 250_000_000
+"""Bytes of a file that is read: all formats are read whole."""
+TIME_NAMES = ("time", "t", "zeit", "temps", "timestamp", "time stamp")
+"""Names of a column that is time, if the file gives a unit of time with one of them."""
+LONGEST_S = 60.0
+"""Seconds that a format's library may take to read a file."""
+MEMORY = 3 << 30
+"""Bytes that a format's library may take."""
+VENDOR = (".svd", ".pvd")
+_MOST = 1e30
+"""Beyond it, and beyond its inverse, a number is none that was measured."""
+_EXTRA = {"pyuff": "pyuff", "nptdms": "npTDMS", "h5py": "h5py"}
+
+
+class Unreadable(Refusal):
+    """A recording that can't be read without a guess, or at all; `field` is the file or the key that settles it."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A text file's delimiter ("" to find it; " " for any white space), decimal sign, lines before the numbers."""
+
+    delimiter: str = ""
+    decimal: str = ""
+    skip_lines: int = 0
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel: its samples, its name, its unit ("" if the file gives none), its step in s if known."""
+
+    samples: Any
+    name: str
+    unit: str = ""
+    step_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Channels of a file; `time` is the one that holds time by its name and unit."""
+
+    path: Path
+    channels: Sequence[Channel]
+
+    @property
+    def time(self) -> int | None:
+        found = [i for i, c in enumerate(self.channels) if _last(c.name).strip().lower() in TIME_NAMES]
+        found = [i for i in found if plain(self.channels[i].unit) in TIMES]
+        return found[0] if len(found) == 1 else None
+
+    def numbered(self, indices: Iterable[int] | None = None) -> str:
+        """Return the channels' numbers and names, of some or of all."""
+        shown = range(len(self.channels)) if indices is None else indices
+        return ", ".join(f"{i + 1} {self.channels[i].name}" for i in shown)
+
+    def index(self, wanted: str | int, field: str) -> int:
+        """Return the index of a channel by its name or its number, which counts from 1. Raises Refusal.
+
+        The name may lack its group if only one channel ends so.
+        """
+        names = [channel.name for channel in self.channels]
+        if isinstance(wanted, int):
+            if not 1 <= wanted <= len(names):
+                raise Refusal(field, wanted, f"{self.path.name} has {len(names)} channels: {', '.join(names)}", 1)
+            return wanted - 1
+        found = [i for i, name in enumerate(names) if name == wanted]
+        if len(found) > 1:
+            limit = f"{self.path.name} has several channels of this name; give a number"
+            raise Refusal(field, wanted, limit, found[0] + 1)
+        found = found or [i for i, name in enumerate(names) if _last(name) == wanted]
+        if len(found) != 1:
+            close = get_close_matches(wanted, names, n=1)
+            limit = f"is no channel of {self.path.name}, which has {self.numbered()}"
+            raise Refusal(field, wanted, limit, close[0] if close else None)
+        return found[0]
+
+    def columns(self, indices: Sequence[int]) -> Floats:
+        """Return channels as columns (n, k). Raises Refusal for different lengths, Unreadable for absurd numbers."""
+        chosen = [self.channels[i] for i in indices]
+        counts = [len(channel.samples) for channel in chosen]
+        if len(set(counts)) > 1:
+            listed = ", ".join(f"{c.name} {count}" for c, count in zip(chosen, counts, strict=True))
+            raise Refusal("channel", self.path.name, f"its channels have different counts of samples: {listed}")
+        table = np.column_stack([np.asarray(channel.samples, float) for channel in chosen])
+        size = np.abs(table)
+        absurd = (size > _MOST) | ((size > 0) & (size < 1 / _MOST))
+        if absurd.any():
+            row, column = np.argwhere(absurd)[0]
+            limit = f"sample {row + 1} of channel {chosen[column].name!r} is {table[row, column]:g}"
+            raise Unreadable(str(self.path), None, f"{limit}: the file is damaged")
+        return table
+
+
+def _last(name: str) -> str:
+    return name.rpartition("/")[2]
+
+
+@functools.cache
+def _by_ending() -> dict[str, str]:
+    """Return the reader's module by ending: every module of this package has ENDINGS."""
+    found: dict[str, str] = {}
+    for one in pkgutil.iter_modules(__path__):
+        found |= dict.fromkeys(import_module(f"{__name__}.{one.name}").ENDINGS, one.name)
+    return found
+
+
+def expect_ending(path: Path, field: str) -> str:
+    """Return the ending of a file's name, in small letters. Raises Unreadable for one that no reader has."""
+    ending = path.suffix.lower()
+    if ending in VENDOR:
+        raise Unreadable(field, path.name, "Polytec's own format is read by Polytec's library alone: export UFF")
+    if ending not in _by_ending():
+        raise Unreadable(field, path.name, f"no reader; known endings: {', '.join((*_by_ending(), *VENDOR))}", ".csv")
+    return ending
+
+
+def open_recording(path: Path, layout: Layout = Layout()) -> Recording:
+    """Return the recording in a file.
+
+    Raises Unreadable (a Refusal) for a file that can't be read without a guess, Missing without the library of its
+    format, UnitcadError for a file that isn't there or is no regular one.
+    """
+    module = _by_ending()[expect_ending(path, str(path))]
+    try:
+        with open(path, "rb", opener=files.regular()) as file:
+            first = file.read(512)
+    except FileNotFoundError:
+        raise files.NotThere(f"{path}: no such file") from None
+    except OSError as error:
+        raise UnitcadError(f"{path}: {(error.strerror or 'unreadable').lower()}") from None
+    if (size := path.stat().st_size) > LARGEST:
+        limit = f"has {size / 1e6:.0f} MB; files are read whole, up to {LARGEST / 1e6:g} MB: cut it, or record slower"
+        raise Unreadable(str(path), None, limit)
+    if module == "matlab" and first.startswith((b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3")):
+        module = "hdf5"
+    with _refusing(path):
+        if getattr(import_module(f"{__name__}.{module}"), "LIBRARY", ""):
+            # Some damaged files end the library's process, take all memory, or loop for ever.
+            reading = _worker().submit(_read_in, os.getcwd(), module, path, layout, seconds=LONGEST_S)
+            return Recording(path, reading.result())
+        return Recording(path, _read(module, path, layout))
+
+
+def _read_in(folder: str, module: str, path: Path, layout: Layout) -> list[Channel]:
+    os.chdir(folder)
+    return _read(module, path, layout)
+
+
+def _read(module: str, path: Path, layout: Layout) -> list[Channel]:
+    return import_module(f"{__name__}.{module}").read(path, layout)
+
+
+@functools.cache
+def _worker() -> Pool:
+    return Pool(memory=MEMORY)
+
+
+@contextlib.contextmanager
+def _refusing(path: Path) -> Iterator[None]:
+    """Turn an exception of a format's library into a refusal."""
+    try:
+        yield
+    except ModuleNotFoundError as missing:
+        name = _EXTRA.get(missing.name or "", missing.name)
+        raise Missing(f"{path}: needs {name}: pip install 'unitcad[lab]'") from None
+    except TimedOut:
+        raise Unreadable(str(path), None, f"is damaged: its library did not return in {LONGEST_S:g} s") from None
+    except MemoryError:
+        limit = f"is damaged, or takes more than {MEMORY >> 30} GiB to read"
+        raise Unreadable(str(path), None, limit) from None
+    except WorkerEnded as end:
+        raise Unreadable(str(path), None, f"is damaged, or no {path.suffix} file ({end})") from None
+    except UnitcadError:
+        raise
+    except Exception as error:  # a damaged file: whatever the library stumbles over
+        said = " ".join(str(error).split())[:120] or type(error).__name__
+        raise Unreadable(str(path), None, f"is damaged, or no {path.suffix} file ({said})") from None

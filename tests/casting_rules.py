@@ -1,0 +1,270 @@
+"""What a casting procedure must never say: each rule reads the procedure's data and names what breaks it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+
+from unitcad.casting.pouring import GREASE, HOLD, LEVEL_AGAIN, TACK
+from unitcad.casting.procedure import Procedure
+from unitcad.casting.steps import BenchStep
+from unitcad.text import spaced
+
+WORDS = {
+    r"\bknife": "sharp knife",
+    r"\bscissors": "small scissors",
+    r"\bpin\b": "pin",
+    r"\bspatula": "blunt spatula",
+    r"\blevel, or a small spirit level": "level",
+    r"\bpaper\b": "paper",
+    r"\bvice\b": "vice and two boards",
+    r"\bpen\b": "pen",
+    r"\bcotton bud": "cotton buds",
+    r"\bbrush a thin coat": "small brush",
+    r"\bbrush off": "hand brush",
+    r"strip of stiff card": "stiff card or plastic",
+    r"\bflat pliers": "flat pliers",
+    r"\bwith pliers": "narrow pliers",
+    r"\bsolder (the|on|wires)": "soldering iron and solder",
+    r"release agent, if any": "release agent",
+    r"tape over the underside": "wide adhesive tape",
+    r"petroleum jelly|\bgrease the": "petroleum jelly",
+    r"isopropanol": "isopropanol and lint-free wipes",
+    r"syringe of isopropanol": "rinsing syringe",
+    r"\boven\b": "oven",
+    r"post-cure": "curing lamp",
+    r"varnish": "acrylic varnish",
+}
+"""What a step's words name, in lower case, and the line of the bill that it asks for."""
+
+
+def layers_named(texts: Iterable[str]) -> list[int]:
+    """The layers (from 0, -1 for the last) whose silicone an assembly's words ask for."""
+    said = re.findall(r"(?:Layer (\d+)|(last) layer)'s silicone", " ".join(texts))
+    return [-1 if last else int(layer) - 1 for layer, last in said]
+
+
+def broken_rules(procedure: Procedure) -> list[str]:
+    """Return what a procedure does wrong, one sentence each; empty where it keeps every rule."""
+    return [fault for rule in RULES for fault in rule(procedure)]
+
+
+def _agent(procedure: Procedure) -> Iterator[str]:
+    """Keep release agent off what bonds later, and off every pour but the last."""
+    bonds = {bond.face: bond.to for bond in procedure.bonds}
+    last = procedure.pours[-1].index
+    for pour in procedure.pours:
+        for face in pour.agent:
+            if face in bonds:
+                bond = f"whose cast bonds to {bonds[face]}"
+                yield f"pour {pour.index}: release agent on the {face.face} of {face.tool}, {bond}"
+            if pour.index != last:
+                yield f"pour {pour.index}: release agent before the last pour"
+            if face.tool != f"cup{last}" or face.face != "bore":
+                yield f"pour {pour.index}: release agent on the {face.face} of {face.tool}, not on the last cup's bore"
+
+
+def _degassing(procedure: Procedure) -> Iterator[str]:
+    """Degas every pour where there is a vacuum; ask for nothing that needs one where there is none."""
+    for pour in procedure.pours:
+        says = any(step.text.startswith("Degas for") for step in pour.steps)
+        if procedure.vacuum and not (says and pour.degassing_min > 0):
+            yield f"pour {pour.index}: not degassed, though there is a vacuum"
+        needs = [figure.name for figure in pour.figures if "vacuum" in figure.name or "degassing" in figure.name]
+        if not procedure.vacuum and (says or pour.degassing_min or needs):
+            yield f"pour {pour.index}: asks for a vacuum that is not there: {', '.join(needs) or 'degassing'}"
+    needs = [item.item for item in procedure.bill if "degassing" in item.item or "vacuum" in item.note]
+    if needs and not procedure.vacuum:
+        yield f"the bill asks for a vacuum that is not there: {', '.join(needs)}"
+
+
+def _held(procedure: Procedure) -> Iterator[str]:
+    """Hold an open cup down before it is struck off, and pull the tongue before a cup is lifted."""
+    for pour in procedure.pours:
+        strike, hold = _first(pour.steps, "Strike off"), _first(pour.steps, f"{HOLD} cup {pour.index} down")
+        cups = any(step.title == f"Cup {pour.index} on" for step in pour.steps)
+        if cups and strike is not None and (hold is None or hold > strike):
+            yield f"pour {pour.index}: nothing holds the cup down while it is struck off"
+        inserted, pull, lift = (_first(pour.steps, words) for words in ("on the ledge", "tongue out", "Lift cup"))
+        if inserted is not None and (pull is None or lift is None or pull > lift):
+            yield f"pour {pour.index}: the cup is lifted over a tongue"
+
+
+def _greased(procedure: Procedure) -> Iterator[str]:
+    """Grease what seals a cup's slots before the cup hides it, with petroleum jelly, and say on which faces."""
+    for pour in procedure.pours:
+        titles = [step.title for step in pour.steps]
+        on = f"Cup {pour.index} on"
+        if GREASE in titles:
+            text = pour.steps[titles.index(GREASE)].text
+            if titles.index(GREASE) > titles.index(on):
+                yield f"pour {pour.index}: greases what the cup already hides"
+            if "petroleum jelly" not in text or "face" not in text:
+                yield f"pour {pour.index}: does not say what to grease with, or which faces"
+
+
+def _lifted(procedure: Procedure) -> Iterator[str]:
+    """Lift the mould off the bench before a filament is pulled from under it."""
+    for step in procedure.release:
+        if step.title == "Filament out" and not step.text.startswith("Lift the mould off the bench"):
+            yield "the filaments are pulled out while the mould lies on them"
+
+
+def _cleared(procedure: Procedure) -> Iterator[str]:
+    """Clear every window that resin may close, before the post-cure."""
+    clear, cure = _first(procedure.preparation, "Clear the windows"), _first(procedure.preparation, "post-cure, bake")
+    for cup in procedure.tunnels:
+        if clear is None or cure is None or clear > cure or spaced(cup) not in procedure.preparation[clear].text:
+            yield f"the window of {cup} is not cleared of resin before the post-cure"
+
+
+def _shown(procedure: Procedure) -> Iterator[str]:
+    """Show every step in which a piece of the mould is put on, moved or taken off."""
+    moving = re.compile(
+        r"^(Cup \d+ (on|off)|Lid|Tongue|Filament|Grease the fl|Hold|Pour$|Strike|Inject|Peel|Base|Push|Level|Try)"
+    )
+    for step in _all(procedure):
+        if moving.match(step.title) and not step.picture:
+            yield f"{step.title}: has no picture"
+
+
+def _levelled(procedure: Procedure) -> Iterator[str]:
+    """Level the mould before the first pour, and say how to see it."""
+    if not any("level" in step.text and "paper under a corner" in step.text for step in procedure.preparation):
+        yield "nothing says how the mould is levelled"
+
+
+def _cured(procedure: Procedure) -> Iterator[str]:
+    """Cure before a mould is opened, for the silicone's whole time, and say how to tell that it is done."""
+    for pour in procedure.pours:
+        cures = [i for i, step in enumerate(pour.steps) if step.kind == "cure"]
+        opens = [i for i, step in enumerate(pour.steps) if step.title.endswith((" off", "out FIRST")) and i]
+        if len(cures) != 1 or any(i < cures[0] for i in opens if pour.steps[i].title != "Strike off"):
+            yield f"pour {pour.index}: the mould is opened before the cure"
+        elif pour.steps[cures[0]].wait_min < 60 * pour.cure_h - 1e-6:
+            yield f"pour {pour.index}: cures for less than the silicone takes"
+        elif TACK not in pour.steps[cures[0]].text:
+            yield f"pour {pour.index}: nothing says how to tell cured silicone from tacky"
+    smeared = any("smear" in step.text for step in procedure.assembly)
+    if smeared and procedure.assembly[-1].kind != "cure":
+        yield "the smear that holds the motor is not cured"
+
+
+def _enough(procedure: Procedure) -> Iterator[str]:
+    """Mix what the cavities, and a syringe, take."""
+    for pour in procedure.pours:
+        values = {figure.name: figure.value for figure in pour.figures}
+        density = values["density"]
+        needed = values.get("to draw into the syringe, at least", 0.0) * density or values["in the cavities, net"]
+        if pour.part_a_g + pour.part_b_g < needed:
+            yield f"pour {pour.index}: mixes less than it takes"
+        injected = any(step.title == "Inject" for step in pour.steps)
+        if injected and "to draw into the syringe, at least" not in values:
+            yield f"pour {pour.index}: nothing says what the syringe holds back"
+
+
+def _gripped(procedure: Procedure) -> Iterator[str]:
+    """Give a cut tongue a grip."""
+    for step in procedure.preparation:
+        if step.title == "Cut the tongues" and "what you pull by" not in step.text:
+            yield "a cut tongue has nothing to pull it by"
+
+
+def _propped(procedure: Procedure) -> Iterator[str]:
+    """Bear the grip of every tongue that stands, and look at the ledge only where nothing covers it."""
+    for pour in procedure.pours:
+        for step in pour.steps:
+            if step.title == "Tongue home" and " hangs free: put" not in step.text:
+                yield f"pour {pour.index}: nothing bears the tongue's grip"
+            if pour.index > 1 and "none under it on the ledge" in step.text:
+                yield f"pour {pour.index}: asks to look at a ledge that Layer 1 covers"
+
+
+def _listed(procedure: Procedure) -> Iterator[str]:
+    """List every tool and consumable that a step names."""
+    items = {item.item for item in procedure.bill}
+    for step in _all(procedure):
+        for words, item in WORDS.items():
+            if re.search(words, step.text.lower()) and item not in items:
+                yield f"the bill lacks what a step names: {item}"
+
+
+def _bought(procedure: Procedure) -> Iterator[str]:
+    """Buy what the pours take of each silicone, and the smear's batch on top."""
+    bought = {item.item: item.quantity for item in procedure.bill}
+    batches = [(pour.material, pour.part_a_g + pour.part_b_g) for pour in procedure.pours]
+    layers = set(layers_named(step.text for step in procedure.assembly))
+    for material in dict.fromkeys(material for material, _ in batches):
+        taken = sum(grams for name, grams in batches if name == material)
+        there = sum(bought.get(f"{material} part {part}", 0.0) for part in "AB")
+        smeared = any(procedure.pours[min(i, len(procedure.pours) - 1)].material == material for i in layers)
+        if there < taken - 1e-6 or (smeared and there < taken + 1e-6):
+            yield f"the bill lacks silicone: {material}"
+
+
+def _timed(procedure: Procedure) -> Iterator[str]:
+    """Give every step its time: at the bench, or as a wait."""
+    for step in _all(procedure):
+        if not step.minutes and not step.wait_min:
+            yield f"{step.title}: takes no time"
+
+
+def _level_again(procedure: Procedure) -> Iterator[str]:
+    """Look at the level again once tape or bands run under the plate."""
+    for pour in procedure.pours:
+        cups = any(step.title == f"Cup {pour.index} on" for step in pour.steps)
+        if cups and not any(LEVEL_AGAIN in step.text for step in pour.steps):
+            yield f"pour {pour.index}: nothing says to look at the level again"
+
+
+def _mixed_first(procedure: Procedure) -> Iterator[str]:
+    """Use no mix before it is weighed and mixed."""
+    for pour in procedure.pours:
+        mixed = next((i for i, step in enumerate(pour.steps) if step.kind == "mix"), len(pour.steps))
+        for step in pour.steps[:mixed]:
+            if "the mix " in step.text:
+                yield f"pour {pour.index}: {step.title} uses the mix before it is mixed"
+
+
+def _smeared(procedure: Procedure) -> Iterator[str]:
+    """Let the smear cure as long as the silicone that the steps name for it, and no other."""
+    silicones = [pour.material for pour in procedure.pours]
+    hours = {pour.material: pour.cure_h for pour in procedure.pours}
+    for said in layers_named(step.text for step in procedure.assembly):
+        asked = hours[silicones[min(said, len(silicones) - 1)]]
+        if abs(procedure.assembly[-1].wait_min - 60 * asked) > 1e-6:
+            yield f"the smear is of layer {said % len(silicones) + 1}'s silicone and cures for another's time"
+
+
+RULES = (
+    _agent,
+    _degassing,
+    _held,
+    _greased,
+    _lifted,
+    _cleared,
+    _shown,
+    _levelled,
+    _cured,
+    _enough,
+    _gripped,
+    _propped,
+    _listed,
+    _bought,
+    _timed,
+    _smeared,
+    _level_again,
+    _mixed_first,
+)
+
+
+def _all(procedure: Procedure) -> Iterator[BenchStep]:
+    yield from procedure.preparation
+    for pour in procedure.pours:
+        yield from pour.steps
+    yield from (*procedure.release, *procedure.assembly)
+
+
+def _first(steps: tuple[BenchStep, ...], words: str) -> int | None:
+    """Return the number of the first step (from 0) that says so."""
+    return next((i for i, step in enumerate(steps) if words in step.text), None)

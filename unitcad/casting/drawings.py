@@ -1,0 +1,270 @@
+"""What pictures of the procedure show beside the pieces: arrows, tape, grease, paper, card, screwdrivers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from unitcad.designs import layer_colour
+from unitcad.designs.tooling import Cell
+from unitcad.moulds.base import PRY_HALF_WIDTH, outline, plate_top
+from unitcad.moulds.cup import skirt_end, window_section
+from unitcad.moulds.layout import CORNER_RADIUS, MARK
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
+from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
+from unitcad.shape import Extrude, Revolve, Shape, box, cut, moved, polygon, rotated, turned, union
+
+if TYPE_CHECKING:
+    from unitcad.moulds.dovetails import Axis, Interval
+
+ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0.38), (0.80, 0.86, 0.90)
+CARD, PAPER, GREASE, INK = (0.45, 0.72, 0.38), (0.96, 0.93, 0.62), (0.98, 0.72, 0.16), (0.10, 0.10, 0.12)
+TAB = (0.93, 0.90, 0.78)
+CLEAR = 5.0
+"""Between a piece that is lifted off and what it was on, mm."""
+Offset = tuple[float, float, float]
+DOWN = (0.0, 0.0, -1.0)
+BESIDE = 3.0
+"""From a filament's middle to tape, mm."""
+HELD = 60.0
+"""Length of a cup's side that one strip of tape holds down, mm (assumed)."""
+TAPE_WIDTH, TAPE_THICKNESS, BELOW_RIM = 8.0, 0.4, 0.8
+ON_PLATE = 0.75
+"""Share of the pad under a grip, at least, that lies on the plate: it does not tip over the plate's edge."""
+
+
+@dataclass(frozen=True)
+class Extra:
+    """Something beside the pieces: an arrow, tape, silicone; its colour (three numbers 0 to 1), and how it is moved."""
+
+    shape: Shape
+    colour: tuple[float, float, float]
+    moved: Offset = (0.0, 0.0, 0.0)
+
+
+def cast_colour(moulds: MouldSet, pour: int) -> tuple[float, float, float]:
+    """Return the colour of what pour (from 1) casts: that of the body that it becomes."""
+    own = (body.colour for body in moulds.unit if body.made == "cast" and body.step == pour)
+    return next(own, layer_colour(pour - 1))
+
+
+def arrow(way: Offset, x: float, y: float, z: float, length: float) -> Extra:
+    """Draw an arrow along a direction square to y, its middle at (x, y, z)."""
+    tip = min(3.6, length / 2)
+    upright = Revolve(polygon((0, 0), (0.55, 0), (0.55, length - tip), (1.5, length - tip), (0, length)))
+    leaning = rotated(moved(upright, 0, 0, -length / 2), "y", math.degrees(math.atan2(way[0], way[2])))
+    return Extra(moved(leaning, x, y, z), ARROW)
+
+
+def bands(x: float, y: float, low: float, high: float) -> tuple[Extra, ...]:
+    """Draw two rubber bands round lid and base, near their ends at -x and x: from -y to y, from z to z."""
+
+    def band(x: float) -> Shape:
+        return cut(box(x - 1, x + 1, -y - 1, y + 1, low - 1, high + 1), (box(x - 2, x + 2, -y, y, low, high),))
+
+    return Extra(band(x - 2), BAND), Extra(band(2 - x), BAND)
+
+
+def tails(moulds: MouldSet) -> list[tuple[Cell, int]]:
+    """Return every way out of a cell for a tail or a tongue: the cell, and the side."""
+    return [(cell, side) for cell in moulds.plan.layout.cells for side in cell.sides]
+
+
+def on_tongues(moulds: MouldSet, length: float, colour: tuple[float, float, float]) -> tuple[Extra, ...]:
+    """Draw grease, or a pen's mark, on `length` mm of every tongue beside the cup's wall."""
+    wall = moulds.plan.layout.cup[0]
+    return _sleeves(moulds, 0.15, colour, [(cell.y, s * wall, s * (wall + length)) for cell, s in tails(moulds)])
+
+
+def tabs(moulds: MouldSet, out: float = 0.0) -> tuple[Extra, ...]:
+    """Draw the folded tape on every tongue that is cut, where it is pulled out by `out` mm; none on printed ones."""
+    lay = moulds.plan.layout
+    if grip_of(moulds) == "grip":
+        return ()
+    near = max(lay.cup[0] - abs(cell.x) for cell in lay.cells) + GRIP_GAP + out
+    far = near + GRIP_LENGTH + 0.5
+    return _sleeves(moulds, 0.5, TAB, [(cell.y, cell.x + s * near, cell.x + s * far) for cell, s in tails(moulds)])
+
+
+def _sleeves(
+    moulds: MouldSet, thick: float, colour: tuple[float, float, float], places: Sequence[tuple[float, float, float]]
+) -> tuple[Extra, ...]:
+    """Draw what is round tongues, a film in height and `thick` in width: their y, and from where to where along x."""
+    exit = moulds.dimensions.exit
+    if not exit:
+        return ()
+    half, low, high = exit.width / 2 + thick, exit.low - 0.15, exit.high + 0.15
+    return tuple(Extra(box(min(x0, x1), max(x0, x1), y - half, y + half, low, high), colour) for y, x0, x1 in places)
+
+
+def grease_on_rim(moulds: MouldSet, step: Step) -> Extra:
+    """Draw the line of grease near the outer edge of a cup's rim, under its lid."""
+    x, y = moulds.plan.layout.cup
+    outer, inner = (outline((x - by, y - by), MARK) for by in (0.4, 1.2))
+    hole = Extrude(inner, step.rim - 1, step.rim + 1)
+    return Extra(cut(Extrude(outer, step.rim, step.rim + 0.3), (hole,)), GREASE)
+
+
+def paper_in_slit(moulds: MouldSet) -> tuple[Extra, ...]:
+    """Draw a strip of paper in the slit between a cup's skirt and the plate, on two sides."""
+    low, high, (x, y) = plate_top(moulds.spec), skirt_end(moulds.spec), moulds.plan.layout.cup
+    front = CORNER_RADIUS - y
+    strips = box(x - 1, x + 9, front, front + 6, low, high), box(-x - 9, 1 - x, front, front + 6, low, high)
+    return tuple(Extra(strip, PAPER) for strip in strips)
+
+
+def screwdrivers(lifted: float, edge: float, low: float) -> tuple[Extra, ...]:
+    """Draw a screwdriver at either end along x, an arrow down on each handle.
+
+    Its tip is at `low` under what is lifted, which ends at x = `lifted`, and it leaves the base at x = `edge`.
+    """
+    blade = box(lifted - 1, edge + 4, -3, 3, low, low + 0.9)
+    handle = moved(turned(Revolve(polygon((0, 0), (2.2, 0), (2.2, 9), (0, 9))), "y", 1), edge + 4, 0, low + 0.45)
+    return tuple(
+        extra
+        for side in (1, -1)
+        for extra in (
+            Extra(turned(union((blade, handle)), "z", 1 - side), TOOL),
+            arrow(DOWN, side * (edge + 9), 0.0, low + 9, 9.0),
+        )
+    )
+
+
+def spirit_level(half: float, z: float, plate: tuple[float, float], bottom: float) -> tuple[Extra, ...]:
+    """Draw a spirit level that lies along x on what is `half` wide to either side and ends at `z`.
+
+    Paper lies under a corner of the base, whose half sizes are `plate` and whose underside is at `bottom`.
+    """
+    long, (x, y) = min(1.5 * half, 30.0), plate
+    return (
+        Extra(box(-long, long, -4.0, 4.0, z, z + 4.5), TOOL),
+        Extra(box(-4.0, 4.0, -2.0, 2.0, z + 4.0, z + 5.0), (0.75, 0.93, 0.35)),
+        Extra(box(-x - 6, -x + 5, -y - 3, -y + 6, bottom - 0.8, bottom), PAPER),
+    )
+
+
+def tape_places(moulds: MouldSet) -> tuple[float, ...]:
+    """Return where the strips of tape on the front and the back of a cup begin along x, mm.
+
+    One for each `HELD` mm of it, the outer two at its ends, the others beside filaments, which leave in the middle.
+    Each piece of a split tool that reaches these sides has one; where it is too narrow, the strip reaches over a seam.
+    """
+    plan, half = moulds.plan, moulds.plan.layout.cup[0]
+    left, right, count = CORNER_RADIUS - half, half - MARK - TAPE_WIDTH, math.ceil(2 * half / HELD)
+    seams = sorted({seam.at for split in plan.splits for seam in split.seams if seam.across == "x"})
+    if count == 1 and not seams:
+        return (left,)
+    beside = [at for cell in plan.layout.cells for at in (cell.x + BESIDE, cell.x - BESIDE - TAPE_WIDTH)]
+    free = [at for at in beside if all(not at < cell.x < at + TAPE_WIDTH for cell in plan.layout.cells)]
+
+    def add(wanted: float, among: list[float]) -> None:
+        places.add(min(among, key=lambda at: (abs(at - wanted), at)))
+
+    places = {left, right}
+    for i in range(1, count - 1 if free else 0):
+        add(left + (right - left) * i / (count - 1), free)
+    for low, high in pairwise((-half, *seams, half)):
+        high -= TAPE_WIDTH
+        there = [at for at in free if low <= at <= high]
+        if there and not any(low <= at <= high for at in places):
+            add((low + high) / 2, there)
+    for low, high in _pieces(moulds, "x", half):
+        if free and not any(low <= at <= high - TAPE_WIDTH for at in places):
+            places.add(_most_on(low, high, free))
+    return tuple(sorted(places))
+
+
+def side_places(moulds: MouldSet) -> tuple[float, ...]:
+    """Return where strips on the two other sides begin along y, mm: for pieces in rows between others, clear of slots.
+
+    () where every piece that has an outer edge reaches the front or the back.
+    """
+    half, beside = moulds.plan.layout.cup[1], PRY_HALF_WIDTH + 1.0
+    places: set[float] = set()
+    for low, high in _pieces(moulds, "y", half):
+        if low > -half and high < half:
+            choices = ((low + high - TAPE_WIDTH) / 2, beside, -beside - TAPE_WIDTH)
+            places.add(_most_on(low, high, [at for at in choices if not -beside - TAPE_WIDTH < at < beside]))
+    return tuple(sorted(places))
+
+
+def _pieces(moulds: MouldSet, axis: Axis, half: float) -> Iterator[Interval]:
+    """Yield from where to where each piece of split tools goes along an axis, at the two edges along it."""
+    for split in moulds.plan.splits:
+        lines = [seam.line for seam in split.seams if seam.across == axis]
+        ends = sorted((min(line[0][0], line[-1][0]), max(line[0][0], line[-1][0])) for line in lines)
+        yield from ((a[1], b[0]) for a, b in pairwise([(-half, -half), *ends, (half, half)]))
+
+
+def _most_on(low: float, high: float, places: Sequence[float]) -> float:
+    """Return the place whose strip lies most on a piece, the nearest to its middle of those alike."""
+
+    def rank(at: float) -> tuple[float, float, float]:
+        return max(low - at, at + TAPE_WIDTH - high, 0.0), abs(at + TAPE_WIDTH / 2 - (low + high) / 2), at
+
+    return min(places, key=rank)
+
+
+def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
+    """Draw the strips of tape on a pour's cup: its wall, the plate, the plate's edge and underside."""
+    lay, (bottom, top), thick = moulds.plan.layout, moulds.plate, TAPE_THICKNESS
+    strips: list[Extra] = []
+    for axis, places in ((1, tape_places(moulds)), (0, side_places(moulds))):
+        cup, plate = lay.cup[axis], lay.plate[axis]
+        runs = [
+            (cup, cup + thick, (top, step.rim - BELOW_RIM)),
+            (cup, plate + thick, (top, top + thick)),
+            (plate, plate + thick, (bottom - thick, top + thick)),
+            (plate - 5.0, plate + thick, (bottom - thick, bottom)),
+        ]
+        for side in (1, -1) if places else ():
+            boxes = [
+                box(at, at + TAPE_WIDTH, a, b, *heights) if axis else box(a, b, at, at + TAPE_WIDTH, *heights)
+                for at in places
+                for a, b, heights in ((*sorted((side * a, side * b)), heights) for a, b, heights in runs)
+            ]
+            strips.append(Extra(union(boxes), TAPE))
+    return tuple(strips)
+
+
+@dataclass(frozen=True)
+class Prop:
+    """A pad of card on the plate, against the cup: its size in mm, and each one's shape in its place.
+
+    `tolerance_mm`: how far its thickness may be off: the tongue has as much room above and below in its windows.
+    """
+
+    thickness_mm: float
+    width_mm: float
+    length_mm: float
+    tolerance_mm: float
+    pads: tuple[Shape, ...]
+
+
+def grip_of(moulds: MouldSet) -> str:
+    """Return what a tongue is pulled by: a printed one's grip, or the tab of tape on one that is cut."""
+    return "tab" if any(tool.made == "cut" for tool in moulds.plan.of_kind("tongue")) else "grip"
+
+
+def tongue_prop(moulds: MouldSet) -> Prop | None:
+    """Return the pad under the tongues' grips, one on each side that tongues leave to; None without tongues."""
+    lay, exit, top = moulds.plan.layout, moulds.dimensions.exit, plate_top(moulds.spec)
+    if not exit or not moulds.plan.of_kind("tongue"):
+        return None
+    room = []
+    for step in moulds.plan.steps:
+        _, low, high = window_section(moulds.spec, exit, step.rim)
+        room += [exit.low - low, *([high - exit.high] if high < step.rim else [])]
+    width = float(math.floor((lay.plate[0] - lay.cup[0]) / ON_PLATE))
+    pads, lengths = [], []
+    for side in (1, -1):
+        if along := [cell.y for cell in lay.cells if side in cell.sides]:
+            x0, x1 = sorted((side * lay.cup[0], side * (lay.cup[0] + width)))
+            y0, y1 = min(along) - GRIP_WIDTH / 2 - 1, max(along) + GRIP_WIDTH / 2 + 1
+            pads.append(box(x0, x1, y0, y1, top, exit.low))
+            lengths.append(y1 - y0)
+    return Prop(exit.low - top, width, max(lengths), min(room), tuple(pads))

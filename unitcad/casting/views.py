@@ -1,0 +1,528 @@
+"""What each picture of the procedure shows: which pieces stand where, which one moves, what holds or fills them.
+
+Data: `pictures` draws it. Meshed here is only what tells a place: a lid's channels, an array's motors, what is
+laid into a curved base.
+A view's name is the name of its file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from unitcad.casting.drawings import (
+    CARD,
+    CLEAR,
+    DOWN,
+    GREASE,
+    INK,
+    TOOL,
+    Extra,
+    Offset,
+    arrow,
+    bands,
+    cast_colour,
+    grease_on_rim,
+    on_tongues,
+    paper_in_slit,
+    screwdrivers,
+    spirit_level,
+    tabs,
+    tape,
+    tape_places,
+    tongue_prop,
+)
+from unitcad.casting.figures import window_length
+from unitcad.designs import layer_colour
+from unitcad.export.picture_letters import Name
+from unitcad.kernels.mesh import arrays, bounds
+from unitcad.moulds.base import plate_bottom, pry_floor
+from unitcad.moulds.layout import MARK
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
+from unitcad.moulds.removal import CAST, Way
+from unitcad.moulds.tongue import GRIP_WIDTH
+from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, ring, rotated, turned, union
+from unitcad.shape.body import Body
+from unitcad.shape.column import extent
+from unitcad.text import number
+
+ABOVE, UNDER, OVER, LOW = (0.55, -1.0, 0.62), (0.55, -1.0, -0.6), (0.25, -1.0, 1.2), (0.55, -1.0, 0.3)
+"""Directions towards the eye."""
+BEFORE = 3.0
+"""From the cavity's mouth down to what is to go in, mm."""
+SHOWN = 0.25
+"""Thickness of a circuit in the picture, at least, mm: the drawn one would hardly be seen."""
+Views = Iterator[tuple[str, "View"]]
+Group = Literal["moulds", "under", "pieces", "unit", "cut", "curved"]
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A piece by its name, moved from its place (mm); `half`: without its half nearer the eye."""
+
+    name: str
+    moved: Offset = (0.0, 0.0, 0.0)
+    half: bool = False
+
+
+@dataclass(frozen=True)
+class View:
+    """One picture. Views of one `eye` and `group` share their scale.
+
+    `names` stand beside the points that they name; pieces laid out side by
+    side are named by their own names. `turned`: the picture upside down, as what lies on its back is seen.
+    What is moved has an arrow, back to its place (`way` -1) or on (1); none where it stays there (0).
+    """
+
+    parts: tuple[Placed, ...]
+    extras: tuple[Extra, ...] = ()
+    eye: Offset = ABOVE
+    group: Group = "moulds"
+    names: tuple[Name, ...] = ()
+    turned: bool = False
+    way: int = -1
+
+
+def placed(these: Iterable[Body | Step], x: float = 0.0, z: float = 0.0, half: bool = False) -> tuple[Placed, ...]:
+    """Return pieces, or what pours cast, in their places or beside them."""
+    return tuple(Placed(each.name, (x, 0.0, z), half) for each in these)
+
+
+def views(moulds: MouldSet) -> dict[str, View]:
+    """Return every view of a procedure by its name, in the order of the steps."""
+
+    def made(blank: MouldSet) -> dict[str, View]:
+        return {
+            name: replace(view, extras=(*view.extras, *_arrows(blank, view)), way=0) for name, view in _views(blank)
+        }
+
+    return moulds.once_a_geometry("views", made)
+
+
+def _arrows(moulds: MouldSet, view: View) -> Iterator[Extra]:
+    """Yield an arrow for each way in which a view moves things, in front of them."""
+    moving: dict[Offset, list[tuple[float, ...]]] = {}
+    for item in (*view.parts, *view.extras):
+        if any(item.moved) and view.way:
+            for shape, _ in shapes(moulds, item, view.group == "unit"):
+                box = bounds(moulds.mesh_of(shape)) if view.group == "curved" else extent(shape)
+                moving.setdefault(item.moved, []).append(box)
+    for (dx, dy, dz), boxes in moving.items():
+        (x0, y0, z0), (x1, _, z1) = np.min(boxes, axis=0)[:3].tolist(), np.max(boxes, axis=0)[3:].tolist()
+        x, z = (x0 + x1 + dx) / 2, (z0 + z1 + dz) / 2
+        if not dz:
+            # What slides has it above, where it is.
+            x, z = x + dx / 2, z1 + 3.0
+        yield arrow((view.way * dx, 0.0, view.way * dz), x, y0 + dy - 4.0 * (dz != 0), z, 0.6 * math.hypot(dx, dz))
+
+
+def shapes(moulds: MouldSet, item: Placed | Extra, unit: bool) -> list[tuple[Shape, tuple[float, float, float]]]:
+    """Return the shapes of what a view shows, not moved, and their colours; `unit`: of the unit, not of its moulds."""
+    if isinstance(item, Extra):
+        return [(item.shape, item.colour)]
+    plan = moulds.plan
+    if unit:
+        bodies = *moulds.unit, *moulds.laid_later, *moulds.pushed_in
+    else:
+        bodies = dict.fromkeys((*plan.tools, *plan.pieces, *plan.steps[-1].inserts))
+    cast = [(step, shape) for step in plan.steps if step.name == item.name and not unit for shape in step.layer]
+    found = [(shape, cast_colour(moulds, step.index)) for step, shape in cast]
+    return found + [(body.shape, body.colour) for body in bodies if body.name == item.name]
+
+
+def picture_path(name: str) -> str:
+    """Return the path of a view's picture in a result's folder."""
+    return f"steps/{name}.png"
+
+
+def level_on(moulds: MouldSet) -> Step:
+    """Return the first pour on whose rim a level lies flat: nothing on the base stands higher."""
+    steps, core = moulds.plan.steps, moulds.dimensions.core_height
+    return next((step for step in steps if step.rim >= core - 1e-9), steps[-1])
+
+
+def _views(moulds: MouldSet) -> Views:
+    plan, (bottom, top), (cup_x, cup_y) = moulds.plan, moulds.plate, moulds.plan.layout.cup
+    yield "pieces", View(placed(plan.pieces), eye=OVER, group="pieces")
+    if moulds.cast_flat:
+        yield from _curved(moulds, moulds.cast_flat, views(moulds.cast_flat))
+        return
+    yield from _single_pieces(moulds)
+    base, first = placed(plan.of_kind("base")), plan.steps[0]
+    if not plan.of_kind("cup"):
+        yield from _tray(moulds, base, first)
+        return
+    paper = () if plan.pins else paper_in_slit(moulds)
+    pressed = arrow(DOWN, 0.0, -0.8 * cup_y, first.rim + 5, 8.0)
+    slit = (Name("paper", (cup_x + 6.0, 5.0 - cup_y, top)),) if paper else ()
+    names = *slit, _corner(moulds, first.rim)
+    yield "dry-fit", View((*base, Placed(first.cup)), (*paper, pressed), names=names)
+    if stubs := plan.of_kind("stub"):
+        down = 1.2 * (moulds.dimensions.core_height - bottom)
+        x, y = plan.layout.cells[0].x, -plan.layout.plate[1]
+        names = Name("filament", (x, y * 0.8, bottom - down)), Name("groove", (x, y * 0.7, bottom))
+        yield "filament", View((*base, *placed(stubs, z=-down)), (), UNDER, "under", names=names)
+    standing, on = (*base, *placed(stubs)), level_on(moulds)
+    yield "level", _level((*standing, Placed(on.cup)), cup_x, on.rim, plan.layout.plate, bottom)
+    for step in plan.steps:
+        for name, view in _pour(moulds, step, standing):
+            yield f"pour{step.index}-{name}", view
+    yield from _way_out(moulds)
+    yield from _motor_in(moulds)
+
+
+def _level(
+    parts: tuple[Placed, ...],
+    half: float,
+    z: float,
+    plate: tuple[float, float],
+    bottom: float,
+    group: Group = "moulds",
+) -> View:
+    """Return the view of a level on what ends at `z`, and of paper under a corner of the base."""
+    names = Name("level", (0.0, -4.0, z + 2)), Name("paper", (-plate[0] - 4, -plate[1], bottom))
+    return View(parts, spirit_level(half, z, plate, bottom), group=group, names=names)
+
+
+def _single_pieces(moulds: MouldSet) -> Views:
+    """Yield the views of pieces that are joined, of tongues that are cut, of a resin cup's windows."""
+    plan, exit = moulds.plan, moulds.dimensions.exit
+    strip = next((tool for tool in plan.of_kind("tongue") if tool.made == "cut"), None)
+    if strip and exit:
+        cell = plan.layout.cells[0]
+        side, half, radius = cell.sides[0], exit.width / 2, moulds.dimensions.ledge_radius
+        end = cell.x + side * (max(plan.layout.cup[0] - abs(c.x) for c in plan.layout.cells) + 6.0)
+        names = (
+            Name(f"radius {number(radius, 3)} mm", (cell.x - side * radius, cell.y, exit.high)),
+            Name(f"{number(exit.width, 3)} mm wide", ((cell.x + end) / 2, cell.y - half, exit.high)),
+            Name("tape", (end, cell.y - half, exit.high)),
+        )
+        hole = moved(ring(radius - 0.1, radius, exit.high - 0.05, exit.high + 0.05), cell.x, cell.y)
+        yield "cut-tongue", View((Placed(strip.name),), (Extra(hole, INK), tabs(moulds)[0]), OVER, "cut", names=names)
+        if step := next((step for step in plan.steps if step.windows), None):
+            wall = side * plan.layout.cup[0]
+            slid = Placed(strip.name, (0.5 * (wall - side * abs(cell.x)), 0.0, 0.0))
+            window = Name("window", (wall, cell.y - half, exit.high))
+            yield "clear-windows", View((Placed(step.cup, half=True), slid), names=(window,))
+    for split in plan.splits[:1]:
+        lying, pushed = split.pieces[:2]
+        left, front, _, right, _, high = bounds(moulds.mesh(lying))
+        x0, y0, z0, x1, _, z1 = bounds(moulds.mesh(pushed))
+        up = z1 - z0 + max(2 * CLEAR, 0.15 * (x1 - x0))
+        names = Name("piece 1", ((left + right) / 2, front, high)), Name("piece 2", ((x0 + x1) / 2, y0, z1 + up))
+        yield "join", View((*placed([lying]), *placed([pushed], z=up)), names=names)
+
+
+def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
+    plan, lay, dims, (bottom, top) = moulds.plan, moulds.plan.layout, moulds.dimensions, moulds.plate
+    (cup_x, cup_y), before, radius = lay.cup, plan.steps[: step.index - 1], dims.radii[step.index - 1]
+    near, lengths = min(lay.cells, key=lambda each: (each.y, each.x)), moulds.spec.moulds
+    cured = *standing, *placed(before)
+    if before:
+        face = Name("bond face", (near.x, near.y - dims.radii[step.index - 2], 0.6 * before[-1].rim))
+        yield "bond-face", View((*cured, *placed(before[-1].inserts)), names=(face,) if plan.concentric else ())
+    if moulds.design.laid_in == step.index:
+        yield "laid-in", View((*cured, *placed(step.inserts, z=2 * CLEAR)))
+    cured = *cured, *placed(step.inserts)
+    if moulds.greased(step):
+        meshes = [mesh for mesh in moulds.meshes(step.seals[:1]) if not mesh.is_empty()]
+        points = [max(np.asarray(arrays(mesh)[0], float).tolist(), key=np.array(ABOVE).dot) for mesh in meshes]
+        yield (
+            "grease",
+            View(
+                cured, (Extra(union(step.seals), GREASE),), names=tuple(Name("grease", (x, y, z)) for x, y, z in points)
+            ),
+        )
+    up = max(step.rim, dims.core_height) - top + CLEAR
+    raised = Placed(step.cup, (0.0, 0.0, up))
+    yield "cup-on", View((*cured, raised), names=(_corner(moulds, step.rim + up),))
+    tongues, exit = plan.standing(step, "tongue"), dims.exit
+    prop = tongue_prop(moulds) if tongues else None
+    on, card = (), ()
+    if prop and exit:
+
+        def slid(out: float) -> tuple[Placed, ...]:
+            return tuple(Placed(each.name, ((each.removal or DOWN)[0] * out, 0.0, 0.0)) for each in tongues)
+
+        seat, opened = window_length(moulds, step), Placed(step.cup, half=True)
+        cell = min(lay.cells, key=lambda each: (each.y, -max(each.sides, default=0)))
+        side = max(cell.sides, default=1)
+        wall = cell.y - exit.width / 2, exit.high
+        pushed = *on_tongues(moulds, seat, GREASE), *tabs(moulds, seat)
+        greased = Name(f"grease {number(seat, 2)} mm", (side * (cup_x + seat / 2), *wall))
+        yield "tongue-in", View((*cured, opened, *slid(seat)), pushed, names=(greased,))
+        pads, marks = tuple(Extra(pad, CARD) for pad in prop.pads), ()
+        front = min(cell.y for cell in lay.cells if side in cell.sides) - GRIP_WIDTH / 2 - 1
+        card = (Name("card", (side * (cup_x + prop.width_mm / 2), front, top + prop.thickness_mm / 3)),)
+        names = card
+        if len(plan.steps) > 1:
+            marks, names = on_tongues(moulds, 0.6, INK), (Name("pen mark", (side * (cup_x + 0.3), *wall)), *card)
+        on = *pads, *tabs(moulds)
+        yield "tongue-home", View((*cured, opened, *placed(tongues)), (*on, *marks), names=names)
+    closed = *cured, Placed(step.cup), *placed(tongues)
+    lift, poured, colour = step.top - step.rim + 2 * CLEAR, placed([step]), layer_colour(step.index - 1)
+    off = Placed(step.lid or "", (0.0, 0.0, lift))
+    if step.lid:
+        grease = Name("grease", (0.4 * cup_x, 0.8 - cup_y, step.rim))
+        yield "lid-on", View((*closed, off), (*on, grease_on_rim(moulds, step)), names=(grease,))
+        held = *on, *bands(cup_x, lay.plate[1], bottom, step.top)
+        yield from _injected(moulds, step, (*closed, Placed(step.lid)), held, cup_x - 2.0)
+        held = *held, Extra(union(step.channels), colour)
+    else:
+        held = *on, *tape(moulds, step)
+        # In pieces, to show that each has its tape.
+        split = {each.tool: each.pieces for each in plan.splits}
+        parts = [replace(part, name=piece.name) for part in closed for piece in split.get(part.name, (part,))]
+        names = (Name("tape", (tape_places(moulds)[0] + 4.0, -lay.plate[1], top)),)
+        yield "hold", View(tuple(parts), held, names=names)
+        reach = (radius + (dims.radii[step.index - 2] if before else 0.0)) / 2
+        mound = cylinder(radius + 0.6, step.rim, step.rim + 0.5)
+        mounds = [moved(mound, cell.x, cell.y) for cell in lay.cells if plan.concentric]
+        thread = moved(cylinder(0.6, step.rim - 1.0, step.rim + 14.0), near.x - 0.5 * reach, near.y)
+        yield "pour", View((*closed, *poured), (*held, *(Extra(each, colour) for each in (*mounds, thread))))
+        back, strikers = -0.55 * cup_x, held
+        blades = placed(plan.of_kind("blade"), back, step.rim - (*before, step)[0].rim)
+        if not plan.concentric and plan.dimensions.core_height > step.rim:
+            # A strip as wide as the cavity, since what stands on the base is in the blade's way.
+            half, blades = plan.dimensions.radii[step.index - 1], ()
+            strikers = *held, Extra(box(0.0, 0.8, -half, half, step.rim, step.rim + 12.0), CARD, (back, 0.0, 0.0))
+        yield "strike", View((*closed, *poured, *blades), strikers)
+        out = radius + lengths.land_mm + lengths.groove_width_mm / 2
+        touched = Name("touch here", (near.x - 0.5 * out, near.y - 0.866 * out, step.rim - lengths.groove_depth_mm))
+        names = (touched,) if step.groove and plan.concentric else ()
+        yield "filled", View((*closed, *poured), held, names=names)
+    parts = *cured, Placed(step.cup), *poured
+    if prop and exit:
+        lid = (Placed(step.lid),) if step.lid else ()
+        kept = (each for each in held if each not in tabs(moulds))
+        pulled = *kept, *tabs(moulds, cup_x)
+        yield "tongue-out", View((*parts, *lid, *slid(cup_x)), pulled, names=card, way=1)
+    if step.lid:
+        yield "lid-off", View((*parts, off), way=1)
+    if any(removal.piece == step.cup for removal in step.removals):
+        lever = Name("screwdriver", (lay.plate[0] + 8.0, 0.0, top))
+        low = pry_floor(moulds.spec) - plate_bottom(moulds.spec) + bottom
+        yield "cup-off", View((*cured, *poured, raised), screwdrivers(cup_x, lay.plate[0], low), names=(lever,), way=1)
+
+
+def _injected(
+    moulds: MouldSet,
+    step: Step,
+    closed: tuple[Placed, ...],
+    held: tuple[Extra, ...],
+    band: float,
+    group: Group = "moulds",
+) -> Views:
+    """Yield the views of a lid that is held down, filled and cured; a band lies at x = `band`."""
+    names = (Name("rubber band", (band, 0.0, step.top + 1)),)
+    yield "lid-held", View(closed, held, group=group, names=names)
+    # Of the second cavity, where there are several: clear of the syringe. The vent nearest the eye.
+    count = len(step.channels) // len(step.layer)
+    first = count if len(step.channels) > count else 0
+    sprue, *vents = (_middle(moulds, shape, top=True) for shape in step.channels[first : first + count])
+    vent = max(vents, key=lambda at: ABOVE[0] * at[0] + ABOVE[1] * at[1])
+    closed, held = (*closed, *placed([step])), (*held, Extra(union(step.channels), layer_colour(step.index - 1)))
+    names = Name("sprue", sprue), Name("vent", vent, ring=True)
+    x0, y0, _, x1, y1, z = bounds(moulds.mesh_of(step.channels[0]))
+    tip = (x1 - x0) / 2
+    profile = polygon((0, -1), (0.6 * tip, -1), (tip, 6), (4, 8), (4, 26), (6, 26), (6, 27), (0, 27))
+    syringe = Extra(moved(Revolve(profile), (x0 + x1) / 2, (y0 + y1) / 2, z), TOOL)
+    yield "inject", View(closed, (*held, syringe), group=group, names=names)
+    yield "filled", View(closed, held, group=group, names=(Name("touch here", vent, ring=True),))
+
+
+def _corner(moulds: MouldSet, z: float) -> Name:
+    """Name the cut corner of a cup whose rim is at `z`."""
+    x, y = moulds.plan.layout.cup
+    return Name("cut corner", (x - MARK / 2, y - MARK / 2, z))
+
+
+def _way_out(moulds: MouldSet) -> Views:
+    """Yield the views from the last cured layer to the cast in the hand."""
+    plan, (bottom, top), y = moulds.plan, moulds.plate, moulds.plan.layout.cup[1]
+    base, last = plan.of_kind("base"), plan.steps[-1]
+    cast = *plan.steps, *last.inserts
+    stays = () if any(removal.piece == last.cup for removal in last.removals) else (Placed(last.cup),)
+    if stubs := plan.of_kind("stub"):
+        away = placed(stubs, z=1.2 * (bottom - moulds.dimensions.core_height))
+        yield "filament-out", View((*placed((*base, *cast)), *stays, *away), (), UNDER, "under", way=1)
+    up = last.rim + CLEAR
+    raised = placed(cast, z=up)
+    if not stays:
+        yield "peel", View((*placed(base), *raised), way=1)
+        return
+    down = moulds.dimensions.core_height + max(last.rim, 2 * CLEAR)
+    parts = [piece for tool in base for piece in plan.pieces_of(tool.name)]
+    names = Name("base", (0.0, -plan.layout.plate[1], top - down)), Name("cup stays on", (0.0, -y, last.rim / 2))
+    yield "base-off", View((*placed(parts, z=-down), *placed(cast), *stays), names=names, way=1)
+    yield "push-out", View((*stays, *raised), way=1)
+
+
+def _motor_in(moulds: MouldSet) -> Views:
+    """Yield the views of motor and circuit going in: a unit that opens to the skin lies on its back."""
+    inside = [body for body in (*moulds.unit, *moulds.laid_later) if body.made != "cast"]
+    if not inside or moulds.design.laid_in:
+        return
+    below = moulds.design.opens == "below"
+    away = (-1.0 if below else 1.0) * (moulds.dimensions.heights[-1] + CLEAR)
+    cast = placed((body for body in moulds.unit if body.made == "cast"), half=not moulds.laid_later)
+    eye = UNDER if below else LOW
+    laid = View((*cast, *placed(inside, z=away)), (), eye, "unit", turned=below)
+    yield "motor-in", _fed_through(moulds, inside) or laid
+    yield "motor-home", View((*cast, *placed(inside)), eye=eye, group="unit", turned=below)
+
+
+def _fed_through(moulds: MouldSet, inside: list[Body]) -> View | None:
+    """Return the view of a tail or wires led out through a closed slot, motor and pad before the mouth; else None."""
+    dims, exit, spec = moulds.dimensions, moulds.dimensions.exit, moulds.spec
+    led = [body for body in inside if body.kind in ("circuit", "wire")]
+    if not led or not exit or exit.high >= dims.heights[0] or moulds.design.opens != "below":
+        return None
+    middle, pad = (exit.low + exit.high) / 2, dims.pad
+    away, across = -(middle + BEFORE), [0.0]
+    if spec.fpcb and pad:
+        start, half, long = pad.radius - SHOWN, spec.fpcb.tail_width_mm / 2, spec.fpcb.tail_length_mm
+        level, thick = (pad.low + pad.high) / 2, max(spec.fpcb.thickness_mm, SHOWN)
+    elif spec.wires:
+        thick, long, count = spec.wires.diameter_mm, spec.wires.length_mm, spec.wires.count
+        start, half, level = dims.motor_radius, thick / 2, dims.core_height - thick
+        across = [(2 * i + 1 - count) * exit.width / (2 * count) for i in range(count)]
+    else:
+        return None
+    # Each strip goes along +x, in (x, z): from `start` up to the slot's mouth, then level to x = `end`.
+    run, rise = dims.cavity_radius - thick - start, middle - level - away
+    slope, t = math.hypot(run, rise), thick / 2
+    end = max(dims.outer_radius + long - slope, dims.outer_radius + 2.0)
+    x, z = start + run, level + away
+    sloping = rotated(box(0, slope, -half, half, -t, t), "y", -math.degrees(math.atan2(rise, run)))
+    strip = union((moved(sloping, start, 0, z), box(x - t, end, -half, half, middle - t, middle + t)))
+    strips = [moved(turned(strip, "z", 1 - side), y=y) for side in dims.sides for y in across]
+    if spec.fpcb and pad:
+        strips.append(cylinder(pad.radius, z - t, z + t))
+    side = max(dims.sides)
+    pulled = arrow((side, 0, 0), side * (end + 4.0), -half - 1.0, middle + 1.5, 6.0)
+    parts = (
+        *placed((body for body in moulds.unit if body.made == "cast"), half=True),
+        *placed((each for each in inside if each not in led), z=away),
+    )
+    names = (Name("slot", (side * dims.outer_radius, -half, middle)),)
+    return View(parts, (Extra(union(strips), led[0].colour), pulled), UNDER, "unit", names=names, turned=True, way=0)
+
+
+def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
+    """Yield the views of the one pour of a tray, a mould without cups."""
+    (x, y), lengths = moulds.plan.layout.plate, moulds.spec.moulds
+    filled = *tray, *placed([step])
+    yield "level", _level(tray, moulds.plan.layout.cup[0], step.rim, (x, y), moulds.plate[0])
+    x0, y0, _, _, y1, _ = bounds(moulds.meshes(step.layer)[0])
+    thread = moved(cylinder(0.6, step.rim - 1.0, step.rim + 14.0), x0 + 3.0, (y0 + y1) / 2)
+    yield "pour", View(filled, (Extra(thread, cast_colour(moulds, 1)),))
+    yield "strike", View((*filled, *placed(moulds.plan.of_kind("blade"), -0.55 * x)))
+    groove = y0 - lengths.land_mm - lengths.groove_width_mm / 2
+    touched = Name("touch here", ((x0 + 2 * x) / 3, groove, step.rim - lengths.groove_depth_mm))
+    yield "filled", View(filled, names=(touched,))
+    up = step.rim + 2 * CLEAR
+    yield "peel", View((*tray, *placed([step], z=up)), way=1)
+    if cast := {
+        body.name.partition("-")[0]: bounds(moulds.mesh(body)) for body in moulds.pushed_in if body.made == "cast"
+    }:
+        # The sheet, its back up, and the units under their pockets, each named by its place.
+        down = max(high for *_, high in cast.values()) + CLEAR
+        middles = {name: ((box[0] + box[3]) / 2, (box[1] + box[4]) / 2, step.rim) for name, box in cast.items()}
+        names = tuple(Name(name, at, on=True) for name, at in middles.items())
+        parts = *placed(moulds.unit), *placed(moulds.pushed_in, z=-down)
+        yield "units-in", View(parts, (), OVER, "unit", names=names)
+
+
+def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> Views:
+    """Yield the views of a set whose last pour stands on a base of its own, round a limb.
+
+    `cast_flat`: the set of the flat tools, `flat`: its views.
+    """
+    plan, step = moulds.plan, moulds.plan.steps[-1]
+    for name, view in flat.items():
+        if name in ("filament-out", "peel"):
+            yield f"flat-{name}", view
+        elif view.group in ("moulds", "under", "cut"):
+            yield name, view
+    count = len(plan.layout.cells)
+    # What is laid in, pour by pour, in the order of the cells; and the way in which the unit of each cell is drawn off.
+    laid = [step.earlier[i : i + count] for i in range(0, len(step.earlier), count)]
+    drawn_off = [removal for removal in step.removals if removal.piece == CAST]
+    by_part = {removal.part: removal.direction for removal in drawn_off}
+    ways = [by_part[f"at {cell.name}"] for cell in plan.layout.cells]
+    casts = tuple(Extra(union(shapes), layer_colour(pour)) for pour, shapes in enumerate(laid))
+    (base,), (lid,), stubs = (plan.standing(step, kind) for kind in ("base", "lid", "stub"))
+    x0, y0, bottom, x1, y1, high = bounds(moulds.mesh(base))
+    seat, standing = step.pins.seat if step.pins else bottom, placed((base, *stubs))
+
+    def filaments(there: tuple[Placed, ...], casts: tuple[Extra, ...], way: int) -> View:
+        """Return the base from below, its filaments halfway out along their cores, on their way up or down."""
+        out = 0.8 * (high - bottom)
+        away = (Placed(stub.name, _along(stub.removal or DOWN, out)) for stub in stubs)
+        return View((*there, *away), casts, UNDER, "curved", way=way)
+
+    def last_pour() -> Views:
+        """Yield the views from the empty curved base to the cured sheet without its lid."""
+        yield "filament", filaments(placed([base]), (), -1)
+        yield "level", _level((*standing, *placed([lid])), x1, step.top, (x1, y1), bottom, "curved")
+        raised = [
+            Extra(shape, layer_colour(pour), _along(way, 2 * CLEAR))
+            for pour, shapes in enumerate(laid)
+            for shape, way in zip(shapes, ways, strict=True)
+        ]
+        tops = (_middle(moulds, moved(extra.shape, *extra.moved)) for extra in raised[-count:])
+        names = tuple(Name(cell.name, at) for cell, at in zip(plan.layout.cells, tops, strict=True))
+        yield "laid-in", View(standing, tuple(raised), group="curved", names=names)
+        lift = high - seat + CLEAR
+        off = placed([lid], z=lift)
+        edges = [box(x0, x1, *ys, seat, step.top) for ys in ((y0 + 0.5, y0 + 1.5), (y1 - 1.5, y1 - 0.5))]
+        line = Common((union(step.seals), union((*edges, box(x0, x1, y0, y1, seat + 0.4, seat + 0.9)))))
+        names = (Name("grease", (0.0, y0 + 1.0, high)),)
+        yield "lid-on", View((*standing, *off), (*casts, Extra(line, GREASE)), group="curved", names=names)
+        held = *casts, *bands(x1, y1, bottom, step.top)
+        yield from _injected(moulds, step, (*standing, *placed([lid])), held, x1 - 2.0, "curved")
+        levers = *casts, *screwdrivers(x1, x1, seat)
+        names = (Name("screwdriver", (x1 + 8.0, 0.0, seat)),)
+        yield "lid-off", View((*standing, *placed([step]), *off), levers, group="curved", names=names, way=1)
+
+    for name, view in last_pour():
+        yield f"pour{step.index}-{name}", view
+    yield "filament-out", filaments(placed([base, step]), casts, 1)
+    # The silicone drawn off, each part in its own direction.
+    up = step.rim + 2 * CLEAR
+    *others, last = drawn_off
+    spaces: dict[Way, list[Shape]] = {}
+    for removal in others:
+        if removal.within and removal.direction != last.direction:
+            spaces.setdefault(removal.direction, []).append(removal.within)
+    rest = [space for within in spaces.values() for space in within]
+    extras = []
+    for pour, shapes in enumerate((*laid, step.layer)):
+        whole = union(shapes)
+        apart = ((Common((whole, union(within))), way) for way, within in spaces.items())
+        parts = *apart, (cut(whole, rest), last.direction)
+        extras += [Extra(part, layer_colour(pour), _along(way, up)) for part, way in parts]
+    yield "peel", View(placed([base]), tuple(extras), group="curved", way=1)
+    bodies = {body.name: body for body in (*cast_flat.unit, *cast_flat.laid_later)}
+    for name in ("motor-in", "motor-home"):
+        # What lies flat here has the names of what is cast round the limb: it is drawn as its shapes.
+        shapes = (Extra(bodies[part.name].shape, bodies[part.name].colour, part.moved) for part in flat[name].parts)
+        yield name, replace(flat[name], parts=(), extras=(*shapes, *flat[name].extras), way=0)
+
+
+def _middle(moulds: MouldSet, shape: Shape, top: bool = False) -> Offset:
+    """Return the middle of a shape's box, or of the box's upper face."""
+    x0, y0, z0, x1, y1, z1 = bounds(moulds.mesh_of(shape))
+    return (x0 + x1) / 2, (y0 + y1) / 2, z1 if top else (z0 + z1) / 2
+
+
+def _along(way: Way, length: float) -> Offset:
+    """Return a way as long as that."""
+    x, y, z = way
+    return x * length, y * length, z * length

@@ -1,0 +1,75 @@
+"""TDMS of LabVIEW and NI loggers, by npTDMS."""
+
+from __future__ import annotations
+
+import logging
+import struct
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from unitcad.lab.readers import Channel, Layout, Unreadable
+
+ENDINGS = (".tdms",)
+LIBRARY = "nptdms"
+
+
+def read(path: Path, layout: Layout) -> list[Channel]:
+    """Return the channels of a TDMS file, named group/channel. Raises Unreadable where it holds no numbers."""
+    from nptdms import TdmsFile
+    from nptdms.log import log_manager
+
+    log_manager.set_level(logging.CRITICAL)  # it writes whole damaged strings to standard error
+    size = path.stat().st_size
+    stated = _raw_bytes(path, size)
+    found = []
+    with warnings.catch_warnings(), open(path, "rb") as opened, TdmsFile.open(opened) as file:
+        warnings.simplefilter("error")
+        everything = [channel for group in file.groups() for channel in group.channels()]
+        sizes = [getattr(channel.data_type, "size", None) for channel in everything]
+        if stated is not None and None not in sizes:
+            held = sum(len(channel) * (bytes_ or 0) for channel, bytes_ in zip(everything, sizes, strict=True))
+            if held != stated:
+                raise Unreadable(str(path), None, f"its channels state {held} bytes of samples, its segments {stated}")
+        for channel in everything:
+            if not (isinstance(channel.dtype, np.dtype) and channel.dtype.kind in "fiu" and len(channel)):
+                continue
+            if len(channel) > size:
+                limit = f"channel {channel.name!r} states {len(channel)} samples in a file of {size} bytes"
+                raise Unreadable(str(path), None, limit)
+            step, unit = channel.properties.get("wf_increment"), channel.properties.get("unit_string")
+            known = isinstance(step, float | int) and np.isfinite(step) and step > 0
+            name = f"{channel.group_name}/{channel.name}"
+            found.append(
+                Channel(channel[:], name, unit if isinstance(unit, str) else "", float(step) if known else None)
+            )
+    if not found:
+        raise Unreadable(str(path), None, "holds no channel of numbers")
+    return found
+
+
+def _raw_bytes(path: Path, size: int) -> int | None:
+    """Walk the segments' lead-ins; return the bytes of their raw data, None for raw data of DAQmx.
+
+    Raises Unreadable where a segment does not begin where the one before ends, or the last one ends elsewhere.
+    """
+    raw, at, plain = 0, 0, True
+    with open(path, "rb") as file:
+        while at < size:
+            file.seek(at)
+            lead = file.read(_LEAD.size)
+            if len(lead) < _LEAD.size or not lead.startswith(b"TDSm"):
+                raise Unreadable(str(path), None, f"has no segment at byte {at}, where one is stated")
+            _, contents, _, following, before = _LEAD.unpack(lead)
+            plain = plain and not contents & _DAQMX
+            raw += following - before
+            at += _LEAD.size + following
+    if at != size or raw < 0:
+        raise Unreadable(str(path), None, f"states {at} bytes and has {size}: it was not closed, or is damaged")
+    return raw if plain else None
+
+
+_LEAD = struct.Struct("<4sIIQQ")
+"""A segment's lead-in: tag, contents, version, bytes to the next segment, bytes to the raw data."""
+_DAQMX = 1 << 7

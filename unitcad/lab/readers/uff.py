@@ -1,0 +1,78 @@
+"""Universal files (.uff, .unv): data sets 58 and 58b that are time records, by pyuff. What Polytec exports too."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from unitcad.lab.readers import Channel, Layout, Unreadable
+
+ENDINGS = (".uff", ".unv")
+LIBRARY = "pyuff"
+TIME_RESPONSE = (0, 1)
+"""Function types that are a record over time: general, time response."""
+TIME_UNITS = 17
+"""The abscissa's specific data type that is time."""
+
+
+def read(path: Path, layout: Layout) -> list[Channel]:
+    """Return the time records of a universal file as channels. Raises Unreadable for a file without any."""
+    import pyuff
+
+    _expect_binary_whole(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        file = pyuff.UFF(str(path))
+        kinds = [int(kind) for kind in file.get_set_types()]
+        if 0 in kinds:
+            raise Unreadable(str(path), None, f"the type of its data set {kinds.index(0) + 1} can't be read")
+        sets: list[Any] = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+    records = [one for one in sets if int(one["func_type"]) in TIME_RESPONSE]
+    if not records:
+        listed = ", ".join(map(str, kinds)) or "none"
+        raise Unreadable(str(path), None, f"holds no time record (its data sets: {listed})")
+    return [_record(path, one) for one in records]
+
+
+def _expect_binary_whole(path: Path) -> None:
+    """Raise Unreadable where a binary data set does not end as many bytes behind its header as that states."""
+    content = path.read_bytes()
+    for head in _BINARY.finditer(content):
+        at = head.end()
+        for _ in range(int(head[1])):
+            at = content.find(b"\n", at) + 1 or len(content)
+        end = content[at + int(head[2]) :]
+        if not re.match(rb"\s{0,2}    -1\s", end[:16]):
+            raise Unreadable(str(path), None, f"does not hold the {int(head[2])} bytes that a data set states")
+
+
+_BINARY = re.compile(rb"^ {4}58b[ \d]{12}([ \d]{12})([ \d]{12})[^\n]*\n", re.MULTILINE)
+"""The first line of a data set 58b: the lines of its header and the bytes of its data."""
+
+
+def _record(path: Path, one: dict[str, Any]) -> Channel:
+    """Return a data set's channel and samples. Raises Unreadable where its header and its data disagree."""
+    name = _label(one["ordinate_axis_lab"]) or _label(one["rsp_ent_name"]) or _label(one["id1"]) or "record"
+    data = np.asarray(one["data"])
+    where = f"{path.name}: data set {name!r}"
+    if np.iscomplexobj(data) or data.ndim != 1:
+        raise Unreadable(str(path), None, f"{where} is no real record over time")
+    count, header = int(one["num_pts"]), one.get("n_bytes")
+    if len(data) != count or len(data) < 2:
+        raise Unreadable(str(path), None, f"{where} states {count} points and has {len(data)}")
+    if int(one["binary"]) and header not in (count * 4, count * 8):
+        raise Unreadable(str(path), None, f"{where} states {header} bytes for {count} points")
+    if int(one["abscissa_spec_data_type"]) not in (0, TIME_UNITS):
+        raise Unreadable(str(path), None, f"{where} does not run over time")
+    if int(one["abscissa_spacing"]) != 1:
+        raise Unreadable(str(path), None, f"{where} is not sampled evenly; resample it, or export text with its time")
+    step = float(one["abscissa_inc"])
+    return Channel(data, name, _label(one["ordinate_axis_units_lab"]), step if step > 0 else None)
+
+
+def _label(text: str) -> str:
+    return "" if text.strip().upper() == "NONE" else text.strip()

@@ -1,0 +1,628 @@
+"""A silicone's quasi-static modulus from the curves of its specimens, with a range and warnings. SI inside.
+
+The range covers what could be defended: the stable methods' least and largest value, widened by the scatter of the
+specimens (Student's t, 95 %, of the mean of logarithms) and by the error of the cross-section.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from unitcad import files
+from unitcad.catalogue import Material
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.lab.columns import Declared, column_of, columns, columns_of
+from unitcad.lab.readers import Layout, open_recording
+
+Law = Literal["neo-Hooke", "Mooney", "Yeoh", "Ogden"]
+MODES: Mapping[str, tuple[float, float]] = {"tension": (1.0, -0.5), "plane strain": (1.0, 0.0), "biaxial": (1.0, 1.0)}
+"""Logarithmic strains along the first two axes, per strain of the first: a bar, a wide strip, a sheet."""
+LEAST_POINTS_OF: Mapping[Law, int] = {"neo-Hooke": 2, "Mooney": 3, "Yeoh": 4, "Ogden": 3}
+"""Points that a fit needs: one more than constants."""
+_STEPS = 400
+
+
+@dataclass(frozen=True)
+class HyperelasticFit:
+    """A law with its constants (Pa; alpha is a number), fitted up to a strain.
+
+    `youngs_modulus`: at zero strain, Pa. `residual`: rms of the misfit over the rms of the stress. `unstable`: for each
+    mode the least strain at which Hill's condition fails.
+    """
+
+    law: Law
+    constants: Mapping[str, float]
+    up_to: float
+    youngs_modulus: float
+    residual: float
+    unstable: Mapping[str, float]
+
+    def stress(self, strain: np.ndarray) -> np.ndarray:
+        """Return the nominal stress (Pa) of a bar at engineering strains, any shape."""
+        return nominal_stress(self.law, self.constants, strain)
+
+
+def fit_law(law: Law, strain: np.ndarray, stress: np.ndarray, up_to: float, used: float) -> HyperelasticFit:
+    """Fit a law by least squares to the points (n,) with a strain of 0 to `up_to`; stress in Pa.
+
+    Stability is asked in tension up to `up_to` and in every mode up to `used`, the strain of the application.
+    """
+    from scipy.optimize import minimize_scalar
+
+    kept = (strain >= 0.0) & (strain <= up_to)
+    x, y = strain[kept], stress[kept]
+    if law == "Ogden":  # for each alpha the best mu is known, so one number is searched
+
+        def best(alpha: float) -> dict[str, float]:
+            column = nominal_stress(law, {"mu": 1.0, "alpha": alpha}, x)
+            return {"mu": float(column @ y / (column @ column)), "alpha": alpha}
+
+        def misfit(alpha: float) -> float:
+            return float(np.sum((nominal_stress(law, best(alpha), x) - y) ** 2))
+
+        # alpha and -alpha are different laws, and the misfit has a hill at 0: both signs on a grid first.
+        grid = np.concatenate([np.linspace(-12.0, -0.25, 48), np.linspace(0.25, 12.0, 48)])
+        at = float(grid[np.argmin(list(map(misfit, grid)))])
+        found: Any = minimize_scalar(misfit, bounds=(at - 0.25, at + 0.25), method="bounded", options={"xatol": 1e-10})
+        constants = best(float(found.x))
+    else:
+        columns = _columns(law, x)
+        values = np.linalg.lstsq(np.stack(list(columns.values()), axis=1), y, rcond=None)[0]
+        constants = dict(zip(columns, map(float, values), strict=True))
+    residual = float(np.sqrt(np.mean((nominal_stress(law, constants, x) - y) ** 2) / np.mean(y**2)))
+    reach = {mode: max(up_to, used) if mode == "tension" else used for mode in MODES}
+    unstable = first_unstable(law, constants, reach)
+    return HyperelasticFit(law, constants, up_to, youngs_modulus(law, constants), residual, unstable)
+
+
+def youngs_modulus(law: Law, constants: Mapping[str, float]) -> float:
+    """Return E = 3 mu at zero strain, Pa."""
+    if law == "Ogden":
+        return 3.0 * constants["mu"]
+    return 6.0 * (constants["c10"] + constants.get("c01", 0.0))
+
+
+def nominal_stress(law: Law, constants: Mapping[str, float], strain: np.ndarray) -> np.ndarray:
+    """Return the nominal stress (Pa) of a bar with free sides at engineering strains, any shape."""
+    if law == "Ogden":
+        mu, alpha, stretch = constants["mu"], constants["alpha"], 1.0 + np.asarray(strain, float)
+        return 2.0 * mu / alpha * (stretch ** (alpha - 1.0) - stretch ** (-alpha / 2.0 - 1.0))
+    columns = _columns(law, strain)
+    return np.sum([constants[name] * column for name, column in columns.items()], axis=0)
+
+
+def first_unstable(law: Law, constants: Mapping[str, float], reach: Mapping[str, float]) -> dict[str, float]:
+    """Return, for each mode that fails Hill's condition up to its strain in `reach`, the least strain that fails."""
+    failing = {}
+    for mode, most in reach.items():
+        strain = np.linspace(0.0, most, _STEPS + 1)
+        along = np.log1p(strain)
+        tangent = log_tangent(law, constants, along * MODES[mode][0], along * MODES[mode][1])
+        least = np.linalg.eigvalsh(tangent)[:, 0]
+        bad = np.flatnonzero(least <= 0.0)
+        if bad.size:
+            failing[mode] = float(strain[bad[0]])
+    return failing
+
+
+def log_tangent(law: Law, constants: Mapping[str, float], e1: np.ndarray, e2: np.ndarray) -> np.ndarray:
+    """Return the second derivatives of W (Pa) by the logarithmic strains e1, e2 (n,), volume kept: (n, 2, 2)."""
+    strains = np.stack([e1, e2, -e1 - e2])
+    to_three = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, -1.0]])  # d(e1, e2, e3) / d(e1, e2)
+
+    def first(per_axis: np.ndarray) -> np.ndarray:
+        return np.einsum("in,ia->na", per_axis, to_three)
+
+    def second(per_axis: np.ndarray) -> np.ndarray:
+        return np.einsum("in,ia,ib->nab", per_axis, to_three, to_three)
+
+    if law == "Ogden":
+        return second(2.0 * constants["mu"] * np.exp(constants["alpha"] * strains))
+    squares = np.exp(2.0 * strains)
+    over = squares.sum(axis=0) - 3.0
+    slope = sum(k * constants.get(f"c{k}0", 0.0) * over ** (k - 1) for k in (1, 2, 3))
+    bend = sum(k * (k - 1) * constants.get(f"c{k}0", 0.0) * over ** max(k - 2, 0) for k in (2, 3))
+    gradient = first(2.0 * squares)
+    tangent = np.multiply(slope, second(4.0 * squares).T).T
+    tangent = tangent + np.multiply(bend, np.einsum("na,nb->nab", gradient, gradient).T).T
+    return tangent + constants.get("c01", 0.0) * second(4.0 / squares)
+
+
+def _columns(law: Law, strain: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the nominal stress per unit of each constant."""
+    stretch = 1.0 + np.asarray(strain, float)
+    common = 2.0 * (stretch - stretch**-2)
+    if law == "Mooney":
+        return {"c10": common, "c01": common / stretch}
+    over = stretch**2 + 2.0 / stretch - 3.0
+    return {f"c{k}0": k * common * over ** (k - 1) for k in range(1, 4 if law == "Yeoh" else 2)}
+
+
+LEAST_POINTS = 5
+_HEADER_LINES = 200
+_FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A specimen and its machine: lengths mm, the cell's full scale N, the speed mm/min; None where not known.
+
+    `crosshead`: the strain is the crosshead's travel over the gauge length, not the specimen's own.
+    """
+
+    width_mm: float | None = None
+    thickness_mm: float | None = None
+    gauge_mm: float | None = None
+    area_mm2: float | None = None
+    cell_n: float | None = None
+    speed_mm_min: float | None = None
+    crosshead: bool | None = None
+
+    def over(self, other: Specimen) -> Specimen:
+        """Return this specimen with the values that it lacks from another one."""
+        given = {name: value for name, value in vars(self).items() if value is not None}
+        return replace(other, **given)
+
+    @property
+    def area(self) -> float | None:
+        """Cross-section, m2."""
+        if self.width_mm is not None and self.thickness_mm is not None:
+            return self.width_mm * self.thickness_mm * 1e-6
+        return None if self.area_mm2 is None else self.area_mm2 * 1e-6
+
+
+@dataclass(frozen=True)
+class TensileCurve:
+    """One specimen's curve up to its largest stress: engineering strain rises, engineering stress in Pa; both (n,).
+
+    `rate`: strain per second at the start, None without a time. `skipped`: points left out since the strain had been
+    passed before; `lost`: rows left out since a number was missing. `sha256`: of the file; `path`: where it was read.
+    """
+
+    name: str
+    strain: np.ndarray = field(repr=False)
+    stress: np.ndarray = field(repr=False)
+    specimen: Specimen
+    sha256: str
+    rate: float | None = None
+    skipped: int = 0
+    lost: int = 0
+    path: Path | None = field(default=None, repr=False)
+
+
+def read_curve(
+    path: Path, given: Mapping[str, Declared], specimen: Specimen, layout: Layout = Layout()
+) -> TensileCurve:
+    """Return a file's curve. What `specimen` gives goes before the file's header.
+
+    Raises Refusal where a column or a unit is missing or ambiguous, or where the points are no pull; UnitcadError for
+    a file that can't be read.
+    """
+    recording = open_recording(path, layout)
+    specimen = specimen.over(header_of(path))
+    wanted = {
+        q: found for q in ("time", "strain", "stress", "force", "travel") if (found := column_of(recording, q, given))
+    }
+    if "strain" not in wanted and "travel" not in wanted and (found := column_of(recording, "true_strain", given)):
+        wanted["true_strain"] = found
+    if "stress" not in wanted and "force" not in wanted and (found := column_of(recording, "true_stress", given)):
+        wanted["true_stress"] = found
+    for pair in (("strain", "travel", "true_strain"), ("stress", "force", "true_stress")):
+        if not any(q in wanted for q in pair):
+            limit = f"{path.name} has no column of {pair[0]} or {pair[1]} that is known by name"
+            raise Refusal("--column", None, f"{limit}; declare {pair[0]}=COLUMN:UNIT; {columns_of(recording)}")
+    data, lost = columns(recording, wanted)
+    strain, stress = data.get("strain"), data.get("stress")
+    if "true_strain" in data:
+        strain = np.expm1(data["true_strain"])
+    elif strain is None:
+        if specimen.gauge_mm is None:
+            raise Refusal("--gauge-mm", None, f"{path.name} gives the travel alone: the gauge length is required")
+        strain = (data["travel"] - data["travel"][0]) * 1e3 / specimen.gauge_mm
+        specimen = replace(specimen, crosshead=specimen.crosshead is not False)
+    if "true_stress" in data:
+        stress = data["true_stress"] / (1.0 + strain)
+    elif stress is None:
+        if specimen.area is None:
+            raise Refusal("--width-mm", None, f"{path.name} gives the force alone: width and thickness are required")
+        stress = data["force"] / specimen.area
+    # Up to the largest stress, without points whose strain had been passed before.
+    if len(stress) == 0:
+        raise UnitcadError(f"{path}: no row has a number in each of the columns that are read")
+    if np.max(stress) <= 0:
+        raise UnitcadError(f"{path}: the stress is nowhere above zero: no pull, or the sign of the force is reversed")
+    end = int(np.argmax(stress)) + 1
+    fresh = np.concatenate([[True], strain[1:end] > np.maximum.accumulate(strain[:end])[:-1]])
+    strain, stress = strain[:end][fresh], stress[:end][fresh]
+    rate = None
+    if "time" in data and len(strain) > 1:
+        steps, clock = np.diff(strain[:21]), np.diff(data["time"][:end][fresh][:21])
+        rate = float(np.median(steps[clock > 0] / clock[clock > 0])) if (clock > 0).any() else None
+    if len(strain) < LEAST_POINTS:
+        raise UnitcadError(f"{path}: {len(strain)} points before the largest stress; a curve needs {LEAST_POINTS}")
+    if strain[0] <= -1.0:
+        raise UnitcadError(f"{path}: the strain begins at {strain[0]:.3g}: no body is shorter than nothing")
+    return TensileCurve(path.name, strain, stress, specimen, files.sha256(path), rate, int((~fresh).sum()), lost, path)
+
+
+def header_of(path: Path) -> Specimen:
+    """Return what the lines "name;value" before the numbers say of specimen and machine."""
+    found: dict[str, float | bool] = {}
+    for name, value in _pairs(path):
+        number = _NUMBER.match(value)
+        for pattern, key in _HEADER:
+            if not number or not (match := re.search(pattern, name, re.IGNORECASE)):
+                continue
+            unit = match[1].lower() if match.groups() else ""
+            factor = {"cm": 10.0, "in": 25.4, "cm^2": 100.0, "cm2": 100.0}.get(unit, 1.0)
+            if key == "cell_n":
+                factor = _FORCES.get(number[2], 0.0)
+            amount = float(number[1].replace(",", "."))
+            if factor and amount > 0 and not _MAYBE_THOUSANDS.fullmatch(number[1]):
+                found.setdefault(key, amount * factor)
+        if re.search("strain|elongation", name, re.IGNORECASE):
+            if re.search("crosshead|cross-head|grip|traverse", value, re.IGNORECASE):
+                found["crosshead"] = True
+            elif re.search("extensometer|video|dic", value, re.IGNORECASE):
+                found["crosshead"] = False
+    if length := found.pop("length_mm", None):  # a bare "Length" is the gauge length where no other line gives one
+        found.setdefault("gauge_mm", length)
+    return Specimen(**found)  # type: ignore[arg-type]
+
+
+_HEADER = (
+    (r"thickness\s*[\[(](mm|cm|in)[\])]", "thickness_mm"),
+    (r"width\s*[\[(](mm|cm|in)[\])]", "width_mm"),
+    (r"(?:specimen|gauge|initial) length\s*[\[(](mm|cm|in)[\])]", "gauge_mm"),
+    (r"^\s*length\s*[\[(](mm|cm|in)[\])]", "length_mm"),
+    (r"(?:cross-?section|area)\s*[\[(](mm2|mm\^2|cm2|cm\^2)[\])]", "area_mm2"),
+    (r"(?:speed|rate)\s*[\[(](mm/min)[\])]", "speed_mm_min"),
+    (r"load cell", "cell_n"),
+)
+
+
+_NUMBER = re.compile(r"\s*(\d+(?:[.,]\d*)?(?:e-?\d+)?)\s*([a-zA-Z]*)")
+_MAYBE_THOUSANDS = re.compile(r"[1-9]\d{0,2},\d{3}")
+_UNIT = re.compile(r"\s*[\[(]?(mm|cm|in|mm2|mm\^2|cm2|cm\^2|mm/min)[\])]?\s*")
+
+
+def _pairs(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield name and value of the header's lines; a third cell with a unit counts to the name."""
+    with open(path, "rb", opener=files.regular()) as file:
+        text = file.read(100_000).decode("utf-8", "replace")
+    for line in text.splitlines()[:_HEADER_LINES]:
+        cells = [cell.strip(" \"'") for cell in _cells(line)]
+        if len(cells) > 1 and cells[0] and not re.match(r"[\d.+-]", cells[0]):
+            unit = _UNIT.fullmatch(cells[2]) if len(cells) > 2 else None
+            yield (f"{cells[0]} ({unit[1]})" if unit else cells[0]), cells[1]
+
+
+def _cells(line: str) -> list[str]:
+    """Return a header line's cells: at semicolons or tabs, else at a colon, else at commas that no quotes enclose."""
+    if ";" in line or "\t" in line:
+        return re.split(r"[;\t]", line)
+    if '"' not in line and re.search(r":\s", line):
+        return re.split(r":\s", line, maxsplit=1)
+    try:
+        cells = next(csv.reader([line], strict=True, skipinitialspace=True), [])
+    except csv.Error:
+        return []
+    return [] if '"' not in line and re.fullmatch(r"\s*\d+\s*", "".join(cells[2:3])) else cells  # 6,5: one or two?
+
+
+SECANTS = (0.10, 0.15, 0.25, 0.50, 1.00)
+SLOPE_TO = 0.25
+LAWS: tuple[tuple[Law, float], ...] = (
+    ("neo-Hooke", 0.5),
+    ("Mooney", 1.0),
+    ("Mooney", 3.0),
+    ("Yeoh", 1.0),
+    ("Ogden", 1.0),
+)
+"""Each law with the strain up to which it is fitted."""
+MOST_LAW_STRAIN = 1.0
+"""A law that is fitted beyond this is shown, but it is no statement about small strain."""
+WIDEST_GAP = 0.5
+"""Between two points of a curve, as a part of the strain of use, or of a secant's strain: nothing is made up beyond."""
+_GRID = 41
+_PASSES = 3
+
+
+@dataclass(frozen=True)
+class Modulus:
+    """One method's Young's modulus of one curve, Pa; None with the reason where the method can't be used.
+
+    `defensible`: it may stand for the modulus at the strain of use, and counts in the range of methods.
+    """
+
+    method: str
+    value: float | None
+    reason: str = ""
+    defensible: bool = True
+    fit: HyperelasticFit | None = None
+
+
+@dataclass(frozen=True)
+class Toe:
+    """The start of a curve: neo-Hooke's law with a shifted origin, fitted from the first point to a strain.
+
+    `origin`: the strain at which the law's stress is zero (slack positive, an offset of the force either way).
+    `youngs_modulus`: the law's, Pa.
+    """
+
+    origin: float
+    youngs_modulus: float
+    up_to: float
+
+    def stress(self, strain: np.ndarray) -> np.ndarray:
+        """Return the fitted nominal stress (Pa) at engineering strains as recorded."""
+        stretch = 1.0 + np.asarray(strain, float) - self.origin
+        return self.youngs_modulus / 3.0 * (stretch - stretch**-2)
+
+    def secant(self, low: float, high: float) -> float:
+        """Return the mean secant modulus (Pa) between two strains, from the fitted origin."""
+        stretch = 1.0 + np.linspace(low, high, _GRID)
+        return float(np.mean(self.youngs_modulus / 3.0 * (stretch - stretch**-2) / (stretch - 1.0)))
+
+
+def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None:
+    """Fit the start of a curve by least squares, up to the strain `high` counted from the fitted origin.
+
+    None with fewer than three points, or no solution.
+    """
+    from scipy.optimize import least_squares
+
+    toe, up_to = None, high
+    for _ in range(1 + _PASSES):
+        x, y = strain[strain <= up_to], stress[strain <= up_to]
+        if len(x) < 3 or np.ptp(x) < 0.25 * up_to:
+            return toe
+        slope, offset = np.polyfit(x, y, 1)
+        if slope <= 0.0:
+            return toe
+
+        def misfit(p: np.ndarray, x: np.ndarray = x, y: np.ndarray = y / slope) -> np.ndarray:
+            stretch = 1.0 + x - p[1]
+            return p[0] / 3.0 * (stretch - stretch**-2) - y
+
+        start, bounds = [1.0, -offset / slope], ([1e-6, -0.5], [1e3, float(x.max())])
+        found = least_squares(misfit, start, bounds=bounds, xtol=1e-14, ftol=1e-14)
+        toe = Toe(float(found.x[1]), float(found.x[0] * slope), up_to)
+        up_to = high + max(toe.origin, 0.0)
+    return toe
+
+
+def secant(strain: np.ndarray, stress: np.ndarray, at: float) -> float | None:
+    """Return stress over strain at a strain, Pa, interpolated; None where no points of the curve are near it."""
+    if not strain[0] <= at <= strain[-1]:
+        return None
+    after = int(np.searchsorted(strain, at))
+    if strain[after] > at and strain[after] - strain[after - 1] > WIDEST_GAP * at:
+        return None
+    return float(np.interp(at, strain, stress)) / at
+
+
+def default_method(low: float, high: float) -> str:
+    """Return the default method's name for a strain of use."""
+    return f"secant over {100 * low:.3g} to {100 * high:.3g} %, toe fitted"
+
+
+def moduli(strain: np.ndarray, stress: np.ndarray, low: float, high: float) -> tuple[Modulus, ...]:
+    """Return Young's modulus by every method, the default first; strain rises, stress in Pa, use is `low` to `high`."""
+    made = []
+    ends = f"the curve ends at {100 * strain[-1]:.3g} %"
+    name, toe = default_method(low, high), fit_start(strain, stress, high)
+    if strain[-1] < high:
+        made.append(Modulus(name, None, ends))
+    elif toe is None:
+        made.append(Modulus(name, None, f"too few points below {100 * high:.3g} %, or no rising stress there"))
+    else:
+        points = strain - toe.origin
+        points = np.concatenate([[low], points[(points > low) & (points < high)], [high]])
+        gap = int(np.argmax(np.diff(points)))
+        begin, end = points[gap : gap + 2]
+        span = f"{100 * (begin + toe.origin):.3g} and {100 * (end + toe.origin):.3g} %"
+        sparse = end - begin > WIDEST_GAP * (high - low)
+        reason = f"the curve has no point between {span} strain" if sparse else ""
+        made.append(Modulus(name, None if sparse else toe.secant(low, high), reason))
+    for at in SECANTS:
+        standard = " (ISO 37, ASTM D412)" if at == 1.0 else ""
+        value, reason = secant(strain, stress, at), ""
+        if value is None:
+            spanned = f"the curve spans {100 * strain[0]:.3g} to {100 * strain[-1]:.3g} %"
+            reason = "no points near it" if strain[0] <= at <= strain[-1] else spanned
+        made.append(Modulus(f"secant at {100 * at:g} %{standard}", value, reason))
+    name, kept = f"slope 0 to {100 * SLOPE_TO:g} % with offset", strain <= SLOPE_TO
+    if kept.sum() < 3 or strain[-1] < SLOPE_TO:
+        made.append(Modulus(name, None, "fewer than three points, or the curve ends before"))
+    else:
+        made.append(Modulus(name, float(np.polyfit(strain[kept], stress[kept], 1)[0])))
+    for law, up_to in LAWS:
+        name = f"{law}{', one term,' if law == 'Ogden' else ''} up to {100 * up_to:g} %"
+        if strain[-1] < up_to or ((strain >= 0.0) & (strain <= up_to)).sum() < LEAST_POINTS_OF[law]:
+            made.append(Modulus(name, None, f"{ends}, or has too few points"))
+            continue
+        fit = fit_law(law, strain, stress, up_to, high)
+        reasons = [f"unstable in {mode} from {100 * at:.3g} %" for mode, at in fit.unstable.items()]
+        if up_to > MOST_LAW_STRAIN:
+            reasons.append(f"fitted up to {100 * up_to:g} %, far beyond the use")
+        made.append(Modulus(name, fit.youngs_modulus, "; ".join(reasons), not reasons, fit))
+    return tuple(made)
+
+
+CALLIPER_MM = 0.05
+"""Error of a specimen's width and thickness (assumed: a calliper on soft rubber)."""
+AREA_ERROR = 0.02
+"""Relative error of a cross-section of which no lengths are known (assumed)."""
+MOST_SCATTER, OTHER_MATERIAL, MOST_OF_SHEET = 1.25, 3.0, 5.0
+"""Largest over least specimen that is warned of, and that is no longer one silicone; modulus over the sheet's."""
+LEAST_OF_CELL, LATEST_START, MOST_BREAK, MOST_TOE = 1e-3, 0.02, 1.25, 0.02
+"""Limits: force over full scale, strain of the first point, break over the sheet's, strain of the toe."""
+
+
+@dataclass(frozen=True)
+class MethodRow:
+    """One method over all specimens: the mean of logarithms (Pa) and each specimen's value; None where not usable."""
+
+    method: str
+    value: float | None
+    by_specimen: tuple[float | None, ...]
+    defensible: bool
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Warned:
+    """One warning: a word that names it, and a sentence."""
+
+    code: str
+    message: str
+
+
+@dataclass(frozen=True)
+class TensileResult:
+    """The modulus (Pa) at the strain of use, its range, every method, and the parts of the uncertainty.
+
+    `scatter`, `geometry`: half-widths of the logarithm; scatter is None for one specimen. `spread`: the largest over
+    the least defensible value. `rate`: strain per second, None where not known.
+    """
+
+    value: float
+    low: float
+    high: float
+    method: str
+    rows: tuple[MethodRow, ...]
+    by_curve: tuple[tuple[Modulus, ...], ...]
+    toes: tuple[Toe | None, ...]
+    curves: tuple[TensileCurve, ...]
+    scatter: float | None
+    geometry: float
+    spread: float
+    used: tuple[float, float]
+    rate: float | None
+    warnings: tuple[Warned, ...]
+
+
+def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: Material | None = None) -> TensileResult:
+    """Evaluate the specimens of one material at a strain of use (low, high); `sheet` is compared with the break.
+
+    Raises Refusal where no curve spans the strain of use, where a file is given twice, and for specimens that differ so
+    much that they are not one silicone's.
+    """
+    known: dict[str, TensileCurve] = {}
+    for curve in curves:
+        if before := known.get(curve.sha256):
+            limit = "is given twice" if before.path == curve.path else f"has the same content as {before.name}"
+            raise Refusal("FILES", curve.name, f"{limit}: one specimen counts once")
+        known[curve.sha256] = curve
+    by_curve = tuple(moduli(curve.strain, curve.stress, *used) for curve in curves)
+    rows = tuple(_row(methods) for methods in zip(*by_curve, strict=True))
+    chosen = rows[0]
+    if chosen.value is None:
+        reach = math.floor(1000 * min(float(curve.strain[-1]) for curve in curves)) / 10
+        nearest = f"{100 * used[0]:g}:{reach:g}" if 100 * used[0] < reach < 100 * used[1] else None
+        raise Refusal("--strain", f"{100 * used[0]:g}:{100 * used[1]:g}", chosen.reason, nearest)
+    by_specimen = [one for one in chosen.by_specimen if one is not None]
+    ratio = max(by_specimen) / min(by_specimen)
+    if ratio > OTHER_MATERIAL:
+        pairs = zip(curves, by_specimen, strict=True)
+        shown = ", ".join(f"{curve.name} {one / 1e3:.3g} kPa" for curve, one in pairs)
+        why = "these are not specimens of one silicone, or a unit is wrong"
+        raise Refusal("FILES", None, f"differ by a factor of {ratio:.3g} ({shown}): {why}")
+    scatter = None
+    if len(by_specimen) > 1:
+        from scipy.stats import t
+
+        count = len(by_specimen)
+        scatter = float(t.ppf(0.975, count - 1) * np.std(np.log(by_specimen), ddof=1) / math.sqrt(count))
+    geometry = max(_area_error(curve.specimen) for curve in curves)
+    widened = math.exp(math.hypot(scatter or 0.0, geometry))
+    rates = [curve.rate for curve in curves if curve.rate]
+    toes = tuple(fit_start(curve.strain, curve.stress, used[1]) for curve in curves)
+    values = [row.value for row in rows if row.value is not None and row.defensible]
+    warnings = []
+    for curve, toe in zip(curves, toes, strict=True):
+        warnings += [Warned(code, f"{curve.name}: {message}") for code, message in _doubts(curve, used, toe, sheet)]
+    unstable = {one.method: one.reason for methods in by_curve for one in methods if one.fit and one.fit.unstable}
+    for method, reason in unstable.items():
+        warnings.append(Warned("unstable", f"{method}: {reason}; its constants hold for no simulation"))
+    if len(curves) == 1:
+        warnings.append(Warned("specimens", "one curve: the scatter of specimens is not in the range"))
+    if ratio > MOST_SCATTER:
+        warnings.append(Warned("scatter", f"the specimens differ by a factor of {ratio:.3g}: look for an odd one"))
+    if sheet:
+        off = chosen.value / 1e3 / float(sheet.modulus_100pct_kpa)
+        if not 1 / MOST_OF_SHEET <= off <= MOST_OF_SHEET:
+            message = f"{off:.3g} times the 100 % modulus of {sheet.name}, {float(sheet.modulus_100pct_kpa):g} kPa"
+            warnings.append(Warned("sheet", f"{message}: check the units and --like"))
+    return TensileResult(
+        chosen.value, min(values) / widened, max(values) * widened, chosen.method, rows, by_curve, toes, tuple(curves),
+        scatter, geometry, max(values) / min(values), used, float(np.median(rates)) if rates else None, tuple(warnings),
+    )  # fmt: skip
+
+
+def quasistatic(result: TensileResult, frequency_hz: float) -> str:
+    """Return the sentence that keeps a slow pull from being read as a modulus at the motor's frequency."""
+    motor = 2.0 * math.pi * frequency_hz * sum(result.used) / 2.0
+    pulled = (
+        f"pulled at {result.rate:.2g} /s" if result.rate else "pulled slowly, at a rate that the file does not give"
+    )
+    return (
+        f"quasi-static: {pulled}; at {frequency_hz:g} Hz and {50 * sum(result.used):.3g} % strain the rate is "
+        f"{motor:.3g} /s, where silicone is stiffer"
+    )
+
+
+def _row(methods: Sequence[Modulus]) -> MethodRow:
+    values = tuple(one.value for one in methods)
+    known = [v for v in values if v is not None]
+    positive = [v for v in known if v > 0]
+    mean = None
+    if known and len(known) == len(values):
+        mean = (
+            math.exp(sum(map(math.log, known)) / len(known)) if len(positive) == len(known) else sum(known) / len(known)
+        )
+    reasons = list(dict.fromkeys(one.reason for one in methods if one.reason))
+    defensible = all(one.defensible for one in methods) and len(positive) == len(values)
+    return MethodRow(methods[0].method, mean, values, defensible, "; ".join(reasons[:2]))
+
+
+def _area_error(specimen: Specimen) -> float:
+    if specimen.width_mm is None or specimen.thickness_mm is None:
+        return AREA_ERROR
+    return math.hypot(CALLIPER_MM / specimen.width_mm, CALLIPER_MM / specimen.thickness_mm)
+
+
+def _doubts(
+    curve: TensileCurve, used: tuple[float, float], toe: Toe | None, sheet: Material | None
+) -> Iterator[tuple[str, str]]:
+    """Yield what is doubtful about one curve: a word that names it, and a message."""
+    middle, specimen = sum(used) / 2.0, curve.specimen
+    if specimen.area and specimen.cell_n:
+        force = float(np.interp(middle, curve.strain, curve.stress)) * specimen.area
+        if force < LEAST_OF_CELL * specimen.cell_n:
+            below = f"below a thousandth of the cell's {specimen.cell_n:g} N"
+            yield "force", f"{force:.2g} N at {100 * middle:.3g} %, {below}: use a smaller cell"
+    if curve.strain[0] > LATEST_START:
+        yield "start", f"the first point lies at {100 * curve.strain[0]:.3g} % strain"
+    if toe and abs(toe.origin) > MOST_TOE:
+        yield "toe", f"the fitted curve begins at {100 * toe.origin:.3g} % strain (slack or offset)"
+    if curve.lost:
+        yield "gaps", f"{curve.lost} rows lack a number and are left out"
+    if curve.skipped > 0.01 * len(curve.strain):
+        yield "cycles", f"{curve.skipped} points left out: the strain goes back, as in cycles; the first pull counts"
+    if sheet:
+        at, expected = 100 * curve.strain[-1], float(sheet.elongation_pct)
+        if not 1 / MOST_BREAK <= at / expected <= MOST_BREAK:
+            message = f"breaks at {at:.4g} %, {at / expected:.2g} times the sheet's {expected:g} %"
+            yield "break", f"{message}: the gauge length or the strain is doubtful"
+    if specimen.crosshead:
+        yield "crosshead", "strain by the crosshead's travel: grips and shoulders count as gauge length"

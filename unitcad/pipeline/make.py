@@ -1,0 +1,318 @@
+"""A unit's result made whole, in memory and a store: its files, and the manifest that lists them.
+
+What follows from the geometry sees a mould set whose materials, names and casting are blank (`MouldSet.blank`), so that
+nothing can read them unnoticed: it serves every variant of that geometry.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from unitcad import files
+from unitcad.attenuation.inputs import EstimateInput
+from unitcad.cache import Store, digest
+from unitcad.casting.procedure import procedure
+from unitcad.casting.written import files as written
+from unitcad.check import Options, check_bytes
+from unitcad.errors import UnitcadError
+from unitcad.json_text import json_bytes
+from unitcad.kernels.mesh import bounds
+from unitcad.mould_checks import Strain, check_geometry, check_unit, strain_findings, strains
+from unitcad.mould_checks.finding import FindingRecord
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline import manifest as manifests
+from unitcad.pipeline.manifest import CASTING, BodyFile, Geometry, Manifest, MeshFinding, PartRecord, PourRecord
+from unitcad.pipeline.plan import (
+    GEOMETRIC,
+    Planned,
+    begun,
+    body_key,
+    build_key,
+    code_version,
+    geometry_key,
+    groups,
+    is_printed,
+    plan,
+    possible_outputs,
+    ready,
+)
+from unitcad.shape.body import Body
+from unitcad.spec import Spec, printer_of, spec_hash, to_json, to_toml, with_formats
+from unitcad.spec.asked import Format
+from unitcad.validation import from_data
+
+MESH_FORMATS = ("stl", "3mf")
+"""The formats whose files the mesh rules look at."""
+
+
+class Unfinished(UnitcadError):
+    """A check that ran out of memory or time. It is no verdict: nothing of it is kept, and another try may succeed."""
+
+    exit_code = 1
+
+
+@dataclass
+class Progress:
+    """`progress("meshes")` begins a stage, which ends the one before, and passes its name to `say`."""
+
+    say: Callable[[str], object] = lambda stage: None
+    seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    stage: str = ""
+    prefix: str = ""
+    since: float = field(default_factory=time.perf_counter)
+
+    def __call__(self, stage: str) -> None:
+        now = time.perf_counter()
+        if self.stage:
+            self.seconds[self.stage] += now - self.since
+        if stage and stage not in self.seconds:
+            self.say(self.prefix + stage)
+        self.stage, self.since = stage, now
+
+
+@dataclass(frozen=True)
+class Product:
+    """A result's files by their paths: `own` as bytes, `shared` as the SHA-256 of content in a store."""
+
+    manifest: Manifest
+    own: dict[str, bytes]
+    shared: dict[str, str]
+
+    def place(self, folder: Path, store: Store) -> None:
+        """Write it into an empty folder. Raises OSError, or MissingContent if the store has lost something."""
+        inside = f"{folder}{os.sep}"  # names as text: a Path costs as much as the link
+        for parent in sorted({os.path.dirname(path) for path in (*self.own, *self.shared)} - {""}):
+            os.makedirs(inside + parent, exist_ok=True)
+        for path, sha256 in self.shared.items():
+            store.place(sha256, inside + path)
+        for path, content in self.own.items():
+            files.write_new(inside + path, content)
+
+
+class Subject:
+    """A spec, as a result is made of it. `arrays.Arrayed` is the same for an array."""
+
+    kind, file = "spec", "spec.toml"
+
+    def __init__(self, spec: Spec) -> None:
+        self.of: Any = spec
+        self.unit, self.name, self.hash = spec, spec.name, spec_hash(spec)
+        self.formats: tuple[Format, ...] = spec.output.formats
+
+    @property
+    def folder_name(self) -> str:
+        """Return <slug>-<hash12>, at most 63 characters; the hash covers neither name nor formats."""
+        slug = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-")[:50].rstrip("-") or "unit"
+        return f"{slug}-{self.hash[:12]}"
+
+    @property
+    def text(self) -> str:
+        """Return a text from which `subject_of_text` makes the same."""
+        return to_json(self.of)
+
+    def key(self, only: Sequence[str], check: bool) -> str:
+        """Return the key under which variants share their making."""
+        return build_key(self.of, only, check)
+
+    def outputs(self, only: Sequence[str]) -> tuple[str, ...]:
+        """Return what of `only` there can be."""
+        return possible_outputs(self.of, only)
+
+    def make(
+        self, only: Sequence[str], check: bool, store: Store, progress: Progress, formats: Sequence[Format] = ()
+    ) -> Product:
+        """Return all files asked for, nothing written yet."""
+        return make(with_formats(self.of, tuple(formats)) if formats else self.of, only, check, store, progress)
+
+    def same_file(self, data: dict[str, Any]) -> Subject:
+        """Return the subject of a result's own file."""
+        return Subject(from_data(data))
+
+
+def make(spec: Spec, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
+    """Return all files of a spec that `only` asks for, nothing written yet.
+
+    Raises Refusal if the moulds can't be made, Unfinished if a check lacks memory or time.
+    """
+    moulds, outputs = MouldSet(spec), possible_outputs(spec, only)
+    if {"moulds", "casting"} & set(outputs):
+        moulds.plan  # noqa: B018  # refuses before the long work begins
+    own: dict[str, bytes] = {"spec.toml": to_toml(spec).encode()}
+    estimate = None
+    if "estimate" in outputs:  # first: the helper for STEP loads its kernel meanwhile
+        progress("estimate")
+        estimate, own["estimate.json"] = _estimate(spec, store)
+    shape = geometry(moulds, outputs, check, store, progress)
+    if "casting" in outputs:
+        progress("casting")
+        volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
+        made = written(procedure(moulds, volumes, manifests.printed_mm3(shape["parts"])))
+        own |= {path: made[path].encode() for path in CASTING}
+    progress("manifest")
+    manifest = manifests.of_unit(moulds, outputs, check, shape, mould_findings(spec, shape), estimate)
+    return finished(manifest, own, shape["files"], store)
+
+
+def finished(manifest: Manifest, own: dict[str, bytes], shared: dict[str, str], store: Store) -> Product:
+    """Return a product whose manifest lists all its files."""
+    listed = {path: manifests.FileRecord(bytes=len(content), sha256=digest(content)) for path, content in own.items()}
+    listed |= {path: manifests.FileRecord(bytes=store.size(sha), sha256=sha) for path, sha in shared.items()}
+    manifest["files"] = dict(sorted(listed.items()))
+    return Product(manifest, {**own, "manifest.json": json_bytes(manifest)}, shared)
+
+
+def geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Geometry:
+    """Return parts, steps, mould findings, mesh findings and files of a set's geometry."""
+    return store.data(
+        build_key(moulds.spec, only, check),
+        lambda: _made(moulds.blank, [name for name in only if name in GEOMETRIC], check, store, progress),
+        intact=lambda there: all(map(store.has, there["files"].values())),
+    )
+
+
+def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Geometry:
+    progress("plan")
+    table = [begun(planned) for planned in plan(moulds, only, moulds.spec.output.formats)]
+    pours = bool({"moulds", "casting"} & set(only))
+    progress("meshes")
+    parts: dict[str, PartRecord] = {}
+    for body in (body for group in groups(moulds, only) for body in group.bodies):
+        parts[body.name] = store.data(body_key(moulds, body, "record"), lambda body=body: record(moulds, body))
+        parts[body.name] = {**parts[body.name], "files": {}}
+    made: dict[str, str] = {}
+    findings: list[FindingRecord] = []
+    strained: list[dict[str, Any]] = []
+    meshes: list[MeshFinding] = []
+
+    def put(planned: Planned) -> None:
+        progress(planned.stage)
+        made[planned.path] = sha256 = store.file(planned.key(), planned.make)
+        for name in planned.bodies:
+            parts[name]["files"][planned.form] = BodyFile(path=planned.path, sha256=sha256)
+
+    later = [planned for planned in table if planned.stage in ("step", "step pictures")]
+    for planned in table:
+        if planned not in later:
+            put(planned)
+    if check:
+        progress("mould checks")
+        if "moulds" in only:
+            findings = store.data(geometry_key(moulds, "mould checks"), lambda: _dicts(check_geometry(moulds)))
+            strained = store.data(geometry_key(moulds, "strains"), lambda: [asdict(s) for s in strains(moulds)])
+        elif "unit" in only:  # none of the unit's bodies may overlap another
+            findings = store.data(geometry_key(moulds, "overlaps in the unit"), lambda: _dicts(check_unit(moulds)))
+        progress("check")
+        meshes = list(_mesh_findings(moulds, parts, store))
+    for planned in later:  # a helper makes them meanwhile
+        put(planned)
+    return {
+        "label": moulds.plan.label if pours else None,
+        "air_ring_mm": round(moulds.dimensions.air_ring, 9),
+        "parts": list(parts.values()),
+        "steps": store.data(geometry_key(moulds, "steps"), lambda: _pours(moulds)) if pours else [],
+        "laws": findings,
+        "strains": strained,
+        "check": meshes,
+        "files": made,
+    }
+
+
+def _dicts(findings: Sequence[Any]) -> list[Any]:
+    return [finding.as_dict() for finding in findings]
+
+
+def record(moulds: MouldSet, body: Body) -> PartRecord:
+    """Return a body's entry in the manifest, material and files left open."""
+    solid = moulds.mesh(body)
+    return PartRecord(
+        name=body.name,
+        role=body.role,
+        step=body.step,
+        made=body.made,
+        material=None,
+        volume_mm3=_round(solid.volume(), 12),
+        bbox_mm=[_round(v, 12) for v in bounds(solid)],
+        triangles=len(ready(moulds, body)[1]) if is_printed(body) else int(solid.num_tri()),
+        files={},
+    )
+
+
+def _round(value: float, digits: int) -> float:
+    """Round to significant digits: what a summation's order leaves does not reach the file."""
+    return float(f"{value:.{digits}g}") + 0.0
+
+
+def _pours(moulds: MouldSet) -> list[PourRecord]:
+    return [
+        PourRecord(
+            index=step.index,
+            layer=step.name,
+            material="",
+            tools=[piece.name for name in step.tools for piece in moulds.plan.pieces_of(name)],
+            cavity_volume_mm3=_round(sum(c.reached.volume() for c in moulds.cavities if c.step is step), 9),
+            layer_volume_mm3=_round(moulds.solids[step.name].volume(), 9),
+        )
+        for step in moulds.plan.steps
+    ]
+
+
+def _mesh_findings(moulds: MouldSet, parts: dict[str, PartRecord], store: Store) -> Iterator[MeshFinding]:
+    """Yield the findings of the mesh rules in every mesh file."""
+    listed = {
+        file["path"]: (file["sha256"], part["role"])
+        for part in parts.values()
+        for form, file in part["files"].items()
+        if form in MESH_FORMATS
+    }
+    for path, (sha256, role) in listed.items():
+        # A tool's STL is checked against the printer; its 3MF has the same meshes.
+        printer = printer_of(moulds.spec) if role == "tool" and path.endswith(".stl") else None
+
+        def findings(path=path, sha256=sha256, printer=printer) -> list[dict[str, Any]]:
+            report = check_bytes(store.content(sha256), Path(path).name, Options(printer=printer))
+            if report.has("F011"):
+                why = next(finding.message for finding in report.findings if finding.code == "F011")
+                raise Unfinished(f"{path}: its check was not finished: {why}")
+            return [finding.as_dict() for finding in report.findings if finding.severity != "info"]
+
+        key = digest(f"{sha256} {printer!r} {code_version()}".encode())
+        for finding in store.data(key, findings):
+            yield MeshFinding(path=path, **finding)
+
+
+def mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
+    """Return the geometry's mould findings, and its strains against this variant's silicones, by code."""
+    if not shape["strains"]:
+        return shape["laws"]
+    strained = strain_findings(spec, [Strain(**strain) for strain in shape["strains"]])
+    return sorted([*shape["laws"], *_dicts(strained)], key=lambda finding: finding["code"])
+
+
+_ESTIMATES: dict[Hashable, tuple[dict[str, Any], bytes]] = {}
+"""Estimates that this process made last, by what they read: variants that differ only in casting share one."""
+_MOST_ESTIMATES = 64
+
+
+def _estimate(spec: Spec, store: Store) -> tuple[dict[str, Any], bytes]:
+    """Return the estimate and its file. The layered solver's part reads no silicone: the store shares it."""
+    from unitcad.attenuation.edge.estimates import rounded_layered
+    from unitcad.estimating import estimate_input, estimate_spec
+
+    def layered(asked: EstimateInput) -> dict[str, Any]:
+        reads = (asked.tissue_name, asked.tissue, asked.frequency, asked.diameter, asked.motor_diameter, asked.drive)
+        return store.data(digest(repr((reads, code_version())).encode()), lambda: rounded_layered(asked))
+
+    reads = estimate_input(spec), spec.estimate
+    if reads not in _ESTIMATES:
+        while len(_ESTIMATES) >= _MOST_ESTIMATES:
+            del _ESTIMATES[next(iter(_ESTIMATES))]
+        data = estimate_spec(spec, layered=layered)
+        _ESTIMATES[reads] = data, json_bytes(data)
+    return _ESTIMATES[reads]

@@ -1,0 +1,299 @@
+"""The plan of a result: every file, what asks for it, the key of what it reads, and how it is made.
+
+Files that follow from the geometry are shared by all variants of it, under a key. The others belong to one variant.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache, partial
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from unitcad import __version__
+from unitcad.cache import digest
+from unitcad.casting.bill import plates
+from unitcad.casting.pictures import BenchPictures
+from unitcad.casting.views import picture_path
+from unitcad.casting.written import step_section
+from unitcad.designs import design_of, no_estimate
+from unitcad.errors import UnitcadError, WrongArgument, unknown_name
+from unitcad.export import glb, stl, svg, threemf
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays, realise
+from unitcad.moulds import mould_set
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline import step_helper
+from unitcad.pipeline.scenes import pictures
+from unitcad.shape import Shape, content_hash
+from unitcad.shape.body import Body, copies, part_names
+from unitcad.spec import Spec
+from unitcad.spec.asked import Format
+
+if TYPE_CHECKING:
+    from unitcad.arrays.patch import PatchPart
+
+Output = Literal["unit", "moulds", "estimate", "casting"]
+OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
+FORMATS: tuple[Format, ...] = ("step", "stl", "3mf", "svg", "png", "glb")
+GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")
+"""The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
+KERNELS = {
+    "": ("manifold3d", "numpy"),
+    "step": ("build123d", "cadquery", "cadquery-ocp", "cadquery-ocp-novtk"),
+    "png": ("vtk",),
+}
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A file of a result. `key` hashes all shapes in it, so it is called only for a file that is wanted."""
+
+    path: str
+    make: Callable[[], bytes]
+    key: Callable[[], str]
+    stage: str = "meshes"
+    form: str = ""
+    """The format that asks for it; "" if its output asks for it."""
+    bodies: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class BodyGroup:
+    """Bodies that share a 3MF, a GLB and a STEP file (`together`), and the folder of their own files."""
+
+    name: str  # unit | moulds
+    bodies: tuple[Body, ...]
+    together: str
+
+
+def plan(moulds: MouldSet, only: Sequence[str], forms: Sequence[str]) -> list[Planned]:
+    """Return the files of a geometry that outputs and formats ask for; STEP last, since a helper may make it."""
+    table = [planned for planned in _files(moulds, only) if planned.form in ("", *forms)]
+    return sorted(table, key=lambda planned: planned.form == "step")
+
+
+def groups(moulds: MouldSet, only: Sequence[str]) -> list[BodyGroup]:
+    """Return the groups of bodies that `only` asks for."""
+    unit = [BodyGroup("unit", moulds.unit, "unit")] if "unit" in only else []
+    return [*unit, BodyGroup("moulds", moulds.plan.pieces, "moulds/moulds")] if "moulds" in only else unit
+
+
+def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
+    bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
+    for group in groups(moulds, only):
+        every, together, names = group.bodies, group.together, tuple(body.name for body in group.bodies)
+        printed = [body for body in every if is_printed(body)]
+        for body in printed:
+            path, key = f"{group.name}/{file_stem(body)}.stl", partial(body_key, moulds, body, "stl")
+            yield Planned(path, partial(stl_content, moulds, body), key, form="stl", bodies=(body.name,))
+        for path, plate in plates(moulds, printed, together).items():
+            make, key = partial(threemf_content, moulds, plate), partial(joint_key, moulds, plate, "3mf", *bed)
+            yield Planned(path, make, key, form="3mf", bodies=tuple(body.name for body in plate))
+        make, key = partial(glb_content, moulds, every), partial(joint_key, moulds, every, "glb")
+        yield Planned(f"{together}.glb", make, key, form="glb", bodies=names)
+        yield step_file(f"{together}.step", moulds, every, group.name)
+    if "unit" in only:
+        yield _drawn(moulds, "section.svg", partial(unit_section, moulds), "section")
+    if "casting" in only:
+        for step in moulds.plan.steps:
+            section = partial(step_section, moulds, step)
+            yield _drawn(moulds, f"step{step.index}-section.svg", section, f"section of pour {step.index}")
+        bench = moulds.once("bench pictures", lambda: BenchPictures(moulds))
+        for name in bench.names:
+            path = picture_path(name)
+            yield Planned(path, partial(bench.picture, name), partial(geometry_key, moulds, path), "step pictures")
+    if "png" in moulds.spec.output.formats:
+        from unitcad.export.picture import draw
+
+        scenes = pictures(moulds, only)
+        drawn = cache(lambda: dict(zip(scenes, draw([scene() for scene in scenes.values()]), strict=True)))
+        for path in scenes:
+            key = partial(geometry_key, moulds, path, *sorted(kernel_versions(("png",)).items()))
+            yield Planned(path, lambda path=path: drawn()[path], key, "pictures", "png")
+
+
+def _drawn(moulds: MouldSet, path: str, draw: Callable[[], str], reads: str) -> Planned:
+    return Planned(path, lambda: draw().encode(), partial(geometry_key, moulds, reads), "drawing")
+
+
+def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:
+    """Return `only` in the order of OUTPUTS. Raises Refusal for an unknown one, or none."""
+    for name in only:
+        if name not in OUTPUTS:
+            raise unknown_name("only", name, OUTPUTS, WrongArgument)
+    if not only:
+        raise WrongArgument("only", "", f"needs at least one of {', '.join(OUTPUTS)}", OUTPUTS[0])
+    return tuple(name for name in OUTPUTS if name in only)
+
+
+def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
+    """Return the outputs of `only` that the design has, such as no estimate. Raises Refusal if none is left."""
+    possible = tuple(name for name in only if name != "estimate" or design_of(spec).passes)
+    if not possible:
+        raise WrongArgument("only", ",".join(only), f"{spec.design} has no estimate: {no_estimate()}", "unit")
+    return possible
+
+
+# What a file reads:
+
+
+def build_key(spec: Spec, only: Sequence[str], check: bool) -> str:
+    """Return the key of a geometry with its files and findings; cheap, since no shape is drawn."""
+    formats, only = spec.output.formats, tuple(name for name in only if name in GEOMETRIC)
+    epoch = os.environ.get("SOURCE_DATE_EPOCH") if "step" in formats else None
+    versions = sorted(kernel_versions(formats).items())
+    return digest(repr((MouldSet(spec).geometry, formats, (only, check), code_version(), versions, epoch)).encode())
+
+
+def geometry_key(moulds: MouldSet, *more: object) -> str:
+    """Return the key of something that reads the whole geometry and `more`, but neither formats nor outputs."""
+    return digest(repr((moulds.geometry, more, code_version(), sorted(kernel_versions(()).items()))).encode())
+
+
+def body_key(moulds: MouldSet, body: Body, form: str) -> str:
+    """Return the key of a body's file: tree, name, colour, attitude, resolution, format, code and kernels."""
+    return content_hash(
+        body.shape, body.name, body.role, body.step, body.made, body.colour, body.upside_down, moulds.segments, form,
+        code_version(), sorted(kernel_versions(()).items()),
+    )  # fmt: skip
+
+
+def joint_key(moulds: MouldSet, bodies: Sequence[Body], *more: object) -> str:
+    """Return the key of a file of several bodies."""
+    return digest(repr(([body_key(moulds, body, "") for body in bodies], more)).encode())
+
+
+@cache
+def code_version() -> str:
+    """Return the version and twelve digits over the package's own files, so that a changed line reuses nothing."""
+    sha, root = hashlib.sha256(), str(files("unitcad"))
+    # os.walk, which takes a third of the time of Path.rglob: every command that builds waits for it.
+    named = {
+        os.path.relpath(path, root).replace(os.sep, "/"): path
+        for folder, _, names in os.walk(root)
+        for name in names
+        if name.endswith((".py", ".toml")) and (path := os.path.join(folder, name))
+    }
+    for name, path in sorted(named.items()):
+        sha.update(f"{name}\n".encode() + Path(path).read_bytes())
+    return f"{__version__}+{sha.hexdigest()[:12]}"
+
+
+def kernel_versions(formats: Sequence[str]) -> dict[str, str]:
+    """Return the versions of the installed kernels that make `formats`."""
+    names = [name for form, kernels in KERNELS.items() if form in ("", *formats) for name in kernels]
+    return {name: installed for name in names if (installed := _version(name))}
+
+
+@cache
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+# What a file contains:
+
+
+def is_printed(body: Body) -> bool:
+    """Tell whether a body has mesh files: what is cut from film or filament has none."""
+    return body.role == "unit" or body.made == "printed"
+
+
+def file_stem(body: Body) -> str:
+    """Return a body's file name without suffix: cups begin with their step, so that a folder lists them in order."""
+    return body.name.replace(f"cup{body.step}", f"step{body.step}-cup") if body.kind == "cup" else body.name
+
+
+def ready(moulds: MouldSet, body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mesh as it is written: its count of faces and both mesh formats come from one rounding."""
+    return _ready(body.shape, moulds.segments, body.upside_down)
+
+
+@lru_cache(maxsize=64)
+def _ready(shape: Shape, segments: int, upside_down: bool) -> tuple[np.ndarray, np.ndarray]:
+    return print_ready(*arrays(realise(shape, segments)), upside_down)
+
+
+def forget() -> None:
+    """Drop plans, meshes and their roundings that are kept for the next call: what a measurement of times needs."""
+    _ready.cache_clear()
+    mould_set.forget()
+
+
+def stl_content(moulds: MouldSet, body: Body) -> bytes:
+    """Return a body's STL."""
+    return stl.content(*ready(moulds, body), body.name)
+
+
+def threemf_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
+    """Return the 3MF of several bodies, side by side on the spec's bed; copies share one mesh."""
+    bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
+    alike = copies(bodies)
+    parts = []
+    for name, places in zip(part_names(bodies, alike), alike, strict=True):
+        first, several = bodies[places[0]], tuple(bodies[i].name for i in places) if len(places) > 1 else ()
+        parts.append(threemf.MeshPart(name, first.colour, *ready(moulds, first), copies=several))
+    return threemf.content(parts, bed)
+
+
+def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
+    """Return the GLB of several bodies as assembled; what is cut or bought is in it too."""
+    return glb.content([_glb_part(moulds, body) for body in bodies])
+
+
+def patch_glb(moulds: MouldSet, parts: Sequence[PatchPart]) -> bytes:
+    """Return the GLB of an array's whole patch: the mesh of each distinct body once, a node at each of its places."""
+    return glb.content(
+        [
+            replace(
+                _glb_part(moulds, part.body),
+                name=part.name,
+                places=[glb.Standing(f"{p.name}-{part.body.name}", p.x, p.y, p.angle_deg) for p in part.places],
+            )
+            for part in parts
+        ]
+    )
+
+
+def _glb_part(moulds: MouldSet, body: Body) -> glb.GlbPart:
+    extras = {"role": body.role, "made": body.made, "step": body.step}
+    return glb.GlbPart(body.name, body.colour, *arrays(moulds.mesh(body)), extras)
+
+
+def unit_section(moulds: MouldSet) -> str:
+    """Return the drawing of the unit cut along its tail, with dimensions in mm, as SVG."""
+    concentric = moulds.design.tooling == "concentric"
+    return svg.unit_section(moulds.unit, moulds.dimensions, moulds.segments, concentric=concentric)
+
+
+def step_file(path: str, moulds: MouldSet, bodies: Sequence[Body], name: str) -> Planned:
+    """Plan the STEP of an assembly, which reads its date and the B-rep kernels too."""
+    reads = "step", name, os.environ.get("SOURCE_DATE_EPOCH"), sorted(kernel_versions(("step",)).items())
+    key, names = partial(joint_key, moulds, bodies, *reads), tuple(body.name for body in bodies)
+    return Planned(path, partial(step_content, tuple(bodies), name), key, "step", "step", names)
+
+
+def begun(planned: Planned) -> Planned:
+    """Return the same file; if it is STEP and its helper runs, it begins now."""
+    if planned.form != "step":
+        return planned
+    return replace(planned, make=step_helper.begin(*planned.make.args, planned.make))  # type: ignore[attr-defined]
+
+
+def step_content(bodies: Sequence[Body], name: str) -> bytes:
+    """Return the STEP of an assembly. Raises UnitcadError without a B-rep extra."""
+    try:
+        from unitcad.export import step
+    except ImportError as error:
+        raise UnitcadError(f"STEP needs a B-rep kernel: {error}") from None
+    return step.content(bodies, name)
