@@ -276,19 +276,19 @@ def compare(asked: argparse.Namespace, net: Net, parent: Node, sweep: Path, out:
     """Export a sample from the store, and compare each file with that which this process makes."""
     from unitcad.batch import load_sweep
     from unitcad.cache import MemoryStore
-    from unitcad.pipeline.make import Stages
-    from unitcad.pipeline.write import product_of, subject_of
+    from unitcad.pipeline.make import Progress
+    from unitcad.pipeline.write import subject
 
     wanted, chosen = load_sweep(sweep), {}
     for index in {asked.variants * i // SAMPLE for i in range(SAMPLE)}:
         spec = wanted.spec(index)
-        chosen[subject_of(spec).folder_name] = spec
+        chosen[subject(spec).folder_name] = spec
     words = [name[-12:] for name in chosen]
     words = [sys.executable, "-m", "unitcad", "cache", "export", *words, "--batch", str(out), "-o", str(out / "few")]
     assert parent.start(words, "export").wait(600) == 0, (net.scratch / "logs" / "export").read_text()
     store = MemoryStore()
     for name, spec in chosen.items():
-        product = product_of(spec, tuple(asked.only.split(",")), asked.check, store, Stages())
+        product = subject(spec).make(tuple(asked.only.split(",")), asked.check, store, Progress())
         content = {**product.own, **{path: store.content(sha) for path, sha in product.shared.items()}}
         folder = out / "few" / name
         there = {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}

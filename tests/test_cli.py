@@ -190,14 +190,12 @@ def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(
     assert not (tmp_path / "out").exists()
 
 
-def test_nothing_is_sliced_unasked_and_the_old_option_says_that_it_is_not_needed(tmp_path: Path) -> None:
-    done = _run("build", "single-embedded", "--formats", "stl", "--no-slice", "--no-report", cwd=tmp_path)
+def test_nothing_is_sliced_unless_asked(tmp_path: Path) -> None:
+    done = _run("build", "single-embedded", "--formats", "stl", "--no-report", cwd=tmp_path)
     assert done.returncode == 0
-    assert "leave out --no-slice" in done.stderr
     folder = tmp_path / done.stdout.strip()
     assert not (folder / "slicer.json").exists()
     assert "build spec.toml --slice -o sliced" in (folder / "casting.md").read_text()
-    assert "no-slice" not in _run("build", "--help").stdout
 
 
 def test_the_summary_of_a_gang_speaks_of_each_unit(tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ import ast
 import re
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ import pytest
 import unitcad
 from unitcad.designs import shipped
 from unitcad.validation import default_template, templates
-from unitcad.workers import cores
 
 PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
@@ -44,10 +42,11 @@ FLOORS = [
 ]
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 CAD = ("OCP", "build123d", "cadquery")
-NEEDLESS = ("numpy.ma", "unitcad.arrays.array_file")
+NEEDLESS = ("unitcad.arrays.array_file",)
 """What neither a unit's build nor a check needs, and takes longer to load than a small mesh takes to check."""
 OF_OTHERS = {
     "check": (
+        "numpy.ma",
         "unitcad.check.rules.d_walls",
         "unitcad.check.rules.m_manifest",
         "unitcad.check.geometry.rays",
@@ -165,16 +164,6 @@ def test_the_rooms_of_check_import_one_way() -> None:
             assert room == "__init__" or level[room] < level[other], f"{file} imports {other}"
 
 
-def test_no_file_has_the_name_of_another_file() -> None:
-    names = Counter(file.name for file in PACKAGE.rglob("*.py") if file.name != "__init__.py")
-    assert [name for name, count in names.items() if count > 1] == []
-
-
-def test_no_file_is_past_400_lines() -> None:
-    long = {str(f.relative_to(PACKAGE)): n for f in PACKAGE.rglob("*.py") if (n := f.read_text().count("\n")) > 400}
-    assert long == {}
-
-
 def _names_of_designs(text: str) -> list[str]:
     """The words of a file's code, texts and comments that are a shipped design's name, each with its line."""
     word = re.compile(rf"(?<![a-z])({'|'.join(shipped())})(?![a-z])", re.IGNORECASE)
@@ -223,9 +212,7 @@ def test_no_piece_is_recognised_by_its_name() -> None:
     ids=lambda run: run[0],
 )
 def test_nothing_needless_is_loaded(run: list[str], tmp_path: Path) -> None:
-    # With one core the build makes its estimate itself, and scipy loads what is needless to the rest.
-    alone = run[0] == "build" and cores() < 2
-    needless = CAD + (NEEDLESS if run[0] in ("build", "check") and not alone else ()) + OF_OTHERS.get(run[0], ())
+    needless = CAD + (NEEDLESS if run[0] in ("build", "check") else ()) + OF_OTHERS.get(run[0], ())
     corners = ["0 0 0", "9 0 0", "0 9 0", "0 0 9"]
     facets = [
         "facet normal 0 0 0\nouter loop\n" + "".join(f"vertex {corners[k]}\n" for k in face) + "endloop\nendfacet\n"

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from unitcad import estimating
 from unitcad.errors import UnitcadError
 from unitcad.pipeline import Variant
 from unitcad.pipeline import make as artifacts
@@ -292,8 +291,8 @@ def test_ctrl_c_while_a_module_is_loaded_leaves_with_130(met: str, tmp_path: Pat
 def test_variants_that_differ_in_casting_alone_share_one_estimate(monkeypatch, tmp_path):
     """The file is the one that another process, which remembers nothing, makes; another silicone has its own."""
     made = []
-    whole = estimating.estimate_spec
-    monkeypatch.setattr(estimating, "estimate_spec", lambda *asked, **more: made.append(asked) or whole(*asked, **more))
+    whole = artifacts.estimate_spec
+    monkeypatch.setattr(artifacts, "estimate_spec", lambda *asked, **more: made.append(asked) or whole(*asked, **more))
     artifacts._ESTIMATES.clear()
     changes = [(), ("casting.room_c=24",), ("casting.waste=0.7",), ("layers.0.material=ecoflex-00-30",)]
     files = []

@@ -17,7 +17,7 @@ from unitcad.catalogue.entries import kinds_of
 from unitcad.errors import Refusal
 from unitcad.lab.fit_files import fit_toml
 from unitcad.lab.fitting import fit_lab, load_fit_lab
-from unitcad.pipeline.make import Progress, make
+from unitcad.pipeline.make import Progress, Subject
 from unitcad.pipeline.plan import OUTPUTS
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
@@ -194,7 +194,7 @@ def _before(base: str) -> dict[str, str]:
 
 def _written(data: dict[str, Any]) -> dict[str, str]:
     """The content of each file that is written, as a hash, but for the spec itself; and what the checks find."""
-    product = make(from_data(data), OUTPUTS, True, _STORE, Progress())
+    product = Subject(from_data(data)).make(OUTPUTS, True, _STORE, Progress())
     own = {path: digest(content) for path, content in product.own.items()}
     for path in ("spec.toml", "manifest.json"):
         del own[path]

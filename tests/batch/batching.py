@@ -7,8 +7,11 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+from unitcad.cache import Store
 
 SPEC = """
 name = "ring"
@@ -127,3 +130,11 @@ def leftovers(out: Path) -> list[Path]:
     it, and nobody can tell it from one that a living process has just made.
     """
     return [path for path in out.iterdir() if path.name.startswith(".tmp-") and any(path.iterdir())]
+
+
+def data_of(store: Store, key: str, make: Callable[[], Any], intact: Callable[[Any], bool] = lambda data: True) -> Any:
+    """Return the data under a key, made if the store lacks them."""
+    with store.entry(key, intact=intact) as entry:
+        if entry.data is None:
+            entry.data = make()
+    return entry.data

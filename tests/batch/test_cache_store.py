@@ -13,6 +13,7 @@ from pathlib import Path
 
 import platformdirs
 import pytest
+from batching import data_of
 
 from unitcad.cache import DiskStore, MemoryStore, MissingContent, collect, default_root, usage
 from unitcad.cache import disk as disk_module
@@ -38,9 +39,9 @@ def test_each_key_is_made_once(kind: str, tmp_path: Path) -> None:
     assert first == second
     assert make.count == 1
     assert store.content(first) == b"content"
-    assert store.data("ab2", lambda: {"x": [1.5, None]}) == {"x": [1.5, None]}
-    assert store.data("ab2", lambda: pytest.fail("made twice")) == {"x": [1.5, None]}
-    assert store.data("ab2", lambda: {"y": 1}, intact=lambda data: "y" in data) == {"y": 1}
+    assert data_of(store, "ab2", lambda: {"x": [1.5, None]}) == {"x": [1.5, None]}
+    assert data_of(store, "ab2", lambda: pytest.fail("made twice")) == {"x": [1.5, None]}
+    assert data_of(store, "ab2", lambda: {"y": 1}, intact=lambda data: "y" in data) == {"y": 1}
     assert dict(store.counts) == {"file built": 1, "file reused": 1, "data built": 2, "data reused": 1}
     with pytest.raises(MissingContent):
         store.content("0" * 64)
@@ -135,7 +136,7 @@ def test_no_room_in_the_cache_is_no_error(tmp_path: Path, monkeypatch: pytest.Mo
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", full)
         sha = store.file("ab1", Made())
-        assert store.data("ab2", lambda: 5) == 5
+        assert data_of(store, "ab2", lambda: 5) == 5
     assert store.content(sha) == b"content"
     store.place(sha, tmp_path / "a")
     assert (tmp_path / "a").read_bytes() == b"content"
@@ -173,7 +174,7 @@ def test_a_lock_of_a_killed_process_is_no_obstacle(tmp_path: Path) -> None:
         time.sleep(0.01)
     child.kill()
     child.join()
-    assert DiskStore(tmp_path / "c").data("ab1", lambda: 7) == 7
+    assert data_of(DiskStore(tmp_path / "c"), "ab1", lambda: 7) == 7
 
 
 def _never_ends(root: Path, mark: Path) -> None:
@@ -181,7 +182,7 @@ def _never_ends(root: Path, mark: Path) -> None:
         mark.touch()
         time.sleep(600)
 
-    DiskStore(root).data("ab1", make)
+    data_of(DiskStore(root), "ab1", make)
 
 
 def test_collecting_removes_what_was_used_longest_ago(tmp_path: Path) -> None:
@@ -271,13 +272,14 @@ def test_a_folder_of_others_is_refused(tmp_path: Path) -> None:
 def test_a_bundle_spares_the_work_but_not_the_content(tmp_path: Path) -> None:
     first = MemoryStore()
     sha = first.file("ab1", Made())
-    first.data("ab2", lambda: {"files": [sha]})
+    data_of(first, "ab2", lambda: {"files": [sha]})
     bundle = first.bundle()
     assert json.dumps(vars(bundle))
     second = MemoryStore(bundle)
     assert second.file("ab1", lambda: pytest.fail("known")) == sha
     assert (
-        second.data("ab2", lambda: pytest.fail("known"), intact=lambda d: all(map(second.has, d["files"]))) is not None
+        data_of(second, "ab2", lambda: pytest.fail("known"), intact=lambda d: all(map(second.has, d["files"])))
+        is not None
     )
     assert second.contents == {}
 
@@ -356,8 +358,8 @@ def test_an_entry_under_another_key_does_not_count(kind: str, tmp_path: Path) ->
     """Moved by hand or by a damaged file system: whole in itself, and the verdict on another part."""
     store = DiskStore(tmp_path / "c")
     if kind == "data":
-        store.data("ab1", lambda: {"status": "ok"})
-        store.data("ab2", lambda: {"status": "broken"})
+        data_of(store, "ab1", lambda: {"status": "ok"})
+        data_of(store, "ab2", lambda: {"status": "broken"})
     else:
         store.file("ab1", Made(b"one"))
         store.file("ab2", Made(b"two"))
@@ -365,7 +367,7 @@ def test_an_entry_under_another_key_does_not_count(kind: str, tmp_path: Path) ->
     (folder / "ab2").write_bytes((folder / "ab1").read_bytes())
     again = DiskStore(tmp_path / "c")
     if kind == "data":
-        assert again.data("ab2", lambda: {"status": "broken"}) == {"status": "broken"}
+        assert data_of(again, "ab2", lambda: {"status": "broken"}) == {"status": "broken"}
     else:
         assert again.content(again.file("ab2", Made(b"two"))) == b"two"
     assert dict(again.counts) == {f"{kind} built": 1, "damaged": 1}

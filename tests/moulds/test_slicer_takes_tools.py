@@ -50,8 +50,7 @@ def written(folder: Path, *source: str) -> list[Path]:
 
 
 def sliced(files: list[Path]) -> dict[str, Any]:
-    with slicer.Pieces(printers()["fdm-0.4"]) as pieces:
-        return pieces.report({path.name: path.read_bytes() for path in files})
+    return slicer.print_report(files, printers()["fdm-0.4"], {}, list[str]().append)
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
@@ -64,8 +63,8 @@ def test_no_tool_needs_a_repair(source: tuple[str, ...], tmp_path: Path) -> None
 @pytest.mark.parametrize("source", [("embedded",), ("three-layer",), ("encapsulating", "moulds.printer=fdm-0.25")])
 def test_the_slicers_time_is_within_the_range_that_the_procedure_says(source: tuple[str, ...], tmp_path: Path) -> None:
     moulds, files = set_of(*source), written(tmp_path, *source)
-    with slicer.Pieces(printers()[moulds.spec.moulds.printer]) as pieces:
-        taken = pieces.report({path.name: path.read_bytes() for path in files})["print_s"] / 60
+    printer = printers()[moulds.spec.moulds.printer]
+    taken = slicer.print_report(files, printer, {}, list[str]().append)["print_s"] / 60
     solid = sum(moulds.solids[tool.name].volume() for tool in moulds.plan.tools if tool.made == "printed")
     low, high = figures.FDM_ERROR
     assert low <= taken / figures.print_min(moulds.spec, solid, 0.0) <= high
@@ -157,28 +156,25 @@ def test_coupon_needs_no_repair(tmp_path: Path) -> None:
         assert not slicer.needs_repair(file)
 
 
-def test_print_times_are_written_once_a_piece_and_begin_while_the_rest_is_made(tmp_path: Path) -> None:
+def test_print_times_are_written_once_a_piece(tmp_path: Path) -> None:
     """A second call takes what it knows; a changed piece is sliced again."""
     spec = load("single-embedded")
+    built = build(spec, tmp_path, only=("moulds",), check=False)
     said: list[str] = []
 
     def run() -> str:
-        with slicing.begin(spec, tmp_path / folder_name(spec), said.append) as pieces:
-            built = build(spec, tmp_path, only=("moulds",), check=False, take=slicing.take(pieces))
-            assert {name for name, _ in pieces._sliced} == {"base.stl", "step1-cup.stl", "blade.stl"}
-            return slicing.finish(pieces, built.folder, built.manifest)
+        return slicing.slice_tools(spec, built.folder, built.manifest, said.append)
 
     assert run().startswith("prints in 0 h ")
-    report = json.loads((tmp_path / folder_name(spec) / "slicer.json").read_text())
+    report = json.loads((built.folder / "slicer.json").read_text())
     assert {piece["file"] for piece in report["pieces"]} == {"base.stl", "step1-cup.stl", "blade.stl"}
     assert report["print_s"] == sum(piece["print_s"] for piece in report["pieces"]) > 60
     assert len(said) == 3
     assert run().startswith("prints in 0 h ")
     assert len(said) == 3
-    built = build(spec, tmp_path, only=("moulds",), check=False)
-    for content, expected in ((None, "prints in"), (b"no mesh", "not sliced: ")):
-        blade = built.folder / "moulds" / "blade.stl"
-        blade.write_bytes(content or (built.folder / "moulds" / "base.stl").read_bytes())
-        with slicing.begin(spec, built.folder, said.append) as pieces:
-            assert slicing.finish(pieces, built.folder, built.manifest).startswith(expected)
+    blade = built.folder / "moulds" / "blade.stl"
+    base = (built.folder / "moulds" / "base.stl").read_bytes()
+    for content, expected in ((base, "prints in"), (b"no mesh", "not sliced: ")):
+        blade.write_bytes(content)
+        assert run().startswith(expected)
     assert said[3:] == ["slicing blade.stl"] * 2

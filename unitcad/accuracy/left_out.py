@@ -9,7 +9,7 @@ from unitcad.accuracy.result import Cell, Result, Say, Table
 from unitcad.accuracy.timing import interleaved, machine
 from unitcad.cache import MemoryStore
 from unitcad.pipeline import plan as bodies
-from unitcad.pipeline.make import Progress, make
+from unitcad.pipeline.make import Progress, Subject
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.plan import OUTPUTS
 from unitcad.validation import default_template, load, templates
@@ -53,4 +53,5 @@ def run(quick: bool, say: Say) -> Result:
 def _manifest(template: str, request: str) -> Manifest:
     only, formats, check = REQUESTS[request]
     bodies.forget()
-    return make(load(template, [f"output.formats={list(formats)}"]), only, check, MemoryStore(), Progress()).manifest
+    wanted = Subject(load(template, [f"output.formats={list(formats)}"]))
+    return wanted.make(only, check, MemoryStore(), Progress()).manifest

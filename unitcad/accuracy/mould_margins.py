@@ -12,7 +12,7 @@ from unitcad.accuracy.timing import machine, timing
 from unitcad.cache import MemoryStore
 from unitcad.errors import Refusal
 from unitcad.mould_checks import mould_checks
-from unitcad.pipeline.make import Progress, make
+from unitcad.pipeline.make import Progress, Subject
 from unitcad.pipeline.manifest import FindingRecord
 from unitcad.spec import Spec
 from unitcad.validation import default_template, from_data, load
@@ -86,7 +86,7 @@ def run(quick: bool, say: Say) -> Result:
 def _seconds(spec: Spec) -> tuple[float, list[FindingRecord]]:
     """Return the seconds that the mould checks of a spec take, and what they found. Raises Refusal."""
     stages = Progress()
-    manifest = make(spec, ("unit", "moulds"), True, MemoryStore(), stages).manifest
+    manifest = Subject(spec).make(("unit", "moulds"), True, MemoryStore(), stages).manifest
     return stages.seconds["mould checks"], manifest["laws"]
 
 

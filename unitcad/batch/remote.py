@@ -36,7 +36,8 @@ class Receiver(Folders):
                 self.store.keep(content)
             if outcome.bundle and all(map(self.store.has, outcome.bundle.files.values())):
                 self.store.forget(_key(geometry))
-                self.store.data(_key(geometry), lambda: vars(outcome.bundle))
+                with self.store.entry(_key(geometry)) as entry:
+                    entry.data = vars(outcome.bundle)
             folder = self.out / outcome.folder
             timings = {"code": code_version(), "seconds": {"all": round(outcome.seconds, 4)}}
             with replacing(folder) as fresh:

@@ -18,12 +18,13 @@ from unitcad.cache.collect import DEFAULT_LIMIT_MB, Usage, collect, usage
 from unitcad.cache.disk import DiskStore, default_root, free, held
 from unitcad.cache.objects import absolute
 from unitcad.cache.shared_store import SharedStore
-from unitcad.cache.store import Bundle, MemoryStore, MissingContent, Store, digest
+from unitcad.cache.store import Bundle, Entry, MemoryStore, MissingContent, Store, digest
 
 __all__ = [
     "DEFAULT_LIMIT_MB",
     "Bundle",
     "DiskStore",
+    "Entry",
     "MemoryStore",
     "MissingContent",
     "SharedStore",

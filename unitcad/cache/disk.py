@@ -21,7 +21,7 @@ import msgspec
 import platformdirs
 from filelock import FileLock
 
-from unitcad.cache.store import Intact, Make, MissingContent, digest
+from unitcad.cache.store import Entry, Intact, MissingContent, digest
 from unitcad.errors import UnitcadError
 from unitcad.files import regular, write_new
 
@@ -65,15 +65,15 @@ class DiskStore:
     def __reduce__(self) -> tuple[type[DiskStore], tuple[Path]]:
         return DiskStore, (self.root,)
 
-    def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
-        return self._entry("data", key, make, intact)
+    def entry(self, key: str, *, intact: Intact = lambda data: True) -> contextlib.AbstractContextManager[Entry]:
+        return self._entry("data", key, intact)
 
     def file(self, key: str, make: Callable[[], bytes]) -> str:
-        def stored() -> dict[str, Any]:
-            content = make()
-            return {"sha256": self.keep(content), "size": len(content)}
-
-        return self._entry("file", key, stored, lambda entry: self.has(entry["sha256"]))["sha256"]
+        with self._entry("file", key, lambda data: self.has(data["sha256"])) as entry:
+            if entry.data is None:
+                content = make()
+                entry.data = {"sha256": self.keep(content), "size": len(content)}
+        return entry.data["sha256"]
 
     def has(self, sha256: str) -> bool:
         if sha256 in self._held:
@@ -160,22 +160,24 @@ class DiskStore:
         for kind in ("data", "file"):
             remove(self._path(kind, key))
 
-    def _entry(self, kind: str, key: str, make: Make, intact: Intact) -> Any:
+    @contextlib.contextmanager
+    def _entry(self, kind: str, key: str, intact: Intact) -> Iterator[Entry]:
         path = self._path(kind, key)
-        data = self._read(kind, key, intact)
-        if data is None:
+        entry = Entry(self._read(kind, key, intact))
+        if entry.data is None:
             with held(self.root / "locks" / key):
-                data = self._read(kind, key, intact)  # another process may have made it meanwhile
-                if data is None:
-                    made = make()
-                    payload = json.dumps(made, ensure_ascii=False, allow_nan=False).encode()
+                entry.data = self._read(kind, key, intact)  # another process may have made it in the meantime
+                if entry.data is None:
+                    yield entry
+                    payload = json.dumps(entry.data, ensure_ascii=False, allow_nan=False).encode()
                     with contextlib.suppress(OSError):
                         self._write(path, _checksum(kind, key, payload) + b"\n" + payload)
                     self.counts[f"{kind} built"] += 1
-                    return json.loads(payload)
+                    entry.data = json.loads(payload)  # as the next reader gets it
+                    return
+        yield entry
         self.counts[f"{kind} reused"] += 1
         self._touch(path)
-        return data
 
     def _read(self, kind: str, key: str, intact: Intact) -> Any:
         """Return an entry's data, or None; an entry that is damaged or was written for another key is removed."""

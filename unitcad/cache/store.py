@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from unitcad.errors import UnitcadError
 from unitcad.files import write_new
 
-Make = Callable[[], Any]
 Intact = Callable[[Any], bool]
 
 
@@ -22,14 +23,24 @@ class MissingContent(UnitcadError):
     exit_code = 1
 
 
+@dataclass
+class Entry:
+    """The JSON data under a key. They are None if the block that opened the entry has to make them."""
+
+    data: Any = None
+
+
 class Store(Protocol):
     """A cache as a build uses it."""
 
     counts: Counter[str]
     """"built" and "reused" entries, by kind ("data", "file")."""
 
-    def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
-        """Return the JSON data under `key`; made if it is not there, damaged, or not `intact` any more."""
+    def entry(self, key: str, *, intact: Intact = lambda data: True) -> AbstractContextManager[Entry]:
+        """Open the entry of `key`; its data are None if they are missing, damaged, or not `intact`.
+
+        The store keeps the data that the block sets when the block ends. It keeps nothing if the block raises.
+        """
         ...
 
     def file(self, key: str, make: Callable[[], bytes]) -> str:
@@ -79,12 +90,15 @@ class MemoryStore:
         """Return what is here now."""
         return Bundle(dict(self._data), dict(self._files), {sha: self.size(sha) for sha in self._files.values()})
 
-    def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
-        known = key in self._data and intact(self._data[key])
-        self.counts["data reused" if known else "data built"] += 1
+    @contextlib.contextmanager
+    def entry(self, key: str, *, intact: Intact = lambda data: True) -> Iterator[Entry]:
+        entry = Entry(self._data.get(key))
+        known = entry.data is not None and intact(entry.data)
         if not known:
-            self._data[key] = make()
-        return self._data[key]
+            entry.data = None
+        yield entry
+        self._data[key] = entry.data
+        self.counts["data reused" if known else "data built"] += 1
 
     def file(self, key: str, make: Callable[[], bytes]) -> str:
         known = key in self._files

@@ -57,7 +57,6 @@ def build(
     slicing: Annotated[
         bool, typer.Option("--slice", help="Have PrusaSlicer say print time and filament of each piece (slicer.json).")
     ] = False,
-    no_slice: Annotated[bool, typer.Option("--no-slice", hidden=True)] = False,
     watch: Annotated[
         bool, typer.Option("--watch", help="Build again after every save of the spec, until Ctrl-C.")
     ] = False,
@@ -65,8 +64,6 @@ def build(
     as_json: AsJson = False,
 ) -> None:
     """Make a unit and its casting moulds, or an array of units. The last line printed is the folder."""
-    if no_slice:
-        warn("note: nothing is sliced without --slice: leave out --no-slice, which the next release does not know")
     once = partial(_built, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
     if not watch:
         if not once():

@@ -72,14 +72,13 @@ def _unread(
 
 def _amplitudes(store: Store, drive: Drive, reading: str, variant: EstimateInput, draws: Draws) -> list[np.ndarray]:
     """Return the amplitudes at the reading and of the motor, m under one newton, each (draws,)."""
-    parts = [draws.indices[start : start + BLOCK] for start in range(0, len(draws.indices), BLOCK)]
-    blocks = [
-        store.data(
-            _key(variant, drive, draws.seed, draws.count, part),
-            partial(_solve, variant, drive, draws.seed, draws.count, part),
-        )
-        for part in parts
-    ]
+    blocks = []
+    for start in range(0, len(draws.indices), BLOCK):
+        part = draws.indices[start : start + BLOCK]
+        with store.entry(_key(variant, drive, draws.seed, draws.count, part)) as entry:
+            if entry.data is None:
+                entry.data = _solve(variant, drive, draws.seed, draws.count, part)
+        blocks.append(entry.data)
     return [np.concatenate([block[at] for block in blocks]) for at in (reading, "motor")]
 
 

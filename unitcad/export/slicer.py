@@ -8,17 +8,16 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from unitcad.catalogue import Printer
 from unitcad.errors import UnitcadError
-from unitcad.workers import TimedOut, run
+from unitcad.workers import TimedOut, cores, run
 
-Say = Callable[[str], None]
 PROGRAMS = ("prusa-slicer", "prusa-slicer-console", "PrusaSlicer")
 """Its names on Linux, Windows and macOS, where it is on the path."""
 PLACES = {
@@ -88,63 +87,34 @@ def slice_file(path: Path, printer: Printer) -> Sliced:
     )
 
 
-class Pieces:
-    """Pieces that are sliced side by side from the moment they come; `report` waits for them.
+def print_report(
+    paths: Sequence[Path], printer: Printer, earlier: Mapping[str, Any], say: Callable[[str], object]
+) -> dict[str, Any]:
+    """Slice binary STL files, several at a time; return the content of slicer.json.
 
-    Pieces of an `earlier` report with the same content, printer and slicer are taken from it. The block's end waits for
-    what is being sliced and drops the rest.
+    Pieces of the `earlier` report with the same content, printer and slicer are taken from it. `say` gets the name of
+    each file that is sliced. Raises UnitcadError for a file that the slicer refuses.
     """
+    head = {"slicer": _version(), "printer": printer.name, "layer_mm": float(printer.layer_mm)}
+    same = {key: earlier.get(key) for key in head} == head
+    known = {(piece["file"], piece["sha256"]): piece for piece in earlier["pieces"]} if same else {}
 
-    def __init__(
-        self, printer: Printer, earlier: Mapping[str, Any] | None = None, say: Say = lambda message: None
-    ) -> None:
-        self._printer, self._earlier, self._say = printer, earlier or {}, say
-        self._scratch = tempfile.TemporaryDirectory(prefix="unitcad-slice-")
-        self._pool = ThreadPoolExecutor(max(2, os.cpu_count() or 1))
-        self._head: Future[dict[str, Any]] = self._pool.submit(self._heading)
-        self._sliced: dict[tuple[str, str], Future[dict[str, Any]]] = {}
+    def piece(path: Path) -> dict[str, Any]:
+        sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+        if (path.name, sha256) in known:
+            return known[path.name, sha256]
+        say(f"slicing {path.name}")
+        return {**asdict(slice_file(path, printer)), "sha256": sha256}
 
-    def __enter__(self) -> Pieces:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        self._pool.shutdown(cancel_futures=True)
-        self._scratch.cleanup()
-
-    def add(self, name: str, content: bytes) -> None:
-        """Begin to slice a binary STL, unless it is known."""
-        key = name, hashlib.sha256(content).hexdigest()
-        if key not in self._sliced:
-            self._sliced[key] = self._pool.submit(self._one, *key, content)
-
-    def report(self, files: Mapping[str, bytes]) -> dict[str, Any]:
-        """Return what slicer.json holds of these STL files by name. Raises UnitcadError for one that fails."""
-        for name, content in files.items():
-            self.add(name, content)
-        keys = [(name, hashlib.sha256(content).hexdigest()) for name, content in files.items()]
-        pieces = [self._sliced[key].result() for key in keys]
-        return {
-            **self._head.result(),
-            "pieces": pieces,
-            "print_s": sum(piece["print_s"] for piece in pieces),
-            "filament_cm3": round(sum(piece["filament_cm3"] for piece in pieces), 3),
-            "note": "the slicer's own defaults but for nozzle and layer height; each piece printed alone",
-        }
-
-    def _heading(self) -> dict[str, Any]:
-        return {"slicer": _version(), "printer": self._printer.name, "layer_mm": float(self._printer.layer_mm)}
-
-    def _one(self, name: str, sha256: str, content: bytes) -> dict[str, Any]:
-        head = self._head.result()
-        if {key: self._earlier.get(key) for key in head} == head:
-            for piece in self._earlier["pieces"]:
-                if (piece["file"], piece["sha256"]) == (name, sha256):
-                    return piece
-        self._say(f"slicing {name}")
-        folder = Path(self._scratch.name, sha256)
-        folder.mkdir(exist_ok=True)
-        (folder / name).write_bytes(content)
-        return {**asdict(slice_file(folder / name, self._printer)), "sha256": sha256}
+    with ThreadPoolExecutor(cores()) as pool:
+        pieces = list(pool.map(piece, paths))
+    return {
+        **head,
+        "pieces": pieces,
+        "print_s": sum(piece["print_s"] for piece in pieces),
+        "filament_cm3": round(sum(piece["filament_cm3"] for piece in pieces), 3),
+        "note": "the slicer's own defaults but for nozzle and layer height; each piece printed alone",
+    }
 
 
 def _version() -> str:

@@ -42,7 +42,7 @@ from unitcad.mould_checks.finding import FindingRecord
 from unitcad.mould_checks.gap import play_missing
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.make import Product, Progress, Subject, finished, geometry, make, mould_findings, record
+from unitcad.pipeline.make import Product, Progress, Subject, finished, geometry, mould_findings, record
 from unitcad.pipeline.manifest import (
     CASTING,
     NO_KERNEL,
@@ -93,59 +93,58 @@ class Arrayed(Subject):
     def outputs(self, only: Sequence[str]) -> tuple[str, ...]:
         return tuple(only)
 
-    def make(
-        self, only: Sequence[str], check: bool, store: Store, progress: Progress, formats: Sequence[Format] = ()
-    ) -> Product:
-        return make_array(with_formats(self.of, tuple(formats)) if formats else self.of, only, check, store, progress)
+    def with_formats(self, formats: Sequence[Format]) -> Subject:
+        return Arrayed(with_formats(self.of, tuple(formats)))
 
     def same_file(self, data: dict[str, Any]) -> Subject:
         return Arrayed(array_of(data))
 
-
-def make_array(array: Array, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
-    """Return everything asked for of an array, nothing written yet. Raises Refusal where the moulds can't be made."""
-    moulds = patch_moulds(array)
-    moulds.plan  # noqa: B018  # refuses before the long work begins
-    units = {folder: _unit(array, unit, only, check, store, progress) for folder, unit in unit_folders(array).items()}
-    own: dict[str, bytes] = {Arrayed.file: to_toml(array).encode()}
-    shared: dict[str, str] = {}
-    for folder, product in units.items():
-        own |= {f"{folder}/{path}": content for path, content in product.own.items()}
-        shared |= {f"{folder}/{path}": sha256 for path, sha256 in product.shared.items()}
-    parts: list[PartRecord] = []
-    shape: Geometry | None = None
-    if {"moulds", "casting"} & set(only):
-        shape = geometry(moulds, ["moulds"], check and "moulds" in only, store, progress)
-        if "moulds" in only:
-            shared |= shape["files"]
-            parts += shape["parts"]
-    if "unit" in only:
-        progress("patch")
-        made, files = _patch(moulds, store)
-        parts, shared = [*parts, *made], shared | files
-    drawn: list[str] = []
-    tracks = crowded_tracks(array) if has_circuit(array) else []
-    warned = [*hidden_tails_warning(array), *tracks, *shallow_grooves(moulds), *play_missing(moulds)]
-    if {"unit", "moulds"} & set(only):
-        progress("pictures")
-        shown = _pictures(moulds, store)
-        drawn, shared = list(shown), shared | shown
-    if "casting" in only and shape:
-        progress("casting")
-        for step in moulds.plan.steps:
-            draw = partial(step_section, moulds, step)
-            key = geometry_key(moulds, f"section of pour {step.index}")
-            shared[f"step{step.index}-section.svg"] = store.file(key, lambda draw=draw: draw().encode())
-        shared |= _step_pictures(moulds, store)
-        made = _procedure(moulds, shape, units)
-        own |= {path: text.encode() for path, text in written(made).items()}
-        warned += pour_warnings((f"pour {pour.index} ({pour.material})", pour.verdict) for pour in made.pours)
-    progress("circuit and crosstalk")
-    more, lacking = extras(array, only)
-    own |= more
-    manifest = _manifest(array, moulds, only, check, shape, units, parts, drawn, own, warned)
-    manifest["left_out"] += [LeftOut(what=what, why=why) for what, why in lacking.items()]
-    return finished(manifest, own, shared, store)
+    def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
+        array: Array = self.of
+        moulds = patch_moulds(array)
+        moulds.plan  # noqa: B018  # refuses before the long work begins
+        units = {
+            folder: _unit(array, unit, only, check, store, progress) for folder, unit in unit_folders(array).items()
+        }
+        own: dict[str, bytes] = {Arrayed.file: to_toml(array).encode()}
+        shared: dict[str, str] = {}
+        for folder, product in units.items():
+            own |= {f"{folder}/{path}": content for path, content in product.own.items()}
+            shared |= {f"{folder}/{path}": sha256 for path, sha256 in product.shared.items()}
+        parts: list[PartRecord] = []
+        shape: Geometry | None = None
+        if {"moulds", "casting"} & set(only):
+            shape = geometry(moulds, ["moulds"], check and "moulds" in only, store, progress)
+            if "moulds" in only:
+                shared |= shape["files"]
+                parts += shape["parts"]
+        if "unit" in only:
+            progress("patch")
+            made, files = _patch(moulds, store)
+            parts, shared = [*parts, *made], shared | files
+        drawn: list[str] = []
+        tracks = crowded_tracks(array) if has_circuit(array) else []
+        warned = [*hidden_tails_warning(array), *tracks, *shallow_grooves(moulds), *play_missing(moulds)]
+        if {"unit", "moulds"} & set(only):
+            progress("pictures")
+            shown = _pictures(moulds, store)
+            drawn, shared = list(shown), shared | shown
+        if "casting" in only and shape:
+            progress("casting")
+            for step in moulds.plan.steps:
+                draw = partial(step_section, moulds, step)
+                key = geometry_key(moulds, f"section of pour {step.index}")
+                shared[f"step{step.index}-section.svg"] = store.file(key, lambda draw=draw: draw().encode())
+            shared |= _step_pictures(moulds, store)
+            made = _procedure(moulds, shape, units)
+            own |= {path: text.encode() for path, text in written(made).items()}
+            warned += pour_warnings((f"pour {pour.index} ({pour.material})", pour.verdict) for pour in made.pours)
+        progress("circuit and crosstalk")
+        more, lacking = extras(array, only)
+        own |= more
+        manifest = _manifest(array, moulds, only, check, shape, units, parts, drawn, own, warned)
+        manifest["left_out"] += [LeftOut(what=what, why=why) for what, why in lacking.items()]
+        return finished(manifest, own, shared, store)
 
 
 def unit_folders(array: Array) -> dict[str, Spec]:
@@ -162,7 +161,7 @@ def _unit(array: Array, unit: Spec, only: Sequence[str], check: bool, store: Sto
     apart = construction_of(array.construction, array.cast).own_tails
     wanted = [name for name in only if apart or name not in ("moulds", "casting")] or ["unit"]
     progress.prefix = "unit: "
-    product = make(unit, wanted, check, store, progress)
+    product = Subject(unit).make(wanted, check, store, progress)
     progress.prefix = ""
     return product
 

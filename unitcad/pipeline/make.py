@@ -10,25 +10,37 @@ import os
 import re
 import time
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from unitcad import files
+from unitcad.attenuation.edge.estimates import rounded_layered
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.cache import Store, digest
 from unitcad.casting.procedure import procedure
 from unitcad.casting.written import files as written
 from unitcad.check import Options, check_bytes
 from unitcad.errors import UnitcadError
+from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.export.picture import NoPicture
 from unitcad.json_text import json_bytes
 from unitcad.kernels.mesh import bounds
 from unitcad.mould_checks import Strain, check_geometry, check_unit, strain_findings, strains
 from unitcad.mould_checks.finding import FindingRecord
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import manifest as manifests
-from unitcad.pipeline.manifest import CASTING, BodyFile, Geometry, Manifest, MeshFinding, PartRecord, PourRecord
+from unitcad.pipeline.manifest import (
+    CASTING,
+    BodyFile,
+    Geometry,
+    LeftOut,
+    Manifest,
+    MeshFinding,
+    PartRecord,
+    PourRecord,
+)
 from unitcad.pipeline.plan import (
     GEOMETRIC,
     Planned,
@@ -122,42 +134,43 @@ class Subject:
         return build_key(self.of, only, check)
 
     def outputs(self, only: Sequence[str]) -> tuple[str, ...]:
-        """Return what of `only` there can be."""
+        """Return the outputs of `only` that this subject has."""
         return possible_outputs(self.of, only)
 
-    def make(
-        self, only: Sequence[str], check: bool, store: Store, progress: Progress, formats: Sequence[Format] = ()
-    ) -> Product:
-        """Return all files asked for, nothing written yet."""
-        return make(with_formats(self.of, tuple(formats)) if formats else self.of, only, check, store, progress)
+    def with_formats(self, formats: Sequence[Format]) -> Subject:
+        """Return the same subject with other formats."""
+        return Subject(with_formats(self.of, tuple(formats)))
 
     def same_file(self, data: dict[str, Any]) -> Subject:
         """Return the subject of a result's own file."""
         return Subject(from_data(data))
 
+    def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
+        """Make all files that `only` asks for, in memory and `store`.
 
-def make(spec: Spec, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
-    """Return all files of a spec that `only` asks for, nothing written yet.
-
-    Raises Refusal if the moulds can't be made, Unfinished if a check lacks memory or time.
-    """
-    moulds, outputs = MouldSet(spec), possible_outputs(spec, only)
-    if {"moulds", "casting"} & set(outputs):
-        moulds.plan  # noqa: B018  # refuses before the long work begins
-    own: dict[str, bytes] = {"spec.toml": to_toml(spec).encode()}
-    estimate = None
-    if "estimate" in outputs:  # first: the helper for STEP loads its kernel meanwhile
-        progress("estimate")
-        estimate, own["estimate.json"] = _estimate(spec, store)
-    shape = geometry(moulds, outputs, check, store, progress)
-    if "casting" in outputs:
-        progress("casting")
-        volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
-        made = written(procedure(moulds, volumes, manifests.printed_mm3(shape["parts"])))
-        own |= {path: made[path].encode() for path in CASTING}
-    progress("manifest")
-    manifest = manifests.of_unit(moulds, outputs, check, shape, mould_findings(spec, shape), estimate)
-    return finished(manifest, own, shape["files"], store)
+        Raises Refusal if the moulds can't be made, Unfinished if a check lacks memory or time.
+        """
+        spec, outputs = self.unit, possible_outputs(self.unit, only)
+        moulds = MouldSet(spec)
+        if {"moulds", "casting"} & set(outputs):
+            moulds.plan  # noqa: B018  # refuses before the long work begins
+        own: dict[str, bytes] = {"spec.toml": to_toml(spec).encode()}
+        estimate = None
+        if "estimate" in outputs:  # first: the helper for STEP loads its kernel in the meantime
+            progress("estimate")
+            estimate, own["estimate.json"] = _estimate(spec, store)
+        shape = geometry(moulds, outputs, check, store, progress)
+        pictures, no_pictures = _shaded_pictures(moulds, outputs, store, progress)
+        if "casting" in outputs:
+            progress("casting")
+            volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
+            made = written(procedure(moulds, volumes, manifests.printed_mm3(shape["parts"])))
+            own |= {path: made[path].encode() for path in CASTING}
+        progress("manifest")
+        findings = mould_findings(spec, shape)
+        manifest = manifests.of_unit(moulds, outputs, check, shape, findings, estimate, list(pictures))
+        manifest["left_out"][:0] = no_pictures
+        return finished(manifest, own, {**shape["files"], **pictures}, store)
 
 
 def finished(manifest: Manifest, own: dict[str, bytes], shared: dict[str, str], store: Store) -> Product:
@@ -170,26 +183,25 @@ def finished(manifest: Manifest, own: dict[str, bytes], shared: dict[str, str], 
 
 def geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Geometry:
     """Return parts, steps, mould findings, mesh findings and files of a set's geometry."""
-    return store.data(
-        build_key(moulds.spec, only, check),
-        lambda: _made(moulds.blank, [name for name in only if name in GEOMETRIC], check, store, progress),
-        intact=lambda there: all(map(store.has, there["files"].values())),
-    )
+    key = build_key(moulds.spec, only, check)
+    with store.entry(key, intact=lambda there: all(map(store.has, there["files"].values()))) as entry:
+        if entry.data is None:
+            entry.data = _made(moulds.blank, [name for name in only if name in GEOMETRIC], check, store, progress)
+    return entry.data
 
 
 def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Geometry:
     progress("plan")
-    table = [begun(planned) for planned in plan(moulds, only, moulds.spec.output.formats)]
-    pours = bool({"moulds", "casting"} & set(only))
+    forms = [form for form in moulds.spec.output.formats if form != "png"]
+    table = [begun(planned) for planned in plan(moulds, only, forms)]
     progress("meshes")
     parts: dict[str, PartRecord] = {}
     for body in (body for group in groups(moulds, only) for body in group.bodies):
-        parts[body.name] = store.data(body_key(moulds, body, "record"), lambda body=body: record(moulds, body))
-        parts[body.name] = {**parts[body.name], "files": {}}
+        with store.entry(body_key(moulds, body, "record")) as entry:
+            if entry.data is None:
+                entry.data = record(moulds, body)
+        parts[body.name] = PartRecord(**{**entry.data, "files": {}})
     made: dict[str, str] = {}
-    findings: list[FindingRecord] = []
-    strained: list[dict[str, Any]] = []
-    meshes: list[MeshFinding] = []
 
     def put(planned: Planned) -> None:
         progress(planned.stage)
@@ -201,27 +213,57 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, prog
     for planned in table:
         if planned not in later:
             put(planned)
-    if check:
-        progress("mould checks")
-        if "moulds" in only:
-            findings = store.data(geometry_key(moulds, "mould checks"), lambda: _dicts(check_geometry(moulds)))
-            strained = store.data(geometry_key(moulds, "strains"), lambda: [asdict(s) for s in strains(moulds)])
-        elif "unit" in only:  # none of the unit's bodies may overlap another
-            findings = store.data(geometry_key(moulds, "overlaps in the unit"), lambda: _dicts(check_unit(moulds)))
-        progress("check")
-        meshes = list(_mesh_findings(moulds, parts, store))
-    for planned in later:  # a helper makes them meanwhile
+    findings, strained = _mould_checks(moulds, only, store, progress) if check else ([], [])
+    meshes = _mesh_checks(moulds, parts, store, progress) if check else []
+    for planned in later:  # the helper makes STEP in the meantime
         put(planned)
+    pours = bool({"moulds", "casting"} & set(only))
     return {
         "label": moulds.plan.label if pours else None,
         "air_ring_mm": round(moulds.dimensions.air_ring, 9),
         "parts": list(parts.values()),
-        "steps": store.data(geometry_key(moulds, "steps"), lambda: _pours(moulds)) if pours else [],
+        "steps": _pours(moulds, store) if pours else [],
         "laws": findings,
         "strains": strained,
         "check": meshes,
         "files": made,
     }
+
+
+def _shaded_pictures(
+    moulds: MouldSet, only: Sequence[str], store: Store, progress: Progress
+) -> tuple[dict[str, str], list[LeftOut]]:
+    """Return the pictures that VTK draws, path to SHA-256, or the reason why this machine can't draw.
+
+    That is not stored, since another try may succeed.
+    """
+    if "png" not in moulds.spec.output.formats:
+        return {}, []
+    progress("pictures")
+    scenes = [planned for planned in plan(moulds.blank, only, ("png",)) if planned.form == "png"]
+    try:
+        return {planned.path: store.file(planned.key(), planned.make) for planned in scenes}, []
+    except NoPicture as error:
+        return {}, [LeftOut(what="pictures", why=str(error))]
+
+
+def _mould_checks(
+    moulds: MouldSet, only: Sequence[str], store: Store, progress: Progress
+) -> tuple[list[FindingRecord], list[dict[str, Any]]]:
+    """Return the findings and strains of the moulds; of a unit without moulds the overlaps of its bodies."""
+    progress("mould checks")
+    if "moulds" not in only and "unit" not in only:
+        return [], []
+    checked = "mould checks" if "moulds" in only else "overlaps in the unit"
+    with store.entry(geometry_key(moulds, checked)) as findings:
+        if findings.data is None:
+            findings.data = _dicts(check_geometry(moulds) if "moulds" in only else check_unit(moulds))
+    if "moulds" not in only:
+        return findings.data, []
+    with store.entry(geometry_key(moulds, "strains")) as strained:
+        if strained.data is None:
+            strained.data = [asdict(strain) for strain in strains(moulds)]
+    return findings.data, strained.data
 
 
 def _dicts(findings: Sequence[Any]) -> list[Any]:
@@ -249,22 +291,27 @@ def _round(value: float, digits: int) -> float:
     return float(f"{value:.{digits}g}") + 0.0
 
 
-def _pours(moulds: MouldSet) -> list[PourRecord]:
-    return [
-        PourRecord(
-            index=step.index,
-            layer=step.name,
-            material="",
-            tools=[piece.name for name in step.tools for piece in moulds.plan.pieces_of(name)],
-            cavity_volume_mm3=_round(sum(c.reached.volume() for c in moulds.cavities if c.step is step), 9),
-            layer_volume_mm3=_round(moulds.solids[step.name].volume(), 9),
-        )
-        for step in moulds.plan.steps
-    ]
+def _pours(moulds: MouldSet, store: Store) -> list[PourRecord]:
+    with store.entry(geometry_key(moulds, "steps")) as entry:
+        if entry.data is None:
+            entry.data = [
+                PourRecord(
+                    index=step.index,
+                    layer=step.name,
+                    material="",
+                    tools=[piece.name for name in step.tools for piece in moulds.plan.pieces_of(name)],
+                    cavity_volume_mm3=_round(sum(c.reached.volume() for c in moulds.cavities if c.step is step), 9),
+                    layer_volume_mm3=_round(moulds.solids[step.name].volume(), 9),
+                )
+                for step in moulds.plan.steps
+            ]
+    return entry.data
 
 
-def _mesh_findings(moulds: MouldSet, parts: dict[str, PartRecord], store: Store) -> Iterator[MeshFinding]:
-    """Yield the findings of the mesh rules in every mesh file."""
+def _mesh_checks(moulds: MouldSet, parts: dict[str, PartRecord], store: Store, progress: Progress) -> list[MeshFinding]:
+    """Return the findings of the mesh rules in every mesh file. Raises Unfinished."""
+    progress("check")
+    found: list[MeshFinding] = []
     listed = {
         file["path"]: (file["sha256"], part["role"])
         for part in parts.values()
@@ -272,19 +319,17 @@ def _mesh_findings(moulds: MouldSet, parts: dict[str, PartRecord], store: Store)
         if form in MESH_FORMATS
     }
     for path, (sha256, role) in listed.items():
-        # A tool's STL is checked against the printer; its 3MF has the same meshes.
+        # unitcad checks a tool's STL against the printer; its 3MF has the same meshes.
         printer = printer_of(moulds.spec) if role == "tool" and path.endswith(".stl") else None
-
-        def findings(path=path, sha256=sha256, printer=printer) -> list[dict[str, Any]]:
-            report = check_bytes(store.content(sha256), Path(path).name, Options(printer=printer))
-            if report.has("F011"):
-                why = next(finding.message for finding in report.findings if finding.code == "F011")
-                raise Unfinished(f"{path}: its check was not finished: {why}")
-            return [finding.as_dict() for finding in report.findings if finding.severity != "info"]
-
-        key = digest(f"{sha256} {printer!r} {code_version()}".encode())
-        for finding in store.data(key, findings):
-            yield MeshFinding(path=path, **finding)
+        with store.entry(digest(f"{sha256} {printer!r} {code_version()}".encode())) as entry:
+            if entry.data is None:
+                report = check_bytes(store.content(sha256), Path(path).name, Options(printer=printer))
+                if report.has("F011"):
+                    why = next(finding.message for finding in report.findings if finding.code == "F011")
+                    raise Unfinished(f"{path}: its check was not finished: {why}")
+                entry.data = [finding.as_dict() for finding in report.findings if finding.severity != "info"]
+        found += [MeshFinding(path=path, **finding) for finding in entry.data]
+    return found
 
 
 def mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
@@ -302,12 +347,14 @@ _MOST_ESTIMATES = 64
 
 def _estimate(spec: Spec, store: Store) -> tuple[dict[str, Any], bytes]:
     """Return the estimate and its file. The layered solver's part reads no silicone: the store shares it."""
-    from unitcad.attenuation.edge.estimates import rounded_layered
-    from unitcad.estimating import estimate_input, estimate_spec
 
-    def layered(asked: EstimateInput) -> dict[str, Any]:
-        reads = (asked.tissue_name, asked.tissue, asked.frequency, asked.diameter, asked.motor_diameter, asked.drive)
-        return store.data(digest(repr((reads, code_version())).encode()), lambda: rounded_layered(asked))
+    def layered(wanted: EstimateInput) -> dict[str, Any]:
+        skin = wanted.tissue_name, wanted.tissue, wanted.frequency
+        load = wanted.diameter, wanted.motor_diameter, wanted.drive
+        with store.entry(digest(repr(((*skin, *load), code_version())).encode())) as entry:
+            if entry.data is None:
+                entry.data = rounded_layered(wanted)
+        return entry.data
 
     reads = estimate_input(spec), spec.estimate
     if reads not in _ESTIMATES:

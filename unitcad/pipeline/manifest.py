@@ -177,6 +177,7 @@ def of_unit(
     shape: Geometry,
     findings: list[FindingRecord],
     estimate: dict[str, Any] | None,
+    pictures: list[str],
 ) -> Manifest:
     """Return a unit's manifest but for its files."""
     spec = moulds.spec
@@ -206,7 +207,7 @@ def of_unit(
         laws=findings,
         estimate=EstimateSummary(**summary(estimate)) if estimate else None,
         check=counted(shape["check"]),
-        pictures=[path for path in shape["files"] if path.endswith(".png") and not path.startswith("steps/")],
+        pictures=pictures,
         casting=sorted(CASTING) if "casting" in only else None,
         left_out=[LeftOut(what=what, why=why) for what, why in _left_out(spec, only, check)],
         versions={"unitcad": __version__, **kernel_versions(spec.output.formats)},

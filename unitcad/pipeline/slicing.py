@@ -40,9 +40,9 @@ def slice_tools(spec: Spec, folder: Path, manifest: Manifest, say: Callable[[str
         for part in manifest["parts"]
         if part["role"] == "tool" and "stl" in part["files"] and part["files"]["stl"]["path"].startswith("moulds/")
     ]
-    with held(folder), slicer.Pieces(printer_of(spec), _earlier(folder / SLICED), say) as pieces:
+    with held(folder):
         try:
-            report = pieces.report({path.name: path.read_bytes() for path in tools})
+            report = slicer.print_report(tools, printer_of(spec), _earlier(folder / SLICED), say)
         except UnitcadError as error:
             return f"not sliced: {error}"
         files.write(folder / SLICED, (json.dumps(report, indent=2) + "\n").encode())
@@ -52,9 +52,9 @@ def slice_tools(spec: Spec, folder: Path, manifest: Manifest, say: Callable[[str
     return f"prints in {hours} h {minutes:02d} min with {report['filament_cm3']:.1f} cm3 ({report['slicer']})"
 
 
-def _earlier(path: Path) -> dict[str, Any] | None:
+def _earlier(path: Path) -> dict[str, Any]:
     try:
         report = files.read_json(path, links=False)
-        return report if all({"file", "sha256"} <= piece.keys() for piece in report["pieces"]) else None
+        return report if all({"file", "sha256"} <= piece.keys() for piece in report["pieces"]) else {}
     except (UnitcadError, KeyError, TypeError, AttributeError):
-        return None
+        return {}

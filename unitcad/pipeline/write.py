@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from unitcad.pipeline.make import Product, Progress, Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
 from unitcad.pipeline.plan import FORMATS, OUTPUTS, checked_outputs, code_version
 from unitcad.spec import Spec, from_json, read_toml
+from unitcad.spec.asked import Format
 from unitcad.validation import from_data
 
 LOCK = re.compile(r"\.[a-z0-9-]+-[0-9a-f]{12}\.lock")
@@ -104,18 +106,11 @@ def build(
     clear_leftovers(out)
     while True:
         there = earlier(folder, wanted)
-        formats = tuple(form for form in FORMATS if form in (*there.formats, *wanted.formats))
+        formats: tuple[Format, ...] = tuple(form for form in FORMATS if form in (*there.formats, *wanted.formats))
         every, checked = checked_outputs((*outputs, *there.outputs)), check or there.checked
         with contextlib.suppress(_Changed):  # another build has put a result there: what it has is made too
-            return write(
-                folder,
-                lambda progress, every=every, checked=checked, formats=formats: wanted.make(
-                    every, checked, store, progress, formats
-                ),
-                store,
-                say,
-                unchanged=lambda there=there: earlier(folder, wanted) == there,
-            )
+            maker = partial(wanted.with_formats(formats).make, every, checked, store)
+            return write(folder, maker, store, say, unchanged=lambda there=there: earlier(folder, wanted) == there)
 
 
 def write(
@@ -153,7 +148,7 @@ def write(
     raise AssertionError
 
 
-def earlier_formats(folder: Path, wanted: Subject, *, ours: bool = False) -> tuple[str, ...]:
+def earlier_formats(folder: Path, wanted: Subject, *, ours: bool = False) -> tuple[Format, ...]:
     """Return the formats that an existing result has. `ours`: it is known to be a result, perhaps damaged since.
 
     Raises UnitcadError for a folder that contains something else: no spec.toml of ours, or another spec.
@@ -182,7 +177,7 @@ def earlier_formats(folder: Path, wanted: Subject, *, ours: bool = False) -> tup
 class Earlier:
     """Content of an existing result, which a later build keeps up: formats, outputs, whether it was checked."""
 
-    formats: tuple[str, ...] = ()
+    formats: tuple[Format, ...] = ()
     outputs: tuple[str, ...] = ()
     checked: bool = False
 
