@@ -247,7 +247,7 @@ def _outcome(
         job.index,
         BROKEN if codes else OK,
         folder,
-        row(spec.of, manifest),
+        row(spec.unit, manifest),
         f"broken: {', '.join(codes)}" if codes else "",
         manifest=sha256,
         built=counts["file built"] + counts["data built"],

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import Any, TypedDict
 
 from unitcad import __version__, catalogue
 from unitcad.attenuation.edge.estimate_summary import summary
@@ -21,9 +21,6 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import OUTPUTS, kernel_versions
 from unitcad.spec import Spec, spec_hash
 from unitcad.validation import warnings
-
-if TYPE_CHECKING:
-    from unitcad.arrays.array import Array
 
 CASTING = ("bom.csv", "casting.json", "casting.md")
 UNCHECKED = "--no-check"
@@ -252,13 +249,16 @@ def counted(findings: list[MeshFinding]) -> MeshFindings:
     return {"errors": count["error"], "warnings": count["warning"], "findings": findings}
 
 
-def row(of: Spec | Array, manifest: Manifest) -> dict[str, Any]:
-    """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and edge level by model."""
-    spec, array = (of, None) if isinstance(of, Spec) else (of.unit, of)
-    densities = catalogue.materials(spec.materials)
-    columns: dict[str, Any] = {"name": of.name, "design": spec.design, "diameter_mm": spec.diameter_mm}
+def row(unit: Spec, manifest: Manifest) -> dict[str, Any]:
+    """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and edge level by model.
+
+    The manifest is that of the unit, or of an array of it.
+    """
+    densities = catalogue.materials(unit.materials)
+    columns: dict[str, Any] = {"name": manifest["name"], "design": unit.design, "diameter_mm": unit.diameter_mm}
+    array: dict[str, Any] = manifest.get("array", {})
     if array:
-        columns |= {"array": array.construction, "units": len(array.places), "pitch_mm": round(array.pitch_mm, 3)}
+        columns |= {"array": array["construction"], "units": len(array["places"]), "pitch_mm": array["pitch_mm"]}
     total = 0.0
     for part in manifest["parts"]:
         # An array's own silicone; its units' parts are named after their folders.

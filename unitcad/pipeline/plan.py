@@ -63,6 +63,8 @@ class Planned:
     form: str = ""
     """The format that asks for it; "" if its output asks for it."""
     bodies: tuple[str, ...] = ()
+    begin: Callable[[], Callable[[], bytes]] | None = None
+    """Begins the work in a helper process; returns a function that waits for the content."""
 
 
 @dataclass(frozen=True)
@@ -280,14 +282,13 @@ def step_file(path: str, moulds: MouldSet, bodies: Sequence[Body], name: str) ->
     """Plan the STEP of an assembly, which reads its date and the B-rep kernels too."""
     reads = "step", name, os.environ.get("SOURCE_DATE_EPOCH"), sorted(kernel_versions(("step",)).items())
     key, names = partial(joint_key, moulds, bodies, *reads), tuple(body.name for body in bodies)
-    return Planned(path, partial(step_content, tuple(bodies), name), key, "step", "step", names)
+    here = partial(step_content, tuple(bodies), name)
+    return Planned(path, here, key, "step", "step", names, partial(step_helper.begin, tuple(bodies), name, here))
 
 
 def begun(planned: Planned) -> Planned:
-    """Return the same file; if it is STEP and its helper runs, it begins now."""
-    if planned.form != "step":
-        return planned
-    return replace(planned, make=step_helper.begin(*planned.make.args, planned.make))  # type: ignore[attr-defined]
+    """Return the same file; if a helper process can make it, that begins now."""
+    return replace(planned, make=planned.begin()) if planned.begin else planned
 
 
 def step_content(bodies: Sequence[Body], name: str) -> bytes:
