@@ -23,7 +23,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import CancelledError, Executor, Future
 from functools import partial
 from typing import IO, Any
 
@@ -69,18 +69,18 @@ class Call(Future[Any]):
         self.worker: _Worker | None = None
 
     def result_or(self, here: Callable[[], Any], *, wait: bool = False) -> Any:
-        """Return the result; call `here` instead if its worker is lost or, without `wait`, if none has begun it."""
+        """Return the result; call `here` instead if it is lost or, without `wait`, if no worker has begun it."""
         if not wait and self.cancel():
             return here()
         try:
             return self.result()
-        except (WorkerEnded, NoWorker):
+        except (WorkerEnded, NoWorker, CancelledError):
             return here()
 
     def stop(self, grace_s: float = 0.0) -> None:
         """Take the call back, or end its worker. With `grace_s`, programs get SIGINT and that time to end."""
-        if not self.cancel() and self.worker and not self.done():
-            self.worker.end("was stopped", grace_s)
+        if not self.cancel() and self.worker:
+            self.worker.end("was stopped", grace_s, self)
 
 
 class Pool(Executor):
@@ -99,15 +99,25 @@ class Pool(Executor):
         prepare: tuple[Any, ...] = (),
     ) -> None:
         self._setup = pickle.dumps((_set_up, (memory, tuple(load), prepare), {}))
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a callback of a cancelled call may submit another one
         self._waiting: deque[Call] = deque()
         self._idle: list[queue.SimpleQueue[Call | None]] = []  # the one used last is used next: its memory is warm
         self._workers: set[_Worker] = set()
         self._closed = False
+        self._lost = 0  # threads that ended, since their workers can't start; the last thread stays, and raises
         self._size = size
-        self._threads = [threading.Thread(target=self._keep_worker, daemon=True) for _ in range(size)]
-        for thread in self._threads:
-            thread.start()
+        self._threads: list[threading.Thread] = []
+        for _ in range(size):
+            thread = threading.Thread(target=self._keep_worker, daemon=True)
+            try:
+                thread.start()
+            except RuntimeError as error:  # no memory for a thread
+                if not self._threads:
+                    raise NoWorker(f"a worker process cannot start: {error}") from None
+                with self._lock:
+                    self._lost += size - len(self._threads)
+                break
+            self._threads.append(thread)
 
     def submit(
         self,
@@ -155,25 +165,27 @@ class Pool(Executor):
         """Hand calls to a worker, and start another one when it ends. A worker ends with the thread that started it."""
         inbox: queue.SimpleQueue[Call | None] = queue.SimpleQueue()
         worker: _Worker | None = None
-        answered = None
+        answered: Callable[[], object] = int  # does nothing
         while True:
-            failure = None
+            failure, surplus, call = None, False, None
             if worker is None or worker.ended:
                 worker, failure = self._replace(worker)
             with self._lock:
-                if failure and self._size > 1:  # the other workers do without this one
-                    self._size -= 1
-                    return
-                call = self._waiting.popleft() if self._waiting and not self._closed else None
-                if call is None and not self._closed:
-                    self._idle.append(inbox)
-            if answered:  # only now: who then calls again gets this worker again
-                answered()
-            if call is None and (self._closed or (call := inbox.get()) is None):
+                if failure and self._lost < self._size - 1:  # the other workers do without this one
+                    self._lost, surplus = self._lost + 1, True
+                elif not self._closed:
+                    call = self._waiting.popleft() if self._waiting else None
+                    if call is None:
+                        self._idle.append(inbox)
+            answered()  # only now: a caller that calls again gets this worker again
+            answered = int
+            if surplus or (call is None and (self._closed or (call := inbox.get()) is None)):
                 break
             if worker is None or worker.ended:  # it ended while it was idle
                 worker, failure = self._replace(worker)
-            call.worker, answered = worker, None
+            call.worker = worker
+            if worker:
+                worker.call = call
             if not call.set_running_or_notify_cancel():
                 continue
             try:
@@ -220,40 +232,54 @@ class _Worker:
             [sys.executable, "-P", "-c", code],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=quiet, start_new_session=True,
         )  # fmt: skip
+        self.call: Call | None = None
+        """The call that it answers, or will answer next."""
+        self._lock = threading.RLock()
         self._why = ""
+        self._gone = False
 
     @property
     def ended(self) -> bool:
         return bool(self._why) or self.process.poll() is not None
 
     def answer(self, call: Call) -> Any:
-        timer = threading.Timer(call.seconds or 0, self.end, (f"timed out after {call.seconds or 0:g} s",))
-        if call.seconds is not None:
-            timer.start()
+        """Return the result of a call. Raises what its function raises, or WorkerEnded."""
+        self.call = call
+        timer = _timer(call.seconds or 0, self.end, f"timed out after {call.seconds or 0:g} s", 0.0, call)
+        whole = False
         try:
+            if call.seconds is not None:
+                timer.start()
             assert self.process.stdin
             _send(self.process.stdin, call.request)
             while (message := self._message())[0] == "told":
                 call.heard(message[1])
+            whole = True
         except (OSError, EOFError, pickle.UnpicklingError):
             raise self.cause() from None
         finally:
             timer.cancel()
+            with self._lock:
+                self.call = None
+                if not whole:  # the rest of its answer would be taken for that of the next call
+                    self.end("was stopped")
         returned, value = message
         if returned == "raised":
             if isinstance(value, MemoryError):
-                self.end("is out of memory")  # what it holds is lost to it
+                self.end("is out of memory")  # memory that its objects hold is not free for the next call
             raise value
         return value
 
-    def end(self, why: str, grace_s: float = 0.0) -> None:
-        """End the worker and all that it started."""
-        self._why = self._why or why
-        if grace_s and _POSIX:
-            threading.Timer(grace_s, self.end, (why,)).start()
-        if self.process.returncode is None:
+    def end(self, why: str, grace_s: float = 0.0, call: Call | None = None) -> None:
+        """End the worker and all that it started. With `call`, only if it still answers that one."""
+        with self._lock:
+            if self._gone or (call and self.call is not call):
+                return
+            self._why = self._why or why
+            if grace_s and _POSIX:
+                _timer(grace_s, self.end, why).start()
             with contextlib.suppress(OSError):
-                if _POSIX:
+                if _POSIX:  # the group outlives its first process
                     os.killpg(self.process.pid, signal.SIGINT if grace_s else signal.SIGKILL)
                 else:
                     self.process.kill()
@@ -263,6 +289,7 @@ class _Worker:
         why = self._why
         self.end(why or "ended")
         code = self.process.wait()
+        self._gone = True  # another process may get its number from now on
         for pipe in (self.process.stdin, self.process.stdout):
             with contextlib.suppress(OSError):
                 pipe.close()  # type: ignore[union-attr]
@@ -278,6 +305,12 @@ class _Worker:
             self._why = "timed out"
             raise EOFError
         return pickle.loads(_exactly(self.process.stdout, int.from_bytes(head, "little")))
+
+
+def _timer(seconds: float, function: Callable[..., object], *args: object) -> threading.Timer:
+    timer = threading.Timer(seconds, function, args)
+    timer.daemon = True
+    return timer
 
 
 def limit_memory(size: int | None) -> int | None:
