@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from unitcad.casting.pouring import GREASE, HOLD, LEVEL_AGAIN, TACK
+from unitcad.casting.pouring import LEVEL_AGAIN, TACK
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import BenchStep
 from unitcad.text import spaced
@@ -81,7 +81,7 @@ def _degassing(procedure: Procedure) -> Iterator[str]:
 def _held(procedure: Procedure) -> Iterator[str]:
     """Hold an open cup down before it is struck off, and pull the tongue before a cup is lifted."""
     for pour in procedure.pours:
-        strike, hold = _first(pour.steps, "Strike off"), _first(pour.steps, f"{HOLD} cup {pour.index} down")
+        strike, hold = _first(pour.steps, "Strike off"), _first(pour.steps, f"Hold cup {pour.index} down")
         cups = any(step.title == f"Cup {pour.index} on" for step in pour.steps)
         if cups and strike is not None and (hold is None or hold > strike):
             yield f"pour {pour.index}: nothing holds the cup down while it is struck off"
@@ -95,9 +95,9 @@ def _greased(procedure: Procedure) -> Iterator[str]:
     for pour in procedure.pours:
         titles = [step.title for step in pour.steps]
         on = f"Cup {pour.index} on"
-        if GREASE in titles:
-            text = pour.steps[titles.index(GREASE)].text
-            if titles.index(GREASE) > titles.index(on):
+        if "Grease the flanks" in titles:
+            text = pour.steps[titles.index("Grease the flanks")].text
+            if titles.index("Grease the flanks") > titles.index(on):
                 yield f"pour {pour.index}: greases what the cup already hides"
             if "petroleum jelly" not in text or "face" not in text:
                 yield f"pour {pour.index}: does not say what to grease with, or which faces"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import asdict
 from itertools import pairwise
 
 import pytest
@@ -12,7 +13,6 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.casting.drawings import HELD, TAPE_WIDTH, side_places, tape_places
-from unitcad.casting.pouring import GREASE
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import pour_warnings
 from unitcad.casting.written import to_markdown
@@ -75,7 +75,7 @@ def test_the_words_name_marks_faces_and_lengths_of_this_set(made: Procedure) -> 
     """Layer 1 is 5.5 mm in radius, the unit 7, a fin ends 1.2 mm outside it; the plate under 2.11 mm of core is 4."""
     sort = made.preparation[0].text
     assert f"b{seen(made.label)} on the base" in sort
-    greased = [next(step.text for step in pour.steps if step.title == GREASE) for pour in made.pours]
+    greased = [next(step.text for step in pour.steps if step.title == "Grease the flanks") for pour in made.pours]
     unit = load_array("forearm-patch").unit
     reach, walls = unit.diameter_mm / 2 + 1.2, [layer.wall_mm for layer in unit.layers]
     inner = unit.diameter_mm / 2 - walls[1]
@@ -136,7 +136,7 @@ def test_a_pour_that_outlasts_its_pot_life_is_warned_of() -> None:
     for array, late in ((large, True), (load_array("forearm-patch"), False)):
         moulds = patch_moulds(array)
         pours = back_sheet_procedure(moulds, [100.0] * 2, 1000.0).pours
-        warned = list(pour_warnings((f"pour {pour.index}", pour.verdict) for pour in pours))
+        warned = list(pour_warnings([asdict(pour) for pour in pours]))
         assert [line.split(" in pour")[0] for line in warned] == ["mixing and pouring outlast the pot life"] * late
 
 

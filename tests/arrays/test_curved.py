@@ -16,7 +16,6 @@ from unitcad.arrays.circuit.outline import circuit_body
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.casting.figures import RESIN_LAYER_S
-from unitcad.casting.pouring import GREASE
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.views import views
 from unitcad.check import Options, check_bytes
@@ -310,7 +309,7 @@ def test_the_pages_3d_view_lists_motors_and_circuit_once() -> None:
 
 def test_fins_of_the_flat_base_are_greased_and_the_curved_base_is_levelled_under_its_lid(made: Procedure) -> None:
     """A fin ends 1.2 mm outside its unit; from the wall of the outer layer on it lies in the slot of cup 1."""
-    grease = next(step for step in made.pours[0].steps if step.title == GREASE)
+    grease = next(step for step in made.pours[0].steps if step.title == "Grease the flanks")
     outer = sleeve().arranged.unit.layers[-1].wall_mm
     (length,) = re.findall(r"outermost ([0-9.]+) mm", grease.text)
     assert float(length) == pytest.approx(outer + 1.2)

@@ -12,7 +12,7 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.casting.pouring import GREASE, LEVEL_AGAIN, TACK
+from unitcad.casting.pouring import LEVEL_AGAIN, TACK
 from unitcad.casting.procedure import Pour, Procedure, procedure
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load, templates
@@ -153,8 +153,8 @@ def greased_too_late(made: Procedure) -> Procedure:
     """The order that a cup already on its base makes impossible."""
 
     def change(pour: Pour) -> Pour:
-        grease = [step for step in pour.steps if step.title == GREASE]
-        rest = [step for step in pour.steps if step.title != GREASE]
+        grease = [step for step in pour.steps if step.title == "Grease the flanks"]
+        rest = [step for step in pour.steps if step.title != "Grease the flanks"]
         on = next(i for i, step in enumerate(rest) if step.title == f"Cup {pour.index} on")
         return replace(pour, steps=(*rest[: on + 1], *grease, *rest[on + 1 :]))
 

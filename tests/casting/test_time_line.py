@@ -19,7 +19,7 @@ def casting(*source: str) -> Procedure:
 
 def test_a_cure_ends_a_phase_and_a_rest_does_not() -> None:
     steps = [
-        BenchStep("a", "", minutes=3),
+        BenchStep("a", "", kind="pour", minutes=3),
         BenchStep("b", "", kind="rest", minutes=1, wait_min=9),
         BenchStep("c", "", kind="cure", wait_min=60),
         BenchStep("d", "", minutes=2),

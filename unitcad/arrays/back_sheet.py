@@ -120,7 +120,7 @@ def assembly(array: Array) -> tuple[Fitting, ...]:
         "from the skin's side, motor by motor, its rows in the notches, and push each motor in until its pad lies "
         "against that cap. The spine lies free between the units. The notches may be filled with the same silicone."
     )
-    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, silicone=1, smear=True)
+    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, silicone=1, mixed="smear")
 
 
 CONSTRUCTION = Construction(

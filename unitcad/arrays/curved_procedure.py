@@ -24,6 +24,7 @@ from unitcad.casting.figures import (
 from unitcad.casting.pouring import (
     BondFace,
     Face,
+    after_pours,
     cure,
     injected,
     lid_held,
@@ -31,7 +32,6 @@ from unitcad.casting.pouring import (
     motor_in,
     never_pushed,
     pour_steps,
-    smears,
 )
 from unitcad.casting.pouring import release as flat_release
 from unitcad.casting.pouring import shown as grams_shown
@@ -269,7 +269,7 @@ def _measure(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
 def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchStep]) -> Iterator[Item]:
     """Yield the bill of the whole set, its filaments told apart: bent ones, and straight ones."""
     places = len(moulds.arranged.places)
-    for item in bill(moulds, batches, steps, smears(moulds, [batch.silicone for batch in batches])):
+    for item in bill(moulds, batches, steps, after_pours(moulds, [batch.silicone for batch in batches])):
         if item.item == "filament stub":
             size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
             yield replace(item, quantity=item.quantity - places)

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.casting.drawings import grip_of, side_places, tape_places, tongue_prop
-from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Batch
+from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch
 from unitcad.casting.steps import NEEDS, BenchStep
-from unitcad.catalogue import Material, motors
+from unitcad.catalogue import motors
 from unitcad.export.threemf import layout
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
@@ -32,26 +32,25 @@ class Item:
 
 
 def bill(
-    moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], smears: Sequence[Material] = ()
+    moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], after: Sequence[AfterPours] = ()
 ) -> tuple[Item, ...]:
     """List pieces, silicone, motor, circuit or wires, tools and consumables.
 
-    Silicone is every pour's mix, and the least batch for each of `smears`, which are mixed after the pours.
+    Silicone is every pour's mix, and the batches mixed `after` the pours.
     """
     items = [*_pieces(moulds)]
-    least_g = moulds.spec.casting.minimum_mix_g
-    for material in dict.fromkeys([*(batch.silicone for batch in batches), *smears]):
+    for material in dict.fromkeys([*(batch.silicone for batch in batches), *(more.silicone for more in after)]):
         own = [batch.mix for batch in batches if batch.silicone == material]
-        ratio, smeared = float(material.mix_ratio), smears.count(material) * least_g
+        ratio, later = float(material.mix_ratio), [more for more in after if more.silicone == material]
         uses = [f"{len(own)} pour{'' if len(own) == 1 else 's'}"] if own else []
-        uses += [f"{number(smeared, 3)} g for the smear"] if smeared else []
+        uses += [f"{number(more.grams, 3)} g for the {more.use}" for more in later]
         note = f"{' and '.join(uses)}, mix ratio {number(ratio, 3)} A to 1 B, Shore {material.shore.value}"
-        part_b = smeared / (1 + ratio)
+        part_b = sum(more.grams for more in later) / (1 + ratio)
         part_a, part_b = sum(m.part_a_g for m in own) + ratio * part_b, sum(m.part_b_g for m in own) + part_b
         items += [
             Item(f"{material.name} part {part}", g, "g", "bought", note) for part, g in (("A", part_a), ("B", part_b))
         ]
-    return (*items, *_inside(moulds), *consumed(moulds, batches, steps, len(smears)))
+    return (*items, *_inside(moulds), *consumed(moulds, batches, steps, len(after)))
 
 
 def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
@@ -121,10 +120,10 @@ def injecting(batches: Sequence[Batch]) -> Iterator[Item]:
     yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
 
 
-def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], smears: int = 0) -> Iterator[Item]:
-    """List what pours and steps take; `smears`: mixes beside pours."""
+def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], after: int = 0) -> Iterator[Item]:
+    """List what pours and steps take; `after`: mixes after the pours."""
     pours, cups = len(moulds.plan.steps), moulds.plan.of_kind("cup")
-    yield Item("mixing cups and sticks", pours + smears, "set", "bought", "no latex, no sulphur clay: they inhibit")
+    yield Item("mixing cups and sticks", pours + after, "set", "bought", "no latex, no sulphur clay: they inhibit")
     yield Item("gloves", pours, "pair", "bought", "nitrile or vinyl; latex inhibits")
     yield Item("scale", 1, "piece", "tool", f"shows {number(moulds.spec.casting.scale_resolution_g, 3)} g")
     if cups:

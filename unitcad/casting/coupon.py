@@ -142,9 +142,8 @@ class Coupon:
         lines = [
             f"# Fit coupon for {name}",
             "",
-            f"Print {'plate and plug' if self.resin else 'plate, plug and tongue'} as they lie. At every feature choose "
-            "one of the five stations and put its line",
-            "into your spec. Station 3 is the catalogue's value.",
+            f"Print {'plate and plug' if self.resin else 'plate, plug and tongue'} as they lie. At every feature",
+            "choose one of the five stations and put its line into your spec. Station 3 is the catalogue's value.",
             "",
         ]
         if self.resin:
@@ -164,8 +163,8 @@ class Coupon:
             lines += [
                 "",
                 f"Ribs: press the plug into each station until its handle lies on the boss; {once}.",
-                "Then measure across handle and boss together, along x and along y. What exceeds the handle alone is how",
-                f"far the plug stands off the middle; without ribs up to {number(self.clearance, 3)} mm.",
+                "Then measure across handle and boss together, along x and along y. What exceeds the handle alone is",
+                f"how far the plug stands off the middle; without ribs up to {number(self.clearance, 3)} mm.",
             ]
         heights = [number(high - low, 3) for low, high in self.windows]
         every = f"{', '.join(heights)} mm from 1 to 5" if len({*heights}) > 1 else f"{heights[0]} mm at every station"

@@ -9,7 +9,6 @@ from itertools import product
 
 import numpy as np
 
-from unitcad.casting.steps import LATE, STAY
 from unitcad.catalogue import Material, Value
 from unitcad.designs.limits import filament_groove
 from unitcad.designs.rib_leaves import leaf_mm
@@ -179,6 +178,15 @@ def wall_range(spec: Spec, layer: int, off_axis_mm: float) -> tuple[float, float
 
 
 @dataclass(frozen=True)
+class AfterPours:
+    """Silicone that is mixed after the pours to hold motors: `use` is "smear" or "ring", `grams` both parts."""
+
+    silicone: Material
+    use: str
+    grams: float
+
+
+@dataclass(frozen=True)
 class Batch:
     """The silicone of one pour: `volume_mm3` is that of what it casts, `cells` how many units it is poured for."""
 
@@ -229,18 +237,27 @@ class Batch:
         return min(self.rise_min, allowed) if injected or self.rise_min <= allowed else 0.0
 
     @property
+    def bubbles_stay(self) -> bool:
+        """Whether bubbles do not rise out by themselves in a quarter of the pot life, and no vacuum draws them out."""
+        return not self.vacuum and self.rise_min > WITHOUT_VACUUM * self.pot_min
+
+    @property
+    def over_pot_life_min(self) -> float:
+        """The time of mixing and pouring beyond the pot life; 0 if it is long enough."""
+        bubbles = DEGASSING_MIN if self.vacuum else self.rest_min
+        return max(MIXING_MIN + pouring_min(self.cells) + bubbles - self.pot_min, 0.0)
+
+    @property
     def verdict(self) -> str:
         """How bubbles leave: in the vacuum, or by themselves, for which a quarter of the pot life is allowed."""
-        work, lid = MIXING_MIN + pouring_min(self.cells), self.step.lid
+        lid = self.step.lid
         if self.vacuum:
-            work += DEGASSING_MIN
             said = (
                 f"Degas for {number(DEGASSING_MIN, 3)} min (assumed) at {number(VACUUM_INHG, 3)} inHg, in a "
                 f"container of at least {number(CONTAINER * self.mix.millilitres, 2)} ml: the silicone foams up and "
                 "falls back, then single bubbles rise. Let the air in slowly."
             )
         else:
-            work += self.rest_min
             allowed = WITHOUT_VACUUM * self.pot_min
             said = (
                 f"No vacuum (casting.vacuum): a bubble of {number(BUBBLE_MM, 3)} mm takes {number(self.rise_min, 2)} "
@@ -252,13 +269,14 @@ class Batch:
             brush = "brush a thin coat of the mix now onto all that it will touch, then pour in a thread from one side"
             stand = f"{where} for {number(allowed, 2)} min, push out the air, and inject slowly"
             said += (
-                f"Such bubbles should rise out: {where} for {number(self.rise_min, 2)} min."
-                if self.rise_min <= allowed
-                else f"{STAY}: get a vacuum, or {stand if lid else brush}."
+                f"Such bubbles stay: get a vacuum, or {stand if lid else brush}."
+                if self.bubbles_stay
+                else f"Such bubbles should rise out: {where} for {number(self.rise_min, 2)} min."
             )
-        over = number(work - self.pot_min, 2)
-        late = f" {LATE} {over} min after the pot life: cool the room, or take a slower silicone."
-        return f"{said}{late if work > self.pot_min else ''}"
+        if not self.over_pot_life_min:
+            return said
+        over = number(self.over_pot_life_min, 2)
+        return f"{said} All this ends {over} min after the pot life: cool the room, or take a slower silicone."
 
     @property
     def figures(self) -> tuple[Figure, ...]:

@@ -19,6 +19,7 @@ from unitcad.casting.figures import (
     STRIKE_AGAIN_MIN,
     STRIKE_MIN,
     WEIGH_MIN,
+    AfterPours,
     Batch,
     at_room,
     eccentricity,
@@ -37,15 +38,11 @@ from unitcad.moulds.ribs import ribs
 from unitcad.spec import Spec
 from unitcad.text import listed, number, spaced
 
-GREASE = "Grease the flanks"
-"""The step that seals slits beside the cavity before the cup hides them."""
 TACK = (
     "it is done when a gloved fingertip, pressed on lightly and lifted, comes off without a pull and without a trace, "
     "and the dent of a fingernail springs back. If it still pulls or draws threads, wait half an hour and try again"
 )
 """How to tell cured silicone from tacky silicone."""
-HOLD = "Hold"
-"""How the step begins that keeps an open cup on its base under the blade."""
 LEVEL_AGAIN = (
     "What runs under the plate may tilt it: look at the level once more, and put paper under until it is right."
 )
@@ -137,7 +134,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         )
     if flanks := moulds.greased(step):
         yield BenchStep(
-            GREASE,
+            "Grease the flanks",
             f"Before cup {n} goes on, smear petroleum jelly thinly on {flanks}. A film that shines, no beads: "
             "it keeps silicone out of the slits beside the cup's slots. Wipe off what lies elsewhere.",
             picture("grease"),
@@ -306,7 +303,7 @@ def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
             )
     return BenchStep(
         f"Hold cup {cup} down",
-        f"{HOLD} cup {cup} down while it is struck off: on each of the two sides "
+        f"Hold cup {cup} down while it is struck off: on each of the two sides "
         f"{'where the filaments come out' if split else 'without a pry slot'} run "
         f"{strips} from the cup's wall, below the rim, round the plate's edge to its underside, beside the "
         f"filament where there is one{where}.{pieces} Clamps or weights do as well where they leave the rim "
@@ -320,9 +317,8 @@ def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
 def lid_held(step: Step, picture: str) -> BenchStep:
     """Say how a lid is held down while silicone is injected."""
     return BenchStep(
-        f"{HOLD} lid {step.index} down",
-        f"{HOLD} it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. "
-        f"{LEVEL_AGAIN}",
+        f"Hold lid {step.index} down",
+        f"Hold it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. {LEVEL_AGAIN}",
         picture,
         minutes=2.0,
         needs=("paper",),
@@ -541,26 +537,36 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         path, minutes = picture_path("motor-home" if i else "motor-in"), LAY_IN_MIN * len(moulds.plan.layout.cells)
         yield BenchStep(title, fitting.text, path, minutes=minutes, needs=fitting.needs)
     named = {fitting.silicone for fitting in fittings if fitting.silicone}
+    ring = any(fitting.mixed == "ring" for fitting in fittings)
     cures = {
         each.name: at_room(float(each.cure_h), casting.room_c) for each in _by_layer(silicones, named) or silicones
     }
     hours = ", ".join(f"{name} {number(hour, 2)} h" for name, hour in cures.items())
     mouth, motor = ("cavity's mouth", "motor") if moulds.makes == "unit" else ("cavities' mouths", "motors")
+    least = f"mixed like any batch ({number(casting.minimum_mix_g, 3)} g at least)"
+    smeared = f"A smear of silicone is {least} and spread as thin as butter."
+    mixed = f"The silicone of a ring is {least}." if ring else smeared
     yield BenchStep(
-        "Let the smear cure",
-        f"A smear of silicone is mixed like any batch ({number(casting.minimum_mix_g, 3)} g at least) and "
-        f"spread as thin as butter. It needs its whole cure ({hours}): lay the {moulds.makes} down with the {mouth} "
-        f"up, level, and don't run the {motor} before. Without a smear there is nothing to wait for.",
+        "Let the ring cure" if ring else "Let the smear cure",
+        f"{mixed} It needs its whole cure ({hours}): lay the {moulds.makes} down with the {mouth} up, level, and don't "
+        f"run the {motor} before.{'' if ring else ' Without a smear there is nothing to wait for.'}",
         picture_path("motor-home"),
         kind="cure",
         wait_min=60 * max(cures.values()),
     )
 
 
-def smears(moulds: MouldSet, silicones: Sequence[Material]) -> list[Material]:
-    """Return the silicones of the smears that hold motors, one batch each."""
-    named = () if moulds.design.laid_in else {fitting.silicone for fitting in assembly(moulds) if fitting.smear}
-    return _by_layer(silicones, named)
+def after_pours(moulds: MouldSet, silicones: Sequence[Material]) -> list[AfterPours]:
+    """Return the silicones that are mixed after the pours to hold the motors, one batch each."""
+    cells, casting = len(moulds.plan.layout.cells), moulds.spec.casting
+    found: dict[Material, AfterPours] = {}
+    for fitting in () if moulds.design.laid_in else assembly(moulds):
+        if fitting.mixed:
+            (material,) = _by_layer(silicones, [fitting.silicone])
+            net = cells * fitting.volume_mm3 * float(material.density_g_cm3) / 1000
+            grams = max(net * (1 + casting.waste), casting.minimum_mix_g)
+            found.setdefault(material, AfterPours(material, fitting.mixed, grams))
+    return list(found.values())
 
 
 def _by_layer(silicones: Sequence[Material], layers: Iterable[int]) -> list[Material]:
@@ -592,7 +598,7 @@ def assembly(moulds: MouldSet) -> tuple[Fitting, ...]:
             "A smear of Layer 1's silicone holds it (assumed: silicone bonds poorly to bare metal and polyimide). The "
             "design's file says nothing more of the assembly; a Design with an assembly of its own can.",
             silicone=1,
-            smear=True,
+            mixed="smear",
         ),
     )
 

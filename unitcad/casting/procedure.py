@@ -23,13 +23,13 @@ from unitcad.casting.figures import (
 from unitcad.casting.pouring import (
     BondFace,
     Face,
+    after_pours,
     agent_faces,
     bond_faces,
     measurements,
     motor_in,
     pour_steps,
     release,
-    smears,
 )
 from unitcad.casting.preparation import preparation, printing, tunnels
 from unitcad.casting.steps import BenchStep, Phase, phases
@@ -50,6 +50,8 @@ class Pour:
     material: str
     figures: tuple[Figure, ...]
     verdict: str
+    bubbles_stay: bool
+    over_pot_life_min: float
     agent: tuple[Face, ...]
     degassing_min: float
     part_a_g: float
@@ -108,6 +110,8 @@ def pour_of(batch: Batch, steps: Iterable[BenchStep], agent: Sequence[Face] = ()
         material=batch.silicone.name,
         figures=batch.figures,
         verdict=batch.verdict,
+        bubbles_stay=batch.bubbles_stay,
+        over_pot_life_min=batch.over_pot_life_min,
         agent=tuple(agent),
         degassing_min=DEGASSING_MIN if batch.vacuum else 0.0,
         part_a_g=batch.mix.part_a_g,
@@ -159,7 +163,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         without_ribs=eccentricity(moulds, with_ribs=False),
         walls=walls(moulds) if plan.concentric else (),
         makes=moulds.makes,
-        bill=bill(moulds, batches, every, smears(moulds, silicones)),
+        bill=bill(moulds, batches, every, after_pours(moulds, silicones)),
     )
 
 

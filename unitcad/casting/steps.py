@@ -9,9 +9,6 @@ from typing import Any, Literal
 
 from unitcad.text import listed, number
 
-STAY, LATE = "Such bubbles stay", "All this ends"
-"""How a pour's verdict begins to say that bubbles do not rise out, and that the pot life is over before the end."""
-
 
 @dataclass(frozen=True)
 class BenchStep:
@@ -89,7 +86,7 @@ def phases(stages: Iterable[tuple[str, Sequence[BenchStep]]]) -> tuple[Phase, ..
             bench, wait = bench + step.minutes, wait + step.wait_min
             if step.kind == "cure" or i == len(steps):
                 found.append(Phase(label, clock, bench, wait))
-                label = f"{name}: {'open' if name.startswith('pour') else 'go on'}"
+                label = f"{name}: {'open' if any(step.kind == 'pour' for step in steps) else 'go on'}"
                 clock, bench, wait = clock + bench + wait, 0.0, 0.0
     return tuple(found)
 
@@ -117,16 +114,15 @@ def in_short(procedure: Mapping[str, Any]) -> Iterator[str]:
     count = f"{len(pours)} pour{'s' if len(pours) > 1 else ''}"
     yield f"{count}, ready {total} after the print, of which {bench} at the bench"
     yield "to mix: " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams.items())
-    verdicts = [(f"pour {pour['index']} ({pour['material']})", pour["verdict"]) for pour in pours]
-    yield from (f"warning: {line}" for line in pour_warnings(verdicts))
+    yield from (f"warning: {line}" for line in pour_warnings(pours))
 
 
-def pour_warnings(verdicts: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """Yield what goes wrong in pours, by their names and verdicts: bubbles that stay, a pot life that is too short."""
-    pours = list(verdicts)
-    for words, wrong in (
-        (STAY, "without a vacuum bubbles stay in"),
-        (LATE, "mixing and pouring outlast the pot life in"),
+def pour_warnings(pours: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the faults of pours, as casting.json has them: bubbles that stay, a pot life that is too short."""
+    for wrong, words in (
+        ([pour for pour in pours if pour["bubbles_stay"]], "without a vacuum bubbles stay in"),
+        ([pour for pour in pours if pour["over_pot_life_min"] > 0], "mixing and pouring outlast the pot life in"),
     ):
-        if named := [name for name, verdict in pours if words in verdict]:
-            yield f"{wrong} {listed(named)}; casting.md says what to do"
+        if wrong:
+            named = listed([f"pour {pour['index']} ({pour['material']})" for pour in wrong])
+            yield f"{words} {named}; casting.md says what to do"

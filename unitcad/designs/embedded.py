@@ -7,6 +7,8 @@
 
 from __future__ import annotations
 
+import math
+
 from unitcad import catalogue
 from unitcad.designs import limits
 from unitcad.designs.design import Design, Fitting, Reason
@@ -97,7 +99,7 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
             "bond the pad with a thin smear of the last layer's silicone (assumed); it is that bond which holds the "
             f"motor.{hold}"
         )
-        return [Fitting(text, ("soldering iron and solder",), silicone=-1, smear=True)]
+        return [Fitting(text, ("soldering iron and solder",), silicone=-1, mixed="smear")]
     text = "Push the motor in from the skin's side."
     if spec.wires:
         text = "Push the motor into the ring from above, the wires lying in the notch."
@@ -109,7 +111,8 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
         f"{number(dims.air_ring, 3)} mm round it with Layer 1's silicone or a silicone adhesive (assumed). "
         "motor.fill = true draws Layer 1 up to the motor instead."
     )
-    return [*steps, Fitting(ring, silicone=1)]
+    volume = math.pi * (dims.cavity_radius**2 - dims.motor_radius**2) * dims.motor_height
+    return [*steps, Fitting(ring, ("petroleum jelly",), silicone=1, mixed="ring", volume_mm3=volume)]
 
 
 def left_out(spec: Spec) -> list[Reason]:

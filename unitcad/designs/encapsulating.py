@@ -145,7 +145,7 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
         "(assumed: silicone bonds poorly to bare metal and polyimide; a primer or a silicone adhesive holds better). "
         f"Push {moved_in} in from the skin's side until {back} lies against that cap. {motor_hold(spec, dims)}"
     )
-    return [*steps, Fitting(smear, silicone=1, smear=True)]
+    return [*steps, Fitting(smear, silicone=1, mixed="smear")]
 
 
 DESIGN = Design(

@@ -138,7 +138,7 @@ class Arrayed(Subject):
             shared |= _step_pictures(moulds, store)
             made = _procedure(moulds, shape, units)
             own |= {path: text.encode() for path, text in written(made).items()}
-            warned += pour_warnings((f"pour {pour.index} ({pour.material})", pour.verdict) for pour in made.pours)
+            warned += pour_warnings([asdict(pour) for pour in made.pours])
         progress("circuit and crosstalk")
         more, lacking = extras(array, only)
         own |= more

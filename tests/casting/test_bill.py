@@ -1,0 +1,89 @@
+"""The bill: everything that a step takes, and the number of every piece."""
+
+from __future__ import annotations
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.casting.pictures import BenchPictures
+from unitcad.casting.procedure import Procedure, procedure
+from unitcad.catalogue import materials
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.validation import load
+
+LOOSE = ("no-fpcb", "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]", "motor.fill=false")
+
+
+def moulds_of(*source: str) -> MouldSet:
+    return MouldSet(load(source[0], list(source[1:])))
+
+
+def casting(*source: str) -> Procedure:
+    moulds = moulds_of(*source)
+    return procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
+
+
+def quantities(made: Procedure) -> dict[str, float]:
+    return {item.item: item.quantity for item in made.bill}
+
+
+@pytest.mark.parametrize("cells", [1, 6])
+def test_the_silicone_of_a_filled_ring_is_bought(cells: int) -> None:
+    """Its volume is the difference of two drawn units: Layer 1 up to the motor, and with a ring of air."""
+    gang = f"moulds.cavities=[1,{cells}]"
+    drawn = [MouldSet(load(LOOSE[0], [*LOOSE[1:3], f"motor.fill={fill}"])) for fill in ("true", "false")]
+    filled, loose = (moulds.mesh(moulds.unit[0]).volume() for moulds in drawn)
+    bought = quantities(casting(*LOOSE, gang, "casting.minimum_mix_g=0.1"))
+    of_pour = sum(pour.part_a_g for pour in casting(*LOOSE, gang, "casting.minimum_mix_g=0.1").pours)
+    grams = cells * (filled - loose) / 1000 * float(materials()["ecoflex-00-10"].density_g_cm3)
+    waste = 1 + load("no-fpcb").casting.waste
+    ring = max(grams * waste, 0.1)
+    assert bought["ecoflex-00-10 part A"] - of_pour == pytest.approx(ring / 2, rel=1e-4)
+    assert bought["petroleum jelly"] == 1
+    assert bought["mixing cups and sticks"] == 2
+
+
+def test_a_ring_s_silicone_cures_and_is_no_smear() -> None:
+    made = casting(*LOOSE)
+    (cure,) = (step for step in made.assembly if step.kind == "cure")
+    assert cure.title == "Let the ring cure"
+    assert "smear" not in " ".join(step.text for step in made.assembly)
+    assert cure.wait_min == 60 * made.pours[0].cure_h
+
+
+def test_a_pin_for_bubbles_is_bought_for_an_open_pour_only() -> None:
+    """A base that has pins of its own does not need one."""
+    assert "pin" in quantities(casting("encapsulating"))
+    assert "pin" not in quantities(casting("encapsulating", "moulds.pour=injected"))
+    moulds = patch_moulds(load_array("forearm-patch"))
+    made = back_sheet_procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
+    (cups_on,) = (step for step in made.preparation if "one pin stands off" in step.text)
+    assert "pin" not in cups_on.needs
+
+
+def test_pictures_and_bill_count_pieces() -> None:
+    gang = ("encapsulating", "moulds.cavities=[2,3]")
+    assert quantities(casting(*gang))["filament stub"] == 6
+    bench = BenchPictures(moulds_of(*gang))
+    bench.picture("pieces")
+    assert {"6 filaments", "6 tongues"} <= {name.text for name in bench.written}
+
+
+@pytest.mark.parametrize(
+    ("change", "stays", "late"),
+    [
+        ((), False, False),
+        (("casting.vacuum=false", "layers.0.material=ecoflex-00-30"), False, False),
+        (("casting.vacuum=false",), True, False),
+        (("casting.room_c=43",), False, True),
+    ],
+)
+def test_a_pour_s_faults_are_data_and_its_words_agree(change: tuple[str, ...], stays: bool, late: bool) -> None:
+    pours = casting("encapsulating", *change).pours
+    for pour in pours:
+        assert pour.bubbles_stay == ("bubbles stay" in pour.verdict)
+        assert (pour.over_pot_life_min > 0) == ("after the pot life" in pour.verdict)
+    assert any(pour.bubbles_stay for pour in pours) >= stays
+    assert any(pour.over_pot_life_min > 0 for pour in pours) >= late
