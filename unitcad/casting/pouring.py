@@ -28,7 +28,7 @@ from unitcad.casting.figures import (
 )
 from unitcad.casting.preparation import inner
 from unitcad.casting.steps import BenchStep
-from unitcad.casting.views import picture_path
+from unitcad.casting.views import fed_through, picture_path
 from unitcad.catalogue import Material
 from unitcad.designs.design import Fitting
 from unitcad.moulds.mould_set import MouldSet
@@ -534,7 +534,8 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     fittings, casting = assembly(moulds), moulds.spec.casting
     for i, fitting in enumerate(fittings):
         title = f"Motor in, {i + 1} of {len(fittings)}" if len(fittings) > 1 else "Motor in"
-        path, minutes = picture_path("motor-home" if i else "motor-in"), LAY_IN_MIN * len(moulds.plan.layout.cells)
+        path = picture_path("motor-home" if i or fed_through(moulds) else "motor-in")
+        minutes = LAY_IN_MIN * len(moulds.plan.layout.cells)
         yield BenchStep(title, fitting.text, path, minutes=minutes, needs=fitting.needs)
     named = {fitting.silicone for fitting in fittings if fitting.silicone}
     ring = any(fitting.mixed == "ring" for fitting in fittings)

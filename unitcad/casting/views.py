@@ -46,17 +46,13 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.removal import CAST, Way
 from unitcad.moulds.tongue import GRIP_WIDTH
-from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, ring, rotated, turned, union
+from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, ring, union
 from unitcad.shape.body import Body
 from unitcad.shape.column import extent
 from unitcad.text import number
 
 ABOVE, UNDER, OVER, LOW = (0.55, -1.0, 0.62), (0.55, -1.0, -0.6), (0.25, -1.0, 1.2), (0.55, -1.0, 0.3)
 """Directions towards the eye."""
-BEFORE = 3.0
-"""From the cavity's mouth down to what is to go in, mm."""
-SHOWN = 0.25
-"""Thickness of a circuit in the picture, at least, mm: the drawn one would hardly be seen."""
 Views = Iterator[tuple[str, "View"]]
 Group = Literal["moulds", "under", "pieces", "unit", "cut", "curved"]
 
@@ -275,11 +271,8 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
         held = *held, Extra(union(step.channels), colour)
     else:
         held = *on, *tape(moulds, step)
-        # In pieces, to show that each has its tape.
-        split = {each.tool: each.pieces for each in plan.splits}
-        parts = [replace(part, name=piece.name) for part in closed for piece in split.get(part.name, (part,))]
         names = (Name("tape", (tape_places(moulds)[0] + 4.0, -lay.plate[1], top)),)
-        yield "hold", View(tuple(parts), held, names=names)
+        yield "hold", View(closed, held, names=names)
         reach = (radius + (dims.radii[step.index - 2] if before else 0.0)) / 2
         mound = cylinder(radius + 0.6, step.rim, step.rim + 0.5)
         mounds = [moved(mound, cell.x, cell.y) for cell in lay.cells if plan.concentric]
@@ -357,9 +350,8 @@ def _way_out(moulds: MouldSet) -> Views:
         yield "peel", View((*placed(base), *raised), way=1)
         return
     down = moulds.dimensions.core_height + max(last.rim, 2 * CLEAR)
-    parts = [piece for tool in base for piece in plan.pieces_of(tool.name)]
     names = Name("base", (0.0, -plan.layout.plate[1], top - down)), Name("cup stays on", (0.0, -y, last.rim / 2))
-    yield "base-off", View((*placed(parts, z=-down), *placed(cast), *stays), names=names, way=1)
+    yield "base-off", View((*placed(base, z=-down), *placed(cast), *stays), names=names, way=1)
     yield "push-out", View((*stays, *raised), way=1)
 
 
@@ -372,46 +364,15 @@ def _motor_in(moulds: MouldSet) -> Views:
     away = (-1.0 if below else 1.0) * (moulds.dimensions.heights[-1] + CLEAR)
     cast = placed((body for body in moulds.unit if body.made == "cast"), half=not moulds.laid_later)
     eye = UNDER if below else LOW
-    laid = View((*cast, *placed(inside, z=away)), (), eye, "unit", turned=below)
-    yield "motor-in", _fed_through(moulds, inside) or laid
+    if not fed_through(moulds):
+        yield "motor-in", View((*cast, *placed(inside, z=away)), (), eye, "unit", turned=below)
     yield "motor-home", View((*cast, *placed(inside)), eye=eye, group="unit", turned=below)
 
 
-def _fed_through(moulds: MouldSet, inside: list[Body]) -> View | None:
-    """Return the view of a tail or wires led out through a closed slot, motor and pad before the mouth; else None."""
-    dims, exit, spec = moulds.dimensions, moulds.dimensions.exit, moulds.spec
-    led = [body for body in inside if body.kind in ("circuit", "wire")]
-    if not led or not exit or exit.high >= dims.heights[0] or moulds.design.opens != "below":
-        return None
-    middle, pad = (exit.low + exit.high) / 2, dims.pad
-    away, across = -(middle + BEFORE), [0.0]
-    if spec.fpcb and pad:
-        start, half, long = pad.radius - SHOWN, spec.fpcb.tail_width_mm / 2, spec.fpcb.tail_length_mm
-        level, thick = (pad.low + pad.high) / 2, max(spec.fpcb.thickness_mm, SHOWN)
-    elif spec.wires:
-        thick, long, count = spec.wires.diameter_mm, spec.wires.length_mm, spec.wires.count
-        start, half, level = dims.motor_radius, thick / 2, dims.core_height - thick
-        across = [(2 * i + 1 - count) * exit.width / (2 * count) for i in range(count)]
-    else:
-        return None
-    # Each strip goes along +x, in (x, z): from `start` up to the slot's mouth, then level to x = `end`.
-    run, rise = dims.cavity_radius - thick - start, middle - level - away
-    slope, t = math.hypot(run, rise), thick / 2
-    end = max(dims.outer_radius + long - slope, dims.outer_radius + 2.0)
-    x, z = start + run, level + away
-    sloping = rotated(box(0, slope, -half, half, -t, t), "y", -math.degrees(math.atan2(rise, run)))
-    strip = union((moved(sloping, start, 0, z), box(x - t, end, -half, half, middle - t, middle + t)))
-    strips = [moved(turned(strip, "z", 1 - side), y=y) for side in dims.sides for y in across]
-    if spec.fpcb and pad:
-        strips.append(cylinder(pad.radius, z - t, z + t))
-    side = max(dims.sides)
-    pulled = arrow((side, 0, 0), side * (end + 4.0), -half - 1.0, middle + 1.5, 6.0)
-    parts = (
-        *placed((body for body in moulds.unit if body.made == "cast"), half=True),
-        *placed((each for each in inside if each not in led), z=away),
-    )
-    names = (Name("slot", (side * dims.outer_radius, -half, middle)),)
-    return View(parts, (Extra(union(strips), led[0].colour), pulled), UNDER, "unit", names=names, turned=True, way=0)
+def fed_through(moulds: MouldSet) -> bool:
+    """Tell whether a tail or wires are led out through a closed slot: no picture shows that way."""
+    exit = moulds.dimensions.exit
+    return bool(exit) and exit.high < moulds.dimensions.heights[0] and moulds.design.opens == "below"
 
 
 def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
