@@ -162,7 +162,9 @@ def _views(moulds: MouldSet) -> Views:
         down = 1.2 * (moulds.dimensions.core_height - bottom)
         x, y = plan.layout.cells[0].x, -plan.layout.plate[1]
         names = Name("filament", (x, y * 0.8, bottom - down)), Name("groove", (x, y * 0.7, bottom))
-        yield "filament", View((*base, *placed(stubs, z=-down)), (), UNDER, "under", names=names)
+        # Next to the upright ends: in front of the bent ends the plate would hide them.
+        up = tuple(arrow((0, 0, 1), c.x + 4.0, c.y - 4.0, bottom - down / 2, 7.0) for c in plan.layout.cells)
+        yield "filament", View((*base, *placed(stubs, z=-down)), up, UNDER, "under", names=names, way=0)
     standing, on = (*base, *placed(stubs)), level_on(moulds)
     yield "level", _level((*standing, Placed(on.cup)), cup_x, on.rim, plan.layout.plate, bottom)
     for step in plan.steps:
