@@ -38,7 +38,6 @@ def test_every_save_is_built_and_a_refusal_leaves_the_last_result(tmp_path: Path
     spec.write_text(text)
     command = [sys.executable, "-P", "-m", "unitcad", "build", "mine.toml", "--watch", "--only", "unit"]
     lines: queue.Queue[str] = queue.Queue()
-    # Tests that were started in the background of a script ignore Ctrl-C, and their children with them.
     with (
         subprocess.Popen(
             command,
@@ -46,7 +45,6 @@ def test_every_save_is_built_and_a_refusal_leaves_the_last_result(tmp_path: Path
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         ) as process,
         killed(process),
     ):

@@ -267,8 +267,7 @@ def _running(process: psutil.Process) -> str:
 def test_nothing_is_left_however_the_parent_or_the_worker_ends(body: str, end: str) -> None:
     stay = 30 if ENDS[end] else 1.0
     code = f"""
-import signal, sys, time
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a run in the background ignores it
+import sys, time
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 import worker_acts as acts
 from unitcad import workers

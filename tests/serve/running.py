@@ -67,19 +67,12 @@ class Server:
             return got
 
 
-def interruptible() -> None:
-    """Have a child obey Ctrl-C, which it ignores where the tests were started in the background of a script."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
 @contextlib.contextmanager
 def serving(folder: Path, *arguments: str, environment: dict[str, str] | None = None) -> Iterator[Server]:
     """Run `unitcad serve` in a folder, without a browser unless asked for, with variables added to the environment."""
     command = [sys.executable, "-P", "-m", "unitcad", "serve", "--no-browser", *arguments]
     pipe, given = subprocess.PIPE, {**os.environ, **(environment or {})}
-    with subprocess.Popen(
-        command, cwd=folder, stdout=pipe, stderr=pipe, text=True, preexec_fn=interruptible, env=given
-    ) as process:
+    with subprocess.Popen(command, cwd=folder, stdout=pipe, stderr=pipe, text=True, env=given) as process:
         try:
             assert process.stdout
             yield Server(process.stdout.readline().strip(), process)
