@@ -17,6 +17,7 @@ from pathlib import Path
 import psutil
 import pytest
 import worker_acts as acts
+from process_trees import left
 
 from unitcad import workers
 from unitcad.errors import Refusal
@@ -244,23 +245,6 @@ BODIES = {
 ENDS = {"kill": signal.SIGKILL, "terminate": signal.SIGTERM, "interrupt": signal.SIGINT, "kill the worker": None}
 
 
-def _left(processes: list[psutil.Process]) -> list[str]:
-    """Return the names of the processes that still run after ten seconds."""
-    end = time.monotonic() + 10
-    while running := [name for process in processes if (name := _running(process))]:
-        if time.monotonic() > end:
-            break
-        time.sleep(0.02)
-    return running
-
-
-def _running(process: psutil.Process) -> str:
-    try:
-        return "" if process.status() == psutil.STATUS_ZOMBIE else process.name()
-    except psutil.NoSuchProcess:
-        return ""
-
-
 @linux
 @pytest.mark.parametrize("end", ENDS)
 @pytest.mark.parametrize("body", BODIES)
@@ -287,7 +271,7 @@ with workers.Pool() as pool:
             psutil.Process(parent.pid).children()[0].kill()
         else:
             parent.send_signal(number)
-        assert _left(below) == []
+        assert left(below) == []
     finally:
         parent.kill()
         parent.communicate()

@@ -9,7 +9,6 @@ import time
 import zlib
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
@@ -91,8 +90,6 @@ class VariantOutcome:
 
 
 Answer = list[VariantOutcome] | bytes
-_SYNCED_TOGETHER = 12
-"""Results brought to the disk at once: few, to begin early; several, to share the writes of the file system's log."""
 
 
 def work(task: Task) -> Answer:
@@ -182,30 +179,13 @@ def failure(index: int, error: BaseException) -> VariantOutcome:
 
 
 def _into_folders(task: Task, out: Path) -> list[VariantOutcome]:
-    """Make a task's variants into their folders, with the cache on this disk; when they return, all is on the disk.
-
-    Those that are made go to the disk while the next ones are made: the processor has nothing to do with it.
-    """
-    made: list[Path] = []
-    begun: list[Future[None]] = []
-
-    def make(job: Job, scratch: Path) -> VariantOutcome:
-        outcome = _locally(job, task, out, scratch)
-        made.append(out / outcome.folder)
-        if len(made) == _SYNCED_TOGETHER:
-            begun.append(beside.submit(folders.sync, made.copy(), threads))
-            made.clear()
-        return outcome
-
-    with folders.sync_threads() as threads, ThreadPoolExecutor(1) as beside:  # `beside` uses the threads to its end
-        try:
-            with files.scratch(out) as scratch:
-                done = _each(task.jobs, task, lambda job, known: make(job, scratch))
-        except OSError as error:
-            return [failure(job.index, error) for job in task.jobs]
-        folders.sync(made, threads)
-        for each in begun:
-            each.result()
+    """Make a task's variants into their folders, with the cache on this disk; when they return, all is on the disk."""
+    try:
+        with files.scratch(out) as scratch:
+            done = _each(task.jobs, task, lambda job, known: _locally(job, task, out, scratch))
+    except OSError as error:
+        return [failure(job.index, error) for job in task.jobs]
+    folders.sync(out / outcome.folder for outcome in done if outcome.folder)
     return done
 
 

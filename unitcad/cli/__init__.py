@@ -79,6 +79,9 @@ def main() -> NoReturn:
         place = f"{error.filename}: " if error.filename else ""
         say_error(UnitcadError(f"{place}{error.strerror or error}"), form)
         sys.exit(2)
+    except MemoryError:
+        say_error(UnitcadError("out of memory"), form)
+        sys.exit(1)
     except Exception as error:
         if _interrupt_behind(error):
             _leave_interrupted()

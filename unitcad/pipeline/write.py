@@ -10,7 +10,6 @@ import shutil
 import stat
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -214,23 +213,9 @@ def whole(folder: Path, *, hashes: bool = False) -> Manifest | None:
     return manifest
 
 
-_SYNCS = 16
-
-
-def sync(results: Iterable[Path], threads: ThreadPoolExecutor | None = None) -> None:
-    """Bring the results' own files to the disk; what they share is there since the cache has it. Raises OSError.
-
-    Many at once: the file system then writes its log a few times and not once a file. A caller that syncs often passes
-    `threads` from `sync_threads`, since starting them takes longer than the sync.
-    """
-    paths = [path for result in results for path in _own_files(result)]
-    with contextlib.nullcontext(threads) if threads else sync_threads() as pool:
-        list(pool.map(_sync, (paths[i::_SYNCS] for i in range(_SYNCS))))
-
-
-def sync_threads() -> ThreadPoolExecutor:
-    """Return the threads that `sync` works with."""
-    return ThreadPoolExecutor(_SYNCS)
+def sync(results: Iterable[Path]) -> None:
+    """Bring the results' own files to the disk; what they share is there since the cache has it. Raises OSError."""
+    _sync(path for result in results for path in _own_files(result))
 
 
 def _own_files(folder: str | os.PathLike[str]) -> Iterator[str]:

@@ -1,0 +1,64 @@
+"""A batch whose workers cannot start ends with one line, and does not hang."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).parent.parent / "batch"))
+from batching import command, environment, ring_sweep, unitcad
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+
+
+def _limited(which: int, limit: int) -> None:
+    resource.setrlimit(which, (limit, limit))
+
+
+@pytest.mark.parametrize(
+    ("which", "limit"),
+    [
+        (resource.RLIMIT_NOFILE, 8),
+        (resource.RLIMIT_NOFILE, 10),
+        (resource.RLIMIT_NOFILE, 24),
+        (resource.RLIMIT_AS, 300 << 20),
+        (resource.RLIMIT_AS, 600 << 20),
+    ],
+    ids=["8 descriptors", "10 descriptors", "24 descriptors", "300 MB", "600 MB"],
+)
+def test_a_batch_with_too_little_to_start_workers_ends_in_one_line(which: int, limit: int, tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "out"
+    words = command("batch", sweep, "-o", out, "-j", 2, "--cache", tmp_path / "cache")
+    done = subprocess.run(
+        words, capture_output=True, text=True, check=False, timeout=120, env=environment(),
+        preexec_fn=lambda: _limited(which, limit),
+    )  # fmt: skip
+    lines = done.stderr.splitlines()
+    if done.returncode:
+        assert sum(line.startswith("error: ") for line in lines) == 1
+        assert "a bug" not in done.stderr
+    again = unitcad("batch", sweep, "-o", out, "-j", 2, "--cache", tmp_path / "cache", "--json")
+    assert again.returncode == 0, again.stderr
+
+
+def test_a_batch_whose_workers_cannot_start_says_so_once(tmp_path: Path) -> None:
+    sweep = ring_sweep(tmp_path / "s")
+    words = command("batch", sweep, "-o", tmp_path / "out", "-j", 2, "--cache", tmp_path / "cache")
+    code = "import sys\nsys.executable = '/no/python'\nfrom unitcad.cli import main\nmain()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words[3:]], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line == "error: a worker process cannot start: [Errno 2] No such file or directory: '/no/python'"
+
+
+def test_a_batch_needs_no_writable_temporary_folder(tmp_path: Path) -> None:
+    sweep = ring_sweep(tmp_path / "s")
+    words = ("batch", sweep, "-o", tmp_path / "out", "-j", 2, "--cache", tmp_path / "cache")
+    done = unitcad(*words, env={**environment(), **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), "/proc")})
+    assert done.returncode == 0, done.stderr
