@@ -20,7 +20,7 @@ from unitcad import files
 from unitcad.catalogue import Material
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.lab.columns import Declared, column_of, columns, columns_of
-from unitcad.lab.readers import Layout, open_recording
+from unitcad.lab.readers import AS_FOUND, Layout, open_recording
 
 Law = Literal["neo-Hooke", "Mooney", "Yeoh", "Ogden"]
 MODES: Mapping[str, tuple[float, float]] = {"tension": (1.0, -0.5), "plane strain": (1.0, 0.0), "biaxial": (1.0, 1.0)}
@@ -199,7 +199,7 @@ class TensileCurve:
 
 
 def read_curve(
-    path: Path, given: Mapping[str, Declared], specimen: Specimen, layout: Layout = Layout()
+    path: Path, given: Mapping[str, Declared], specimen: Specimen, layout: Layout = AS_FOUND
 ) -> TensileCurve:
     """Return a file's curve. What `specimen` gives goes before the file's header.
 

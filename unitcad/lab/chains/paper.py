@@ -79,10 +79,6 @@ def _unfit(fits: list[LineFit]) -> str:
         return f"{missing:.2%} of the samples are missing, which it does not leave out"
     if dropped > MOST_MASKED:
         return f"{dropped:.2%} of the samples are drop-outs, which it does not leave out"
-    if min(fit.clipped for fit in fits) < np.inf:
-        return "samples are clipped, which it does not allow for"
-    if any(fit.lines for fit in fits):
-        return "it can't tell several lines apart"
     return ""
 
 

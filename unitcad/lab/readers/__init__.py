@@ -48,6 +48,9 @@ class Layout:
     skip_lines: int = 0
 
 
+AS_FOUND = Layout()
+
+
 @dataclass(frozen=True)
 class Channel:
     """One channel: its samples, its name, its unit ("" if the file gives none), its step in s if known."""
@@ -137,7 +140,7 @@ def expect_ending(path: Path, field: str) -> str:
     return ending
 
 
-def open_recording(path: Path, layout: Layout = Layout()) -> Recording:
+def open_recording(path: Path, layout: Layout = AS_FOUND) -> Recording:
     """Return the recording in a file.
 
     Raises Unreadable (a Refusal) for a file that can't be read without a guess, Missing without the library of its
