@@ -117,7 +117,6 @@ def test_one_curve_in_every_layout_is_the_same_curve(layout: str, tmp_path: Path
         (['"0,1","0,2"', '"0,2","0,3"', '"0,3"x,"0,4"'], None),  # a quote that is closed too early
         (['"0,1","0,2"', '"0,2","0,3"', '"0,3","0,4'], None),
         (['"0,1","0,2"', '"0,2","0,3"', '0,3,"0,4"'], None),
-        (['"0.1","0.2"', '"0.2","0.3"', '"1,000.3","0.4"'], None),
     ],
 )
 def test_quoted_numbers_are_not_guessed(lines: list[str], field: str | None, tmp_path: Path) -> None:
