@@ -77,21 +77,16 @@ def test_an_oscilloscopes_index_is_not_time() -> None:
     """Rigol's column X counts samples; its step stands in the header. The other family writes time with its unit."""
     index = open_recording(DATA / "rigolwfm" / "DS1074Z-A.csv")
     assert index.time is None
-    assert [one.name for one in index.channels] == ["CH1"]
+    assert [one.name for one in index.channels] == ["CH1", "CH2", "CH3"]
     assert open_recording(DATA / "rigolwfm" / "DS1052E.csv").time == 0
     with pytest.raises(Refusal, match="several channels of this name"):
         open_recording(DATA / "rigolwfm" / "DS1052E.csv").index("Voltage", "channel")
 
 
-def test_a_table_of_words_is_no_recording() -> None:
-    with pytest.raises(Unreadable, match="no block of lines"):
-        open_recording(DATA / "phantom-material-database" / "phantoms_table.csv")
-
-
-@pytest.mark.parametrize("ending", [".svd", ".pvd"])
-def test_polytecs_own_format_is_refused(ending: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("ending", "way"), [(".svd", "export UFF"), (".pvd", "export UFF"), (".xlsx", "as CSV")])
+def test_a_format_of_another_program_is_refused_with_a_way(ending: str, way: str, tmp_path: Path) -> None:
     (tmp_path / f"scan{ending}").write_bytes(b"x")
-    with pytest.raises(Unreadable, match="export UFF"):
+    with pytest.raises(Unreadable, match=way):
         open_recording(tmp_path / f"scan{ending}")
 
 

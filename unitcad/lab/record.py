@@ -12,7 +12,7 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.check.rules.rule import Rule
 from unitcad.errors import Refusal
 from unitcad.files import sha256
-from unitcad.geometry.arrays import Floats
+from unitcad.geometry.arrays import Floats, Ints
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, own_keys, recording_of
 from unitcad.lab.chains import chains_of
 from unitcad.lab.chains.chain import LineFit, Mains
@@ -176,8 +176,14 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
     count, missing = len(samples), tuple(int(n) for n in np.count_nonzero(~np.isfinite(samples), axis=0))
     off_grid = 0.0
     if stamps is not None:
-        off = np.abs((stamps - stamps[0]) * rate - np.arange(count))
-        off_grid = float(off.max()) if np.isfinite(off).all() else np.inf
+        off_grid = _off_grid(stamps, rate)
+        if off_grid > IRREGULAR and (places := _places(stamps)) is not None:
+            # A logger that lost samples: their places on the even grid stay empty.
+            whole = np.full((places[-1] + 1, samples.shape[1]), np.nan)
+            whole[places] = samples
+            rate, off_grid = float(places[-1] / (stamps[-1] - stamps[0])), 0.0
+            missing = tuple(int(n + len(whole) - count) for n in missing)
+            samples, count = whole, len(whole)
     if (length := count / rate) > LONGEST_S:
         raise Refusal(shown, None, f"lasts {length:.4g} s; cut the record to {LONGEST_S:g} s or less")
     samples = samples * factors
@@ -185,6 +191,24 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
     if averaged > 1:
         samples = samples[: count // averaged * averaged].reshape(-1, averaged, samples.shape[1]).mean(axis=1)
     return Signal(samples, rate, averaged, count, missing, off_grid, units)
+
+
+def _off_grid(stamps: Floats, rate: float) -> float:
+    """Return by how many steps a time lies off an even grid."""
+    off = np.abs((stamps - stamps[0]) * rate - np.arange(len(stamps)))
+    return float(off.max()) if np.isfinite(off).all() else np.inf
+
+
+def _places(stamps: Floats) -> Ints | None:
+    """Return the times' places on an even grid of at most twice as many; None if a time lies off it."""
+    steps = np.diff(stamps)
+    if not (np.isfinite(stamps).all() and (steps > 0).all()):
+        return None
+    step = float(np.median(steps))
+    places = np.cumsum(np.concatenate([[0], np.round(steps / step)])).astype(int)
+    step = float((stamps[-1] - stamps[0]) / places[-1])
+    off = np.abs((stamps - stamps[0]) / step - places)
+    return places if off.max() <= IRREGULAR and np.diff(places).min() > 0 and places[-1] < 2 * len(places) else None
 
 
 def _factor(sensor: SensorTable, own: str, shown: str) -> float:
@@ -215,7 +239,7 @@ def _factor(sensor: SensorTable, own: str, shown: str) -> float:
 
 def expect_one_unit(
     stated: dict[SensorTable, tuple[str, str]],
-    signal_units: tuple[str, ...],
+    units: tuple[str, ...],
     sensors: tuple[SensorTable, ...],
     shown: str,
 ) -> None:
@@ -223,15 +247,14 @@ def expect_one_unit(
 
     Raises Refusal for two units that this program can't convert into each other, or a unit and none.
     """
-    for own, sensor in zip(signal_units, sensors, strict=False):
-        known = own or plain(sensor.per or (sensor.unit if sensor.scale == 1.0 else ""))
-        before, file = stated.setdefault(sensor, (known, shown))
-        if before != known and (ratio(known, before) is None or not own):
-            told = [
-                f"{name} says {unit}" if unit else f"{name} has no unit"
-                for name, unit in ((shown, own), (file, before))
-            ]
-            raise Refusal("sensor.per", sensor.per, f"{told[0]}, {told[1]}: declare the unit that the scale is per")
+    for own, sensor in zip(units, sensors, strict=True):
+        before, file = stated.setdefault(sensor, (own, shown))
+        alone = plain(sensor.unit) if sensor.scale == 1.0 else ""  # the unit of numbers without one
+        if sensor.per is None and own != before and ratio(own or alone, before or alone) != 1.0:
+            if own and before and ratio(own, before) is not None:
+                continue
+            told = [f"{name} gives {unit or 'no unit'}" for name, unit in ((shown, own), (file, before))]
+            raise Refusal("sensor.per", None, f"is needed: {told[0]}, {told[1]}", own or before)
 
 
 def _rate(
