@@ -111,6 +111,8 @@ LONGEST_S = 60.0
 """Seconds of a record that is measured: the line of a longer one has too many parameters to be fitted at once."""
 IRREGULAR = 0.3
 """Steps by which a time may lie off an even grid."""
+ON_GRID = 0.1
+"""The same for times among which some are lost."""
 SAME_RATE = 1e-3
 """Part by which the campaign's rate may differ from the file's own."""
 HIGHEST_RATE = 5_000.0
@@ -208,7 +210,7 @@ def _places(stamps: Floats) -> Ints | None:
     places = np.cumsum(np.concatenate([[0], np.round(steps / step)])).astype(int)
     step = float((stamps[-1] - stamps[0]) / places[-1])
     off = np.abs((stamps - stamps[0]) / step - places)
-    return places if off.max() <= IRREGULAR and np.diff(places).min() > 0 and places[-1] < 2 * len(places) else None
+    return places if off.max() <= ON_GRID and np.diff(places).min() > 0 and places[-1] < 2 * len(places) else None
 
 
 def _factor(sensor: SensorTable, own: str, shown: str) -> float:

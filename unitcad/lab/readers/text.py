@@ -186,13 +186,16 @@ def _block(path: Path, lines: list[str], layout: Layout) -> Block:
 def _longest_runs(lines: list[str], dialect: Block, skip: int) -> list[Block]:
     """Return the longest run of lines with numbers in the same columns, and the longest one without words."""
     best: dict[bool, Block] = {}
-    start, count, kinds = skip, 0, ()
+    start, count, kinds, open_end = skip, 0, (), False
     for i, line in enumerate(lines[skip:], skip):
         if not line.strip():
             continue
         fresh = dialect.row(line, len(kinds))[1]
+        if open_end and len(fresh) == len(kinds) + 1:  # the run began with lines whose last cell is empty
+            kinds = (*kinds, "")
         if len(fresh) != len(kinds) or any({one, other} == {"n", "t"} for one, other in zip(fresh, kinds, strict=True)):
-            start, count, kinds = i, 0, fresh
+            start, count, kinds, open_end = i, 0, fresh, dialect.delimiter != " "
+        open_end = open_end and line.endswith(dialect.delimiter)
         kinds, count = tuple(one or other for one, other in zip(kinds, fresh, strict=True)), count + 1
         words = kinds.count("t")
         if kinds and words <= kinds.count("n") and (bool(words) not in best or count > best[bool(words)].lines):
