@@ -107,7 +107,7 @@ def read(path: Path, layout: Layout) -> list[Channel]:
             raise Unreadable("skip_lines", None, f"{limit}{block.start + 1}; correct the file, or skip that line")
     rows = _rows(path, lines, block)
     names, units, step = _header(lines[layout.skip_lines : block.start] or lines[: block.start], block)
-    clocks = [bool(_CLOCK.fullmatch(field)) for field in block.split(lines[block.start])]
+    clocks = [bool(_CLOCK.fullmatch(field)) for field in block.row(lines[block.start], block.width)[0]]
     shown = [i for i, kind in enumerate(block.kinds) if kind == "n"]
     if step is not None and names[0] == "X":  # a counter of the samples
         shown = shown[1:]
