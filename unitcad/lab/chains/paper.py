@@ -28,8 +28,9 @@ def gain(table: ChainTable, frequency_hz: float) -> float:
     from scipy.signal import freqz, sosfreqz
 
     band, comb = _filters(table)
-    size = abs(sosfreqz(band, [frequency_hz], fs=RATE_HZ)[1][0] * freqz(*comb, [frequency_hz], fs=RATE_HZ)[1][0])
-    return float(size**2 if table.zero_phase else size)
+    at: Any = np.array([frequency_hz])
+    size = np.abs(sosfreqz(band, at, fs=RATE_HZ)[1] * freqz(*comb, at, fs=RATE_HZ)[1]).item()
+    return size**2 if table.zero_phase else size
 
 
 def amplitude(table: ChainTable, x: Floats, rate: float) -> float:
