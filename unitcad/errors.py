@@ -53,16 +53,17 @@ def install_command(extras: str) -> str:
     except (PackageNotFoundError, ValueError):
         source = {}
     url = source.get("url", "")
-    folder = Path(url2pathname(urlsplit(url).path)) if url.startswith("file:") else Path(__file__).parent.parent
+    local = url.startswith("file:")
+    folder = Path(url2pathname(urlsplit(url).path)) if local else Path(__file__).parent.parent
     command = [sys.executable, "-m", "pip", "install"]
-    if (folder / "pyproject.toml").is_file():
+    if (local or not url) and (folder / "pyproject.toml").is_file():
         if (folder / "constraints.txt").is_file():
             command += ["-c", str(folder / "constraints.txt")]
         command += ["-e"] * bool(source.get("dir_info", {}).get("editable"))
         return shlex.join([*command, f"{folder}[{extras}]"])
     if vcs := source.get("vcs_info"):
         return shlex.join([*command, f"unitcad[{extras}] @ {vcs['vcs']}+{url}@{vcs['commit_id']}"])
-    if "archive_info" in source and not url.startswith("file:"):
+    if "archive_info" in source and not local:
         return shlex.join([*command, f"unitcad[{extras}] @ {url}"])
     return f"in a clone, {shlex.join([*command, f'.[{extras}]'])}"
 

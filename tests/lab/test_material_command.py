@@ -498,3 +498,22 @@ def test_a_bare_length_is_the_gauge_length_unless_one_is_named(tmp_path: Path) -
     assert header_of(path).gauge_mm == 33.0
     path.write_text('"Length","115","mm"\n"Gauge length","33","mm"\nTime,Load\n1,2\n')
     assert header_of(path).gauge_mm == 33.0
+
+
+def test_a_file_that_is_not_there_is_named_before_anything_else(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["material", str(tmp_path / "nope.csv")])
+    assert str(done.exception) == f"{tmp_path / 'nope.csv'}: no such file"
+
+
+def test_a_table_of_results_before_the_data_is_skipped(tmp_path: Path) -> None:
+    strain, stress = _curve()
+    rows = [f"{100 * a:.6f},{b:.6f}" for a, b in zip(strain, stress, strict=True)]
+    text = ["Results,Maximum", "1,12.5", "2,13.5", "", "Strain (%),Stress (Pa)", *rows]
+    (tmp_path / "a.csv").write_text("\n".join(text) + "\n")
+    arguments = ["material", str(tmp_path / "a.csv"), "--name", "x", "--like", "ecoflex-00-30"]
+    refused = CliRunner().invoke(app, arguments)
+    assert isinstance(refused.exception, Refusal)
+    assert "looks like data" in str(refused.exception)
+    done = CliRunner().invoke(app, [*arguments, "--skip-lines", "4", "--json"])
+    assert done.exit_code == 0, done.output
+    assert len(json.loads(done.stdout)["tensile"]["methods"]) == 7

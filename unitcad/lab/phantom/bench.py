@@ -232,9 +232,9 @@ def _preparation(phantom: PhantomSet, found: Sequence[PhantomPour]) -> Iterator[
         "stay free."
     )
     yield (
-        "Release agent sparingly on the inner walls of tray and frames, none on the plate. "
-        f"Silicone that cures on acrylic does not bond to it: the {found[0].name} only clings. Roughen the plate with emery paper, use "
-        "a silicone primer on it, or take a perforated one. Check before measuring: pushed sideways with a finger, the "
+        "Release agent sparingly on the inner walls of tray and frames, none on the plate. Silicone that cures on "
+        f"acrylic does not bond to it: the {found[0].name} only clings. Roughen the plate with emery paper, use a "
+        "silicone primer on it, or take a perforated one. Check before measuring: pushed sideways with a finger, the "
         "slab must not slip, and through the plate from below no air shows. Level the tray to 0.2 mm over its side."
     )
 
