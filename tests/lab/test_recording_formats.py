@@ -130,7 +130,7 @@ def test_words_may_follow_the_numbers_and_a_gap_is_not_a_number(tmp_path: Path) 
 
 def test_a_long_text_is_read_whole(tmp_path: Path) -> None:
     file = tmp_path / "long.csv"
-    count = 400_000
+    count = 100_000
     lines = "\n".join(f"{i},{i * 2}.0" for i in range(count))
     file.write_text(f"n,twice\n{lines}\n")
     assert_array_equal(open_recording(file).columns((1,))[:, 0], 2.0 * np.arange(count))
