@@ -33,6 +33,41 @@ class Missing(UnitcadError):
     """A lack of this machine or installation: a library of an extra, a folder that only a clone has."""
 
 
+def missing_extra(extra: str, need: str) -> Missing:
+    """Return the error of a library that an extra of this package brings; `need` names the library and its use."""
+    return Missing(f"{need}: {install_command(extra)}")
+
+
+def install_command(extras: str) -> str:
+    """Return the command that adds extras to this installation, from the folder or address that it came from."""
+    import json
+    import shlex
+    import sys
+    from importlib.metadata import PackageNotFoundError, distribution
+    from pathlib import Path
+    from urllib.parse import urlsplit
+    from urllib.request import url2pathname
+
+    try:
+        source = json.loads(distribution("unitcad").read_text("direct_url.json") or "{}")
+    except (PackageNotFoundError, ValueError):
+        source = {}
+    url = source.get("url", "")
+    local = url.startswith("file:")
+    folder = Path(url2pathname(urlsplit(url).path)) if local else Path(__file__).parent.parent
+    command = [sys.executable, "-m", "pip", "install"]
+    if (local or not url) and (folder / "pyproject.toml").is_file():
+        if (folder / "constraints.txt").is_file():
+            command += ["-c", str(folder / "constraints.txt")]
+        command += ["-e"] * bool(source.get("dir_info", {}).get("editable"))
+        return shlex.join([*command, f"{folder}[{extras}]"])
+    if vcs := source.get("vcs_info"):
+        return shlex.join([*command, f"unitcad[{extras}] @ {vcs['vcs']}+{url}@{vcs['commit_id']}"])
+    if "archive_info" in source and not local:
+        return shlex.join([*command, f"unitcad[{extras}] @ {url}"])
+    return f"in a clone, {shlex.join([*command, f'.[{extras}]'])}"
+
+
 class Refusal(UnitcadError):
     """A value that is refused: its field, the value, the limit that it breaks and the nearest accepted value.
 

@@ -389,5 +389,5 @@ def test_without_the_extra_parquet_is_refused_and_tables_are_as_before(
     head, entries = BatchHead(batch="a", name="b"), [JournalEntry(index=0, status="ok")]
     write_results(tmp_path, ["index"], lambda: entries, head, None, None, 1)
     assert (tmp_path / "variants.csv").read_text() == "index\n0\n"
-    with pytest.raises(UnitcadError, match=r"pip install 'unitcad\[parquet\]'"):
+    with pytest.raises(UnitcadError, match=r"-m pip install .*\[parquet\]"):
         write_results(tmp_path, ["index"], lambda: entries, head, None, ("parquet",), 1)

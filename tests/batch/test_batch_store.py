@@ -352,7 +352,7 @@ def test_an_address_that_can_not_be_used(tmp_path: Path, monkeypatch: pytest.Mon
     wrong = {
         str(tmp_path / "file"): "is a file, not a folder",
         str(tmp_path / "full"): "is not a store of unitcad, and not empty",
-        "nonsense://bucket": "not an address of a store|needs an extra",
+        "nonsense://bucket": "not an address of a store|needs fsspec",
     }
     for store, words in wrong.items():
         with pytest.raises(UnitcadError, match=words) as refused:

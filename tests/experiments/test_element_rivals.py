@@ -113,13 +113,13 @@ def test_without_the_library_the_elements_are_left_out_with_the_reason(monkeypat
     monkeypatch.setattr("unitcad.experiments.element_rivals.installed", lambda: False)
     found = available(["crossings", "mechanics-flat-edge"])
     assert [rival.name for rival in found.rivals] == ["crossings"]
-    assert "unitcad[fem]" in found.left_out["mechanics-flat-edge"]
+    assert "the extra fem" in found.left_out["mechanics-flat-edge"]
 
 
 @pytest.mark.parametrize("rivals", [["mechanics-flat-skin", "bush"], ["mechanics-flat-skin", "mechanics-axial-skin"]])
 def test_without_the_library_too_few_rivals_name_it(rivals: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("unitcad.experiments.element_rivals.installed", lambda: False)
-    with pytest.raises(Missing, match=r"mechanics-flat-skin needs scikit-fem: pip install 'unitcad\[fem\]'"):
+    with pytest.raises(Missing, match=r"mechanics-flat-skin needs scikit-fem, of the extra fem"):
         study(load_lab("paper", {"rivals": rivals}))
     specs = {"open": load("embedded")}
     with pytest.raises(Missing, match="mechanics-flat-skin needs scikit-fem"):

@@ -182,8 +182,8 @@ def test_an_uneven_time_axis_and_disagreeing_repeats(tmp_path: Path) -> None:
     time = np.arange(4000) / RATE
     for i in range(7):
         x = (300.0 + 0.1 * i if i < 3 or i == 6 else 100.0 * 1.4**i) * np.cos(2 * np.pi * 120 * time)
-        stamps = np.where(time > 1, time + 0.003, time) if i == 0 else time
-        rows = "\n".join(f"{t:.4f}\t{v:.5f}" for t, v in zip(stamps, x, strict=True))
+        stamps = np.where(time > 1, time + 0.0032, time) if i == 0 else time
+        rows = "\n".join(f"{t:.5f}\t{v:.5f}" for t, v in zip(stamps, x, strict=True))
         (tmp_path / f"{i}.txt").write_text(f"t (s)\tu (um)\n{rows}\n")
     head = '[sensor]\nquantity = "displacement"\nunit = "um"\n'
     text = '[[unit]]\nname = "a"\nreference = ["0.txt", "1.txt", "2.txt"]\nedge = ["3.txt", "4.txt", "5.txt"]\n'

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ from scipy.io import wavfile
 
 from unitcad.errors import Refusal
 from unitcad.lab import measured_files
-from unitcad.lab import record as signals
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable, read_campaign
 from unitcad.lab.chains import CHAINS
 from unitcad.lab.chains.chain import Chain, ChainTable
@@ -45,10 +43,10 @@ def test_a_clip_at_one_rail_is_clipping_and_nothing_else(tmp_path: Path, rail: i
     assert not result.usable
 
 
-def test_a_slight_clip_at_one_rail_is_fitted(tmp_path: Path) -> None:
+def test_a_slight_clip_gives_no_amplitude_either(tmp_path: Path) -> None:
     result = record(tmp_path, np.minimum(100 * np.cos(2 * np.pi * 121.3 * TIME) + noise(), 85.0))
-    assert [(one.code, one.severity) for one in result.findings] == [("L101", "warning")]
-    assert result.amplitude_um == pytest.approx(100.0, abs=3 * result.u_um)
+    assert [(one.code, one.severity) for one in result.findings] == [("L101", "error")]
+    assert result.as_dict()["amplitude_um"] is None
 
 
 @pytest.mark.parametrize("values", [(0.0, 1.0), (0.0, 1.0, 2.0, 3.0)])
@@ -81,16 +79,6 @@ def test_equal_lines_of_another_phase_are_several(tmp_path: Path, turn: float) -
     assert {one.code for one in record(tmp_path, x + noise()).findings} == {"L104"}
 
 
-def test_signal_to_noise_of_several_lines_counts_no_harmonic_as_noise(tmp_path: Path) -> None:
-    """Lines of 100 and 60 with harmonics of a fifth, over noise of 1."""
-    x = noise()
-    for size, hz in ((100, 121.3), (60, 124.3)):
-        x = x + size * (np.cos(2 * np.pi * hz * TIME) + 0.2 * np.cos(4 * np.pi * hz * TIME + 1))
-    result = record(tmp_path, x)
-    assert len(result.lines) == 2
-    assert result.snr == pytest.approx(100.0, rel=0.05)
-
-
 @pytest.mark.parametrize(
     ("ratio", "found"), [(12.0, set()), (7.0, {("L118", "warning")}), (1.0, {("L118", "warning")})]
 )
@@ -111,13 +99,22 @@ def test_an_amplitude_below_twice_its_uncertainty_is_an_error(tmp_path: Path) ->
     assert not result.usable
 
 
-def test_a_stronger_line_outside_the_band_is_found_in_every_section(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(signals, "SECTION", 4000)
-    time = np.arange(12_000) / RATE
-    x = 50 * np.cos(2 * np.pi * 121.3 * time) + np.where(time > 4, 200 * np.cos(2 * np.pi * 47.0 * time), 0.0)
+def test_a_stronger_line_outside_the_band_is_found(tmp_path: Path) -> None:
+    x = 50 * np.cos(2 * np.pi * 121.3 * TIME) + 200 * np.cos(2 * np.pi * 47.0 * TIME)
     assert "L117" in {one.code for one in record(tmp_path, x).findings}
+
+
+def test_a_record_of_more_than_a_minute_is_refused(tmp_path: Path) -> None:
+    wavfile.write(tmp_path / "a.wav", 1000, np.zeros(61_000, "<f4"))
+    campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),))
+    with pytest.raises(Refusal, match=r"a\.wav: lasts 61 s; cut the record to 60 s or less"):
+        measure_record(tmp_path / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), (60.0, 250.0), "a.wav")
+
+
+def test_more_than_one_motor_at_a_time_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(Refusal, match="run one motor at a time") as refused:
+        campaign_of(tmp_path, RECORDS, UNIT + "lines = 9\n")
+    assert (refused.value.field, refused.value.nearest) == ("unit.0.lines", 1)
 
 
 def campaign_of(folder: Path, records: dict[str, np.ndarray], text: str) -> Measured:
@@ -212,17 +209,6 @@ def test_the_blanks_motor_channel_tells_the_motors_mains(tmp_path: Path) -> None
     alone = campaign_of(tmp_path, {**pair, "off": noise(0.01)}, head + unit)
     assert alone.motor_mains == ()
     assert len(alone.mains) > 0
-
-
-def test_each_lines_results_are_in_the_data(tmp_path: Path) -> None:
-    two = {name: x + line(60, 4, 126.0) for name, x in RECORDS.items()}
-    result = campaign_of(tmp_path, two, UNIT)
-    (first, *_) = measured_files.as_data(result)["records"]
-    assert [sorted(one) for one in first["by_line"]] == [["amplitude_um", "frequency_hz"]] * 2
-    assert {round(one["frequency_hz"]): one["amplitude_um"] for one in first["by_line"]} == pytest.approx(
-        {121: 300, 126: 60}, rel=0.01
-    )
-    json.dumps(first, allow_nan=False)
 
 
 def test_a_chain_is_one_module_and_one_entry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

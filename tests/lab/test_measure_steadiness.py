@@ -33,25 +33,24 @@ def line(size: float, hertz: float, seed: int = 1) -> np.ndarray:
     return size * np.cos(2 * np.pi * hertz * TIME + seed) + noise(0.02 * size, seed)
 
 
-def record(folder: Path, x: np.ndarray, band: tuple[float, float] = BAND, lines: int = 1) -> RecordResult:
+def record(folder: Path, x: np.ndarray, band: tuple[float, float] = BAND) -> RecordResult:
     wavfile.write(folder / "a.wav", RATE, x.astype("<f4"))
     campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),), chain=ChainTable(use=("line", "paper")))
-    return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), band, "a.wav", lines)
+    return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), band, "a.wav")
 
 
 def said(result: RecordResult) -> dict[str, str]:
     return {one.code: one.message for one in result.findings}
 
 
-@pytest.mark.parametrize(("first", "last", "least"), [(115.0, 139.0, 15.0), (120.0, 136.0, 9.0), (139.0, 115.0, 15.0)])
+@pytest.mark.parametrize(("first", "last"), [(115.0, 139.0), (120.0, 136.0), (139.0, 115.0)])
 @pytest.mark.parametrize("order", [0, 1])
-def test_a_sweep_is_unsteady(tmp_path: Path, first: float, last: float, least: float, order: int) -> None:
-    """A velocity's amplitude rises with the frequency, too. The range of means over a window is below the whole one."""
+def test_a_sweep_is_unsteady(tmp_path: Path, first: float, last: float, order: int) -> None:
+    """A velocity's amplitude rises with the frequency, too."""
     hertz = first + (last - first) * TIME / 2
     size = 100 * (hertz / first) ** order
     result = record(tmp_path, size * np.cos(2 * np.pi * np.cumsum(hertz) / RATE) + noise(2.0))
     assert "L107" in said(result)
-    assert 100 * result.drift >= least - 3 * order
 
 
 def test_a_record_that_is_steady_for_less_than_half_says_so(tmp_path: Path) -> None:
@@ -64,11 +63,12 @@ def test_a_record_that_is_steady_for_less_than_half_says_so(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("at_start", [True, False])
-def test_a_frequency_that_jumps_is_unsteady(tmp_path: Path, at_start: bool) -> None:
+def test_of_a_frequency_that_jumps_the_longer_part_is_used(tmp_path: Path, at_start: bool) -> None:
     hertz = np.where((TIME < 0.6) if at_start else (TIME > 1.4), 118.0, 127.0)
     result = record(tmp_path, 100 * np.cos(2 * np.pi * np.cumsum(hertz) / RATE) + noise(2.0))
-    assert result.drift == pytest.approx(9 / 127, rel=0.1)
-    assert "L107" in said(result)
+    assert result.frequency_hz == pytest.approx(127.0, abs=0.1)
+    assert result.amplitude_um == pytest.approx(100.0, rel=0.01)
+    assert 1.0 < result.steady_s < 1.5
 
 
 @pytest.mark.parametrize("constant", [0.03, 0.05, 0.1, 0.2])
@@ -151,20 +151,6 @@ def measured(folder: Path, records: dict[str, np.ndarray], text: str = HEAD + UN
 def test_a_unit_off_the_motors_frequency_is_said_once(tmp_path: Path) -> None:
     records = {f"m{i}": line(300, 127.3, i) for i in range(3)} | {f"e{i}": line(100, 145.0, 9 + i) for i in range(3)}
     assert [one.code for one in measured(tmp_path, records).findings] == ["L116"]
-
-
-def test_expected_lines_are_no_finding(tmp_path: Path) -> None:
-    def two(size: float, seed: int) -> np.ndarray:
-        return line(size, 121.3, seed) + line(0.6 * size, 127.0, seed + 50)
-
-    records = {f"m{i}": two(300, i) for i in range(3)} | {f"e{i}": two(100, 9 + i) for i in range(3)}
-    text = (HEAD + UNIT).replace(', "paper"', "")
-    assert {one.code for one in measured(tmp_path, records, text).findings} == {"L104"}
-    result = measured(tmp_path, records, text + "lines = 2\n")
-    assert result.findings == ()
-    assert len(result.levels) == 2
-    findings = measured(tmp_path, records, text + "lines = 3\n").findings
-    assert {one.message.split(":")[0] for one in findings} == {"2 lines, 3 expected"}
 
 
 def test_the_length_that_was_used_is_shown(tmp_path: Path) -> None:

@@ -77,22 +77,16 @@ def test_an_oscilloscopes_index_is_not_time() -> None:
     """Rigol's column X counts samples; its step stands in the header. The other family writes time with its unit."""
     index = open_recording(DATA / "rigolwfm" / "DS1074Z-A.csv")
     assert index.time is None
-    assert index.channels[0].name == "X"
-    assert_array_equal(numbers(index, 0)[:, 0], np.arange(1200))
+    assert [one.name for one in index.channels] == ["CH1", "CH2", "CH3"]
     assert open_recording(DATA / "rigolwfm" / "DS1052E.csv").time == 0
     with pytest.raises(Refusal, match="several channels of this name"):
         open_recording(DATA / "rigolwfm" / "DS1052E.csv").index("Voltage", "channel")
 
 
-def test_a_table_of_words_is_no_recording() -> None:
-    with pytest.raises(Unreadable, match="no block of lines"):
-        open_recording(DATA / "phantom-material-database" / "phantoms_table.csv")
-
-
-@pytest.mark.parametrize("ending", [".svd", ".pvd"])
-def test_polytecs_own_format_is_refused(ending: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("ending", "way"), [(".svd", "export UFF"), (".pvd", "export UFF"), (".xlsx", "as CSV")])
+def test_a_format_of_another_program_is_refused_with_a_way(ending: str, way: str, tmp_path: Path) -> None:
     (tmp_path / f"scan{ending}").write_bytes(b"x")
-    with pytest.raises(Unreadable, match="export UFF"):
+    with pytest.raises(Unreadable, match=way):
         open_recording(tmp_path / f"scan{ending}")
 
 
@@ -103,8 +97,6 @@ def test_polytecs_own_format_is_refused(ending: str, tmp_path: Path) -> None:
         ("a,b\n.1,2\n.3,4\n5\n.6,7\n", ""),
         ("a,b\n.1,2\n3,4\n5,6,7\n6,7\n", ""),
         ("a,b\n.1,2\n3,x\n.6,7\n8,9\n", "skip_lines"),
-        ("a,b\n.1,2\n.3,3\n.6,\n", ""),
-        ("a,b\n1,2\n3,inf\n", ""),
         ("a,b\n0.1,2\n3,4\nmean,3\n", ""),
         ("words alone\nand more\n", ""),
         ("", ""),
@@ -136,14 +128,12 @@ def test_words_may_follow_the_numbers_and_a_gap_is_not_a_number(tmp_path: Path) 
     assert_array_equal(numbers(recording), [[0, 1e-3], [0.5, np.nan], [1, 2]])
 
 
-def test_text_longer_than_a_block_is_read_in_blocks(tmp_path: Path) -> None:
+def test_a_long_text_is_read_whole(tmp_path: Path) -> None:
     file = tmp_path / "long.csv"
-    count = 400_000
+    count = 100_000
     lines = "\n".join(f"{i},{i * 2}.0" for i in range(count))
     file.write_text(f"n,twice\n{lines}\n")
-    blocks = [open_recording(file).columns((1,))]
-    assert blocks
-    assert_array_equal(np.concatenate(blocks)[:, 0], 2.0 * np.arange(count))
+    assert_array_equal(open_recording(file).columns((1,))[:, 0], 2.0 * np.arange(count))
     with open(file, "a") as more:
         more.write("7\n8,9.0\n")
     with pytest.raises(Unreadable, match=f"line {count + 2} "):

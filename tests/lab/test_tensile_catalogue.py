@@ -22,10 +22,6 @@ PROTOTYPE = {
     "secant at 15 %": (18.0, 37.7, 51.3, 110, 454),
     "slope 0 to 25 % with offset": (24.5, 37.3, 59.7, 114, 451),
     "secant at 100 % (ISO 37, ASTM D412)": (14.8, 29.7, 41.0, 113, 437),
-    "neo-Hooke up to 50 %": (22.2, 45.5, 62.6, 139, 575),
-    "Yeoh up to 100 %": (21.1, 43.1, 59.0, 123, 519),
-    "Ogden, one term, up to 100 %": (20.8, 43.5, 59.3, 121, 505),
-    "Mooney up to 300 %": (-3.3, 30.7, 28.7, -45.5, 37.3),
 }
 """Moduli in kPa that another program worked out from the same files."""
 
@@ -43,8 +39,7 @@ def test_every_method_gives_what_another_program_gave(method: str, results: dict
         row = next(row for row in results[name].rows if row.method == method)
         assert row.value is not None
         assert row.value / 1e3 == pytest.approx(expected, rel=0.01)
-        assert ("unstable" in row.reason) == method.startswith("Mooney")
-        assert row.defensible != method.startswith("Mooney")
+        assert row.defensible
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -85,7 +80,7 @@ def test_the_sources_stand_side_by_side() -> None:
 
 def test_the_warnings_name_what_is_doubtful(results: dict[str, TensileResult]) -> None:
     codes = {name: {one.code for one in result.warnings} for name, result in results.items()}
-    assert codes["ecoflex-00-10"] == {"force", "start", "toe", "break", "crosshead", "unstable", "specimens"}
+    assert codes["ecoflex-00-10"] == {"force", "start", "toe", "break", "crosshead", "specimens"}
     assert "force" not in codes["dragon-skin-30"]
     assert "break" not in codes["dragon-skin-10-medium"]
 

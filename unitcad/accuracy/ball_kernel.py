@@ -15,7 +15,7 @@ import numpy as np
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
-from unitcad.errors import Missing
+from unitcad.errors import missing_extra
 
 BITS = 128
 """The least precision; it is doubled where the balls of the result are too wide, which hold whatever it is."""
@@ -38,7 +38,7 @@ class Kernel:
             import flint
             import mpmath  # noqa: F401  for the static radial disc
         except ImportError:
-            raise Missing("the reference needs python-flint and mpmath: pip install 'unitcad[test]'") from None
+            raise missing_extra("test", "the reference needs python-flint and mpmath") from None
         self.flint, self.omega, self.z, self.count, self.bits = flint, omega, z, 0, BITS
         self.sideways, self.column = load.direction == "tangential", 1 if load.direction == "normal" else 0
         self.least_loss, self.slowest = math.inf, 0.0

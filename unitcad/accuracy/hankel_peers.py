@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import fft, integrate, interpolate, special
 
-from unitcad.errors import Missing
+from unitcad.errors import missing_extra
 
 Integrand = Callable[[np.ndarray], np.ndarray]
 END = 2e4
@@ -60,7 +60,7 @@ def filtered(f: Integrand, r: np.ndarray, name: str) -> np.ndarray:
     try:
         import libdlf
     except ImportError as error:
-        raise Missing("the digital filters need libdlf: pip install 'unitcad[fem]'") from error
+        raise missing_extra("fem", "the digital filters need libdlf") from error
     base, j0, *_ = getattr(libdlf.hankel, name)()
     with np.errstate(all="ignore"):
         return (f(base[None] / r[:, None]) @ j0) / r

@@ -10,7 +10,6 @@ from unitcad.accuracy.chain_peers import CHAINS
 from unitcad.accuracy.cramer_rao import amplitude_bound
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, shown, stars
 from unitcad.accuracy.synthetic_records import (
-    CLIPPED,
     LENGTH_S,
     RATE,
     SCENARIOS,
@@ -57,7 +56,7 @@ def run(quick: bool, say: Say) -> Result:
     points = [(row[4], row[1]) for row in rows]
     chains = tuple((*row, star) for row, star in zip(rows, stars(points), strict=True))
     coverage = []
-    for scenario in (*SCENARIOS, CLIPPED):
+    for scenario in SCENARIOS:
         say(scenario.name)
         coverage.append(_coverage(scenario, trials))
     say("levels")

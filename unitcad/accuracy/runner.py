@@ -13,7 +13,7 @@ from pathlib import Path
 from unitcad import files
 from unitcad.accuracy import pages
 from unitcad.accuracy.result import Result, Say, from_dict
-from unitcad.errors import Missing, UnitcadError, unknown_name
+from unitcad.errors import UnitcadError, missing_extra, unknown_name
 
 MODULES = {
     "tessellation": "tessellation",
@@ -60,7 +60,7 @@ def check(name: str) -> None:
     lacking = {module: extra for module, extra in NEEDS.get(name, {}).items() if find_spec(module) is None}
     if lacking:
         extras = ",".join(sorted(set(lacking.values())))
-        raise Missing(f"the suite {name} needs {' and '.join(lacking)}: pip install 'unitcad[{extras}]'")
+        raise missing_extra(extras, f"the suite {name} needs {' and '.join(lacking)}")
 
 
 def run(name: str, quick: bool, say: Say, count: int | None = None, seed: int = 0) -> Result:

@@ -48,7 +48,6 @@ SCENARIOS = (
     replace(PLAIN, name="8 drop-outs a second", dropouts=8.0),
     WHOLE,
 )
-CLIPPED = replace(PLAIN, name="clipped at 0.8 of the amplitude", clip=0.8)
 
 
 @dataclass(frozen=True)

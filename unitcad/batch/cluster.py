@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal, UnitcadError, missing_extra
 
 DASK_SECONDS = 6.0
 """Seconds that a scheduler may take to answer: with imports and start-up the command ends within ten."""
@@ -60,7 +60,7 @@ def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple
         from distributed.comm.registry import get_backend
         from distributed.security import Security
     except ImportError:
-        raise UnitcadError("--scheduler needs Dask: pip install 'unitcad[dask]'") from None
+        raise missing_extra("dask", "--scheduler needs Dask") from None
 
     try:
         scheme, place = parse_address(address)

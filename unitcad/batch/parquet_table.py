@@ -11,7 +11,7 @@ from typing import Any
 
 from unitcad import files
 from unitcad.batch.batch_records import Values
-from unitcad.errors import Missing
+from unitcad.errors import missing_extra
 from unitcad.report.batch_table import HEAD
 
 GROUP = 1 << 15
@@ -30,7 +30,7 @@ def write_parquet(path: Path, head: Values, columns: list[str], rows: Callable[[
     Raises Missing without the extra, OSError.
     """
     if not can_write():
-        raise Missing("a Parquet table needs an extra: pip install 'unitcad[parquet]'")
+        raise missing_extra("parquet", "a Parquet table needs pyarrow")
     import pyarrow as pa
     from pyarrow import parquet
 

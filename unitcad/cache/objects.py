@@ -9,7 +9,7 @@ import uuid
 from pathlib import Path
 from typing import Any, Protocol
 
-from unitcad.errors import Missing, UnitcadError, WrongArgument
+from unitcad.errors import Missing, UnitcadError, WrongArgument, missing_extra
 from unitcad.files import write_new
 
 _IMPATIENT = {"s3": {"config_kwargs": {"connect_timeout": 5, "read_timeout": 60, "retries": {"max_attempts": 2}}}}
@@ -110,7 +110,7 @@ class FsspecObjects:
         try:
             import fsspec
         except ImportError:
-            raise Missing(f"--store {address}: needs an extra: pip install 'unitcad[store]'") from None
+            raise missing_extra("store", f"--store {address}: needs fsspec") from None
         protocol = address.partition("://")[0]
         try:
             options = {"use_listings_cache": False, "skip_instance_cache": True, **_IMPATIENT.get(protocol, {})}

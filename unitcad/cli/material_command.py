@@ -34,6 +34,9 @@ def material(
         str, typer.Option(help="Of the files' columns, where it is not plain: , ; tab or space.")
     ] = "",
     decimal: Annotated[str, typer.Option(help="The files' decimal sign, where it is not plain: . or a comma.")] = "",
+    skip_lines: Annotated[
+        int, typer.Option(min=0, max=100_000, help="Lines of each file to skip, such as a table of results.")
+    ] = 0,
     width_mm: Annotated[float | None, _Length] = None,
     thickness_mm: Annotated[float | None, _Length] = None,
     gauge_mm: Annotated[float | None, _Length] = None,
@@ -72,13 +75,16 @@ def material(
         raise Refusal("--deformation", deformation, "says how --dma was measured, which is not given")
     if cell_n is not None and not curves:
         raise Refusal("--cell-n", cell_n, "belongs to tensile curves, of which none is given")
+    for path in [*(curves or []), *([dma] if dma else [])]:
+        if not path.exists():
+            raise files.NotThere(f"{path}: no such file")
     shipped = catalogue.materials()
     named = name or _slug((curves or [dma])[0])  # type: ignore[arg-type]
     base = like or named
     if base not in shipped:
         raise unknown_name("--like", base, shipped)
     given = declared(column or [])
-    layout = Layout(_DELIMITERS.get(delimiter, delimiter), decimal)
+    layout = Layout(_DELIMITERS.get(delimiter, delimiter), decimal, skip_lines)
     used = _strain(strain, amplitude_um, wall_mm)
     tensile = dynamic = None
     with progress("material") as stage:

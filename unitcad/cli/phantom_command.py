@@ -23,7 +23,7 @@ def phantom(
 ) -> None:
     """Make a skin phantom to cast, and its response.
 
-    Recipe, box with a screed frame a layer, lid, stage holder, tensile coupons, procedure, bench sheet, the tissue for
+    Recipe, box with a screed frame a layer, lid, stage holder, procedure, bench sheet, the tissue for
     an estimate, and the response to expect. The last line printed is the folder.
     """
     from unitcad.cli.output import print_json, progress, warn
@@ -70,7 +70,7 @@ def _print(made: PhantomSet) -> None:
     layers = Table("layer", "silicone", "thinner", "kPa", "mm", "0.1 mm thinner")
     for layer, one in zip(made.table.layers, made.recipes, strict=True):
         change = f"{100 * e.sensitivity[layer.name]:+.2g} %"
-        modulus = f"{one.modulus_kpa:.3g}{' measured' if one.measured else ''}"
+        modulus = f"{one.modulus_kpa:.3g}"
         thinner = f"{one.thinner_pct:g} %"
         layers.add_row(layer.name, one.silicone.name, thinner, modulus, f"{layer.thickness_mm:g}", change)
     screen.print(layers)

@@ -35,7 +35,7 @@ NAMES = {
     "mechanics-axial-skin": "finite elements, motor driven along its axis, the skin beside the unit was read",
     "mechanics-flat-skin": "finite elements, motor driven sideways, the skin beside the unit was read",
 }
-MISSING = "needs scikit-fem: pip install 'unitcad[fem]'"
+MISSING = "needs scikit-fem, of the extra fem"
 
 
 def installed() -> bool:

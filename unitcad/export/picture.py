@@ -54,7 +54,7 @@ class NoPicture(UnitcadError):
 def draw(scenes: Sequence[Scene]) -> list[bytes]:
     """Draw the scenes as PNG files. Raises NoPicture, with what to install, where this machine can't draw."""
     if importlib.util.find_spec("vtkmodules") is None:
-        raise NoPicture("pictures need VTK: pip install 'unitcad[cadquery]'")
+        raise NoPicture("pictures need VTK: in a clone, pip install '.[cadquery]'")
     request = pickle.dumps([(s.size, s.towards_eye, [vars(part) for part in s.parts]) for s in scenes])
     answer = _ask(request, dict(os.environ))
     if answer is None and shutil.which("Xvfb"):

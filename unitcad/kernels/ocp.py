@@ -11,7 +11,7 @@ import contextlib
 import importlib.metadata
 from collections.abc import Iterator
 
-from unitcad.errors import Missing
+from unitcad.errors import Missing, install_command
 
 WHEEL_VERSION = "7.9.3.1.1"
 WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")
@@ -40,8 +40,8 @@ def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
     missing = isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == library
     extra = "step" if library == "OCP" else library
     if missing and (not wheels or library != "OCP"):
-        without = ", or build without STEP: --formats stl,3mf" if library == "OCP" else ""
-        return f"{library} is not installed: in a clone, pip install '.[{extra}]'{without}"
+        without = "; build without STEP (--formats stl,3mf), or install it" if library == "OCP" else ""
+        return f"{library} is not installed{without}: {install_command(extra)}"
     if ".so" in str(error) and "cannot open shared object" in str(error):
         return f"{library} lacks a library of the system: {error}. On Debian: apt-get install libgl1"
     have = ", ".join(f"{name} {version}" for name, version in sorted(wheels.items())) or "no wheel of it"

@@ -36,11 +36,14 @@ SkippedLines = Annotated[int, Meta(ge=0, le=100000)]
 
 
 class SensorTable(Table, frozen=True, kw_only=True):
-    """What the samples are: quantity and unit after `scale`, which is that unit per unit in the file."""
+    """Quantity and unit of the samples after `scale`, which is that unit per `per`, the unit in the file."""
 
     quantity: Quantity
     unit: Name
     scale: Positive = 1.0
+    per: Annotated[
+        Name | None, Meta(description="unit in the files that scale is per; V, or none given, if left out")
+    ] = None
     full_scale: Annotated[Positive | None, Meta(description="largest value that the sensor gives, in unit")] = None
 
 
@@ -95,7 +98,7 @@ class UnitTable(Table, frozen=True, kw_only=True):
     cavity: Cavity | None = None
     reference: Annotated[Records, Meta(description="the motor alone, where no channel has it")] = ()
     edge: Records = ()
-    lines: Annotated[int, Meta(ge=1, le=6, description="lines that its records have, one a motor of an array")] = 1
+    lines: Annotated[int, Meta(ge=1, description="only 1: one motor runs at a time")] = 1
     point: tuple[PointTable, ...] = ()
 
 
@@ -136,6 +139,8 @@ def read_campaign(path: Path) -> Campaign:
         field = f"unit.{i}"
         if names.index(unit.name) != i:
             raise Refusal(f"{field}.name", unit.name, "is the name of two units")
+        if unit.lines > 1:
+            raise Refusal(f"{field}.lines", unit.lines, "run one motor at a time, and record each by itself", 1)
         if not unit.edge and not unit.point:
             raise Refusal(f"{field}.edge", None, "is required, or a [[unit.point]]")
         distances = [point.distance_mm for point in unit.point]

@@ -19,13 +19,13 @@ from unitcad.lab.units import COLUMN_UNITS, plain
 _ANY_CASE = ("lbf", "kgf", "kN", "kPa", "psi", "in", "in/in", "Hz")
 """Units that mean one thing in any case: none has a prefix whose other case is another one."""
 _COLUMN_NAMES = {
-    "time": r"(?:test )?time",
-    "strain": r"(?:(?:engineering|eng\.?|nominal|tensile) )?strain",
+    "time": r"(?:test )?time|(?:prüf)?zeit|时间",
+    "strain": r"(?:(?:engineering|eng\.?|nominal|tensile) )?strain|dehnung|应变",
     "true_strain": r"(?:true|log\w*|hencky) strain",
-    "stress": r"(?:(?:engineering|eng\.?|nominal|tensile) )?stress",
+    "stress": r"(?:(?:engineering|eng\.?|nominal|tensile) )?stress|spannung|应力",
     "true_stress": r"(?:true|cauchy) stress",
-    "force": r"force|load|standard force",
-    "travel": r"travel|displacement|extension|crosshead(?: travel| displacement)?|position",
+    "force": r"force|load|standard force|(?:standard)?kraft|力|载荷",
+    "travel": r"(?:crosshead )?(?:travel|displacement)|crosshead|extension|stroke|position|(?:standard)?weg|位移",
     "frequency": r"(?:angular )?freq(?:uency|\.)?",
     "storage": r"storage(?: modulus)?|[eg](?:'|′)",
     "loss": r"loss(?: modulus)?|[eg](?:''|\"|″)",
@@ -94,7 +94,7 @@ def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]
 
 def columns_of(recording: Recording) -> str:
     """Say which columns a file has."""
-    return "its columns: " + ", ".join(f"{i} {channel.name}" for i, channel in enumerate(recording.channels, 1))
+    return f"its columns: {recording.numbered()}"
 
 
 def columns(recording: Recording, wanted: Mapping[str, tuple[int, float]]) -> tuple[dict[str, np.ndarray], int]:

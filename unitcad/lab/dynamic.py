@@ -16,7 +16,7 @@ import numpy as np
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.lab.columns import Declared, column_of, columns, columns_of
-from unitcad.lab.readers import Layout, open_recording
+from unitcad.lab.readers import AS_FOUND, Layout, open_recording
 from unitcad.lab.tensile import Warned
 
 Deformation = Literal["shear", "tension"]
@@ -73,7 +73,7 @@ class DynamicResult:
 
 
 def read_dynamic(
-    path: Path, given: Mapping[str, Declared], deformation: str = "", layout: Layout = Layout()
+    path: Path, given: Mapping[str, Declared], deformation: str = "", layout: Layout = AS_FOUND
 ) -> DynamicCurve:
     """Return a file's storage and loss over frequency.
 

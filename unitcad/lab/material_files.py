@@ -18,7 +18,7 @@ from unitcad.text import toml, toml_key
 _NAMED = 3
 """Files that a source names; of further ones it gives the count."""
 _SHOWN_TO = 1.2
-"""Strain up to which the chart shows a curve, beyond the fits' 100 %."""
+"""Strain up to which the chart shows a curve."""
 
 
 def table(tensile: TensileResult | None, dynamic: DynamicResult | None, like: str, hertz: float) -> dict[str, Any]:
@@ -77,19 +77,11 @@ def data(
             },
             "methods": [
                 {
-                    "method": row.method, "value_kpa": kpa(row.value), "by_specimen_kpa": list(map(kpa, row.by_specimen)),
+                    "method": row.method, "value_kpa": kpa(row.value),
+                    "by_specimen_kpa": list(map(kpa, row.by_specimen)),
                     "defensible": row.defensible, "reason": row.reason,
                 }
                 for row in tensile.rows
-            ],
-            "fits": [
-                {
-                    "file": curve.name, "law": one.method, "constants": dict(one.fit.constants),
-                    "residual": one.fit.residual,
-                }
-                for curve, methods in zip(tensile.curves, tensile.by_curve, strict=True)
-                for one in methods
-                if one.fit
             ],
             "warnings": warnings(tensile),
             "files": [{"name": curve.name, "sha256": curve.sha256} for curve in tensile.curves],
@@ -111,7 +103,7 @@ def data(
 
 
 def tensile_chart(name: str, result: TensileResult) -> str:
-    """Draw the curves, the fitted toe and the first specimen's laws, up to a little beyond the fits."""
+    """Draw the curves, the fitted toe up to a little beyond 100 %."""
     series = []
     for curve in result.curves:
         kept = curve.strain <= _SHOWN_TO
@@ -119,14 +111,6 @@ def tensile_chart(name: str, result: TensileResult) -> str:
     if toe := result.toes[0]:
         strain = np.linspace(toe.origin, result.used[1] + max(toe.origin, 0.0), 60)
         series.append(Series("start, origin fitted", 100 * strain, toe.stress(strain) / 1e3))
-    laws = [one for one in result.by_curve[0] if one.fit and one.fit.up_to <= _SHOWN_TO]
-    for i, one in enumerate(laws):
-        if one.fit:
-            strain = np.linspace(0.0, one.fit.up_to, 100)
-            dashed = bool(one.fit.unstable)
-            width = 1.8 * (len(laws) - i)  # laws that agree lie on each other: each shows beside the next
-            label = one.method + (", unstable" if dashed else "")
-            series.append(Series(label, 100 * strain, one.fit.stress(strain) / 1e3, dashed=dashed, width=width))
     low, high = (100 * end for end in result.used)
     title = f"{name}: nominal stress, quasi-static; shaded: the strain of use"
     return chart(series, title, "engineering strain, %", "nominal stress, kPa", shaded=(low, high))

@@ -18,7 +18,7 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.export.chart import Series, chart
 from unitcad.lab.chains.chain import Chain
 from unitcad.lab.measuring import Measured, PlaceLevel
-from unitcad.lab.record import RecordResult
+from unitcad.lab.record import RULES, RecordResult
 from unitcad.spec.toml import text_of
 
 MEASURED = "measured.toml"
@@ -105,7 +105,8 @@ def lines(result: Measured) -> Iterator[str]:
         )
     for unit, r in _each_record(result):
         if not r.frequency_hz:
-            yield f"  {unit}, {r.role}, {r.file}: not used, no line"
+            why = ", ".join(f"{one.code} {RULES[one.code].title}" for one in r.findings if one.severity == "error")
+            yield f"  {unit}, {r.role}, {r.file}: not used, {why}"
             continue
         gain = "".join(f", filters of {name} pass {value:.3f}" for name, value in r.gains.items())
         ratio = f", {r.ratio:.4f} of the motor" if r.ratio is not None else ""
@@ -244,16 +245,16 @@ def charts_of(result: Measured) -> dict[str, str]:
 
 
 def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
-    """Chart the spectrum about the fitted lines with the zeros of the chains' combs; all of it without a sure line."""
+    """Chart the spectrum near the lines with the zeros of the chains' combs, or all of it without a sure line."""
     frequency, size = record.picture[2:]
-    at = [one.frequency_hz for one in record.lines] or [record.frequency_hz]
-    if record.frequency_hz and not any(one.code == "L117" for one in record.findings):
+    at = list(record.lines) or [record.frequency_hz] * bool(record.frequency_hz)
+    if at and not any(one.code == "L117" for one in record.findings):
         near = (frequency > min(at) - BESIDE_HZ) & (frequency < max(at) + BESIDE_HZ)
         frequency, size = frequency[near], size[near]
     floor = float(np.median(size)) / 10 if len(size) and np.median(size) > 0 else 1e-12
     kept = size > floor
     series = [Series("spectrum (Hann)", frequency[kept], size[kept])]
-    if record.frequency_hz:
+    if at:
         tops = [float(np.interp(hertz, frequency, size)) for hertz in at]
         series.append(Series("fitted line" if len(at) == 1 else "fitted lines", at, tops, points=True))
     for chain in chains:
@@ -273,13 +274,10 @@ def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
 
 
 def _decay_chart(name: str, levels: list[PlaceLevel]) -> str:
-    """Chart the levels over the distance, a colour for each chain, and each line where a unit has several."""
-    several = len({(one.chain, one.distance_mm) for one in levels}) < len(levels)
-
-    def kind(one: PlaceLevel) -> str:
-        return f"{one.chain}, {one.frequency_hz:.1f} Hz" if several else one.chain
-
-    kinds = {key: list(there) for key, there in groupby(sorted(levels, key=kind), kind)}
+    """Chart the levels over the distance, a colour for each chain."""
+    kinds = {
+        key: list(there) for key, there in groupby(sorted(levels, key=lambda one: one.chain), lambda one: one.chain)
+    }
     wide = max(LEAST_WIDE_MM, *(one.distance_mm for one in levels))
     series = []
     for i, (key, there) in enumerate(kinds.items()):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +19,21 @@ import numpy as np
 
 from unitcad.errors import Refusal
 from unitcad.files import sha256
-from unitcad.lab.campaign import Campaign, RecordingTable, UnitTable, blank_files, check_files, own_keys, recording_of
+from unitcad.lab.campaign import (
+    Campaign,
+    RecordingTable,
+    SensorTable,
+    UnitTable,
+    blank_files,
+    check_files,
+    own_keys,
+    recording_of,
+)
 from unitcad.lab.chains import chains_of
 from unitcad.lab.chains.chain import Chain, Mains
 from unitcad.lab.chains.line import mains_columns, mains_orders, solve, trend_columns
 from unitcad.lab.readers import Layout, open_recording
-from unitcad.lab.record import LabFinding, RecordResult, found, measure_record, open_signal
+from unitcad.lab.record import LabFinding, RecordResult, expect_one_unit, found, measure_record, open_signal
 from unitcad.lab.unit_files import source_file
 
 COVERAGE = 0.95
@@ -125,7 +134,8 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     Raises Refusal for what can't be read.
     """
     check_files(campaign, folder)
-    mains = _mains_of_blanks(campaign, folder)
+    stated: dict[SensorTable, tuple[str, str]] = {}
+    mains = _mains_of_blanks(campaign, folder, stated)
     levels: list[PlaceLevel] = []
     records: dict[str, tuple[RecordResult, ...]] = {}
     findings: list[LabFinding] = []
@@ -133,7 +143,7 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     for i, unit in enumerate(campaign.unit):
         if name := source_file(unit, folder, f"unit.{i}"):
             specs[name] = sha256(folder / name)
-        records[unit.name] = tuple(one := _records(unit, campaign, folder, mains, say))
+        records[unit.name] = tuple(one := _records(unit, campaign, folder, mains, stated, say))
         findings += [finding for record in one for finding in record.findings]
         for role, distance in _places(unit):
             more, said = _levels(unit, role, distance, one, campaign)
@@ -142,7 +152,9 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     return Measured(campaign, tuple(levels), records, tuple(findings), specs, mains[0].blank, mains[1].blank)
 
 
-def _mains_of_blanks(campaign: Campaign, folder: Path) -> tuple[Mains, Mains]:
+def _mains_of_blanks(
+    campaign: Campaign, folder: Path, stated: dict[SensorTable, tuple[str, str]]
+) -> tuple[Mains, Mains]:
     """Return the mains of the unit's sensor and of the motor's, by multiple the largest amplitude of all records.
 
     The motor's are of the motor's channel if blank.records have it, of blank.motor_records if its sensor records alone,
@@ -159,7 +171,8 @@ def _mains_of_blanks(campaign: Campaign, folder: Path) -> tuple[Mains, Mains]:
                 own = msgspec.structs.replace(own, channel=own.motor_channel, motor_channel=None)
             with own_keys(table, name):
                 signal = open_signal(folder / name, own, (sensor,), name)
-            samples = next(signal.sections())[:, 0]
+            expect_one_unit(stated, signal.units, (sensor,), name)
+            samples = signal.samples[:, 0]
             good = np.isfinite(samples)
             time = np.arange(len(samples)) / signal.rate
             orders = mains_orders(hertz, signal.rate, (), float(time[-1]))
@@ -195,32 +208,44 @@ def _places(unit: UnitTable) -> list[tuple[str, float]]:
 
 
 def _records(
-    unit: UnitTable, campaign: Campaign, folder: Path, mains: tuple[Mains, Mains], say: Callable[[str], None]
+    unit: UnitTable,
+    campaign: Campaign,
+    folder: Path,
+    mains: tuple[Mains, Mains],
+    stated: dict[SensorTable, tuple[str, str]],
+    say: Callable[[str], None],
 ) -> list[RecordResult]:
-    """Measure a unit's records: the motor's first, whose frequency the others' lines are looked for near."""
+    """Measure a unit's records: the motor's first, near whose frequency the others' lines are looked for."""
     motor = campaign.motor_sensor or campaign.sensor
+    paired = campaign.recording.motor_channel is not None
     band = campaign.chain.band_hz
-    sensors = (campaign.sensor, motor) if campaign.recording.motor_channel is not None else (campaign.sensor,)
-    out = []
-    for name in unit.reference:
+    out: list[RecordResult] = []
+
+    def add(
+        name: str, role: str, sensors: tuple[SensorTable, ...], own: tuple[Mains, ...], band: tuple[float, float]
+    ) -> None:
         say(name)
-        out.append(measure_record(folder / name, "reference", campaign, (motor,), mains[1:], band, name, unit.lines))
+        out.append(measure_record(folder / name, role, campaign, sensors, own, band, name))
+        expect_one_unit(stated, out[-1].units, sensors, name)
+
+    for name in unit.reference:
+        add(name, "reference", (motor,), mains[1:], band)
     hertz = [record.frequency_hz for record in out if record.usable]
     if hertz:
         middle = float(np.median(hertz))
         band = (max(band[0], middle * (1 - NEAR_MOTOR)), min(band[1], middle * (1 + NEAR_MOTOR)))
+    sensors = (campaign.sensor, motor) if paired else (campaign.sensor,)
     places = [("edge", unit.edge), *((f"{point.distance_mm:g} mm", point.records) for point in unit.point)]
     for role, names in places:
         for name in names:
-            say(name)
-            out.append(measure_record(folder / name, role, campaign, sensors, mains, band, name, unit.lines))
+            add(name, role, sensors, mains, band)
     return out
 
 
 def _levels(
     unit: UnitTable, role: str, distance: float, records: list[RecordResult], campaign: Campaign
 ) -> tuple[list[PlaceLevel], list[LabFinding]]:
-    """Return a unit's levels at one place, by every chain and of every line, with what is wrong with them."""
+    """Return a unit's levels at one place by every chain, and the findings about them."""
     there = [record for record in records if record.role == role and record.usable]
     motor = [record for record in records if record.role == "reference" and record.usable]
     paired = campaign.recording.motor_channel is not None
@@ -229,56 +254,32 @@ def _levels(
         if len(side) < LEAST_REPEATS:
             return [], [found("L112", where, f"{len(side)} usable records; a level needs {LEAST_REPEATS}")]
     shared = max(record.shared for record in (*there, *motor))
+    base = there if paired else motor
+    middle = float(np.median([one.frequency_hz for one in base]))
+    near = [one for one in there if abs(one.frequency_hz - middle) < MOST_APART * middle]
+    if not near:
+        return [], [found("L116", where, f"nothing near the motor's {middle:.2f} Hz")]
+    hertz = float(np.median([one.frequency_hz for one in near]))
     levels: list[PlaceLevel] = []
     findings: list[LabFinding] = []
     for chain in chains_of(campaign.chain):
-        for hertz, values, below in _sides(chain, there, there if paired else motor):
-            at, count = f"{where}, {hertz:.2f} Hz, by {chain.name}", min(len(values), len(below))
-            if not values:
-                none = found("L116", where, f"nothing near the motor's {hertz:.2f} Hz")
-                findings += [] if none in findings else [none]  # the same of every chain
-            elif count < LEAST_REPEATS:
-                findings.append(found("L112", at, f"{count} usable records; a level needs {LEAST_REPEATS}"))
-            else:
-                result = level(values, None if paired else below, shared)
-                levels.append(PlaceLevel(unit.name, distance, chain.name, result, hertz))
-                if result.scatter > MOST_DISAGREEMENT:
-                    message = f"by {chain.name}: logarithms scatter by {result.scatter:.2f}"
-                    findings.append(found("L109", where, message))
-    if len({one.chain for one in levels}) == len(levels):
-        for one, other in combinations(levels, 2):
-            if one.level.high < other.level.low or other.level.high < one.level.low:
-                said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
-                findings.append(found("L115", where, said))
+        values, below = (
+            [one.by_chain[chain.name] for one in side if chain.name in one.by_chain] for side in (near, base)
+        )
+        if not values:  # L114 or L106 says why
+            continue
+        count = min(len(values), len(below))
+        if count < LEAST_REPEATS:
+            message = f"{count} usable records; a level needs {LEAST_REPEATS}"
+            findings.append(found("L112", f"{where}, {hertz:.2f} Hz, by {chain.name}", message))
+            continue
+        result = level(values, None if paired else below, shared)
+        levels.append(PlaceLevel(unit.name, distance, chain.name, result, hertz))
+        if result.scatter > MOST_DISAGREEMENT:
+            message = f"by {chain.name}: logarithms scatter by {result.scatter:.2f}"
+            findings.append(found("L109", where, message))
+    for one, other in combinations(levels, 2):
+        if one.level.high < other.level.low or other.level.high < one.level.low:
+            said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
+            findings.append(found("L115", where, said))
     return levels, findings
-
-
-def _sides(
-    chain: Chain, there: list[RecordResult], motor: list[RecordResult]
-) -> list[tuple[float, list[float], list[float]]]:
-    """Return frequency, the records' values and the motor's, of each line that the motor's records have.
-
-    A chain that tells no lines apart has one entry. No values at all: no record has a line near the motor's.
-    """
-
-    def near(records: list[RecordResult], hertz: float, most: float) -> list[tuple[float, float]]:
-        """Return of each record its nearest line to a frequency, of records that have one close enough."""
-        lines = [min(one.by_line, key=lambda line: abs(line[0] - hertz)) for one in records if one.by_line]
-        return [line for line in lines if abs(line[0] - hertz) < most]
-
-    def sizes(lines: list[tuple[float, float]]) -> list[float]:
-        return [value for _, value in lines]
-
-    lines = sorted(hertz for hertz, _ in max(motor, key=lambda one: len(one.by_line)).by_line)
-    if chain.each_line and len(lines) > 1:
-        gap = min(b - a for a, b in pairwise(lines)) / 2
-        return [(hertz, sizes(near(there, hertz, gap)), sizes(near(motor, hertz, gap))) for hertz in lines]
-    middle = float(np.median([one.frequency_hz for one in motor]))
-    values = near(there, middle, MOST_APART * middle)
-    if not values or chain.each_line:
-        hertz = float(np.median([hz for hz, _ in near(there, middle, np.inf)])) if values else middle
-        return [(hertz, sizes(values), sizes(near(motor, middle, MOST_APART * middle)))]
-    values, below = (
-        [one.by_chain[chain.name] for one in side if chain.name in one.by_chain] for side in (there, motor)
-    )
-    return [(float(np.median([one.frequency_hz for one in there])), values, below)] if values else []

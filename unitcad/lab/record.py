@@ -1,8 +1,7 @@
-"""One record measured: its sections fitted and judged, its line as displacement by each chain of the campaign."""
+"""One record measured: its line fitted and judged, as displacement by each chain of the campaign."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,13 +12,13 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.check.rules.rule import Rule
 from unitcad.errors import Refusal
 from unitcad.files import sha256
-from unitcad.geometry.arrays import Floats
+from unitcad.geometry.arrays import Floats, Ints
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, own_keys, recording_of
 from unitcad.lab.chains import chains_of
-from unitcad.lab.chains.chain import Chain, Line, LineFit, Mains
-from unitcad.lab.chains.line import LOWEST, clip_mask, fit_line, spectrum
+from unitcad.lab.chains.chain import LineFit, Mains
+from unitcad.lab.chains.line import clip_level, fit_line, spectrum
 from unitcad.lab.readers import TIME_NAMES, Layout, Recording, open_recording
-from unitcad.lab.units import UNITS, plain, seconds, to_si
+from unitcad.lab.units import UNITS, plain, ratio, seconds, to_si
 
 RULES = {
     rule.code: rule
@@ -27,31 +26,28 @@ RULES = {
         Rule,
         (
             """L101 error: clipped
-            The samples stay at a level that the motion exceeds. Down to 0.7 of the amplitude the rest
-            is fitted; below, no amplitude is given. Example: An accelerometer of 2 g at 3 g. Fix: Widen
-            the sensor's range.""",
+            The samples stay at a level that the motion exceeds, so no amplitude is given. Example: An
+            accelerometer of 2 g at 3 g. Fix: Set a larger range or a lower gain, and record again.""",
             """L102 error: sampled too slowly
             Fewer than four samples a period: the sensor's filter and aliases change the amplitude.
             Example: 400 Hz for a motor of 125 Hz. Fix: Sample at 1 kHz or faster.""",
             """L103 error: uneven time axis
             A time lies off an even grid by more than 0.3 of a step: samples are missing or the clock
             varies. Example: A logger over USB that loses a packet. Fix: Record with a hardware clock.""",
-            """L104 warning: several lines
-            The band holds another number of lines than the unit's key lines says, which is 1 if left
-            out. They were fitted together; the strongest one's amplitude is given. Example: Two motors
-            of an array. Fix: Set lines = 2 in the unit's table, run one motor, or say which line is
-            meant by chain.band_hz.""",
+            """L104 error: several lines
+            A second line lies near the strongest one, so no amplitude is given: it would be none of
+            theirs. Example: Two motors of an array at once. Fix: Run one motor at a time.""",
             """L105 warning: line on the mains
             The record can't tell the line from a multiple of the mains' frequency. Example: A motor at
-            100.2 Hz over 2 s. Fix: Change the drive's voltage, record longer, or add a motor-off record
-            as [blank].""",
+            100.2 Hz over 2 s. Fix: Record longer, or change the drive's voltage until the line is off the
+            multiple.""",
             """L106 warning: line in the comb's null
             A chain's filters pass less than 0.9 of the line. Example: A motor at 100 Hz and the paper's
             comb at 50 Hz. Fix: Use the chain line, or another drive voltage.""",
             """L107 warning: unsteady
-            The amplitude varies by more than 5 %, slowly or up and down, or the frequency by more than
-            5 %, beyond the spin-up; or less than half of the record is steady. Example: A battery that
-            runs down. Fix: Use a regulated supply and let the motor warm up.""",
+            The amplitude or the frequency varies by more than 5 % in the steady part, or less than half
+            of the record is steady. Example: A battery that runs down. Fix: Use a regulated supply and
+            let the motor warm up, or cut the record.""",
             """L108 warning: fewer than 20 periods
             The steady part is too short for the noise beside the line to be known. Example: 0.1 s at
             125 Hz. Fix: Record 2 s.""",
@@ -67,13 +63,9 @@ RULES = {
             """L112 error: too few repeats
             Fewer than three usable records are left: no level is given. Example: One of three is
             clipped. Fix: Repeat.""",
-            """L113 warning: no line in a part
-            A section of a long record has no line where others have one; the amplitude is that of the
-            others. Example: The motor stopped. Fix: Cut the record where the motor stopped, or
-            repeat.""",
             """L114 warning: not fit for a chain
-            The chain gives no amplitude of this record: of drop-outs, clipped samples, several lines,
-            or one that is too short. Example: The chain paper and a spike. Fix: Use the chain line.""",
+            The chain gives no amplitude of a record with drop-outs, missing samples or too few samples.
+            Example: The chain paper and a spike. Fix: Use the chain line.""",
             """L115 warning: chains disagree
             The intervals of two chains do not overlap. Example: Hum that one chain does not remove.
             Fix: Look at the spectra of the records.""",
@@ -115,10 +107,12 @@ def found(code: str, where: str, message: str, severity: str | None = None) -> L
     return LabFinding(code, severity or RULES[code].severity, where, message)
 
 
-SECTION = 2**18
-"""Samples that are fitted at a time: a longer record is fitted in sections."""
+LONGEST_S = 60.0
+"""Seconds of a record that is measured: the line of a longer one has too many parameters to be fitted at once."""
 IRREGULAR = 0.3
 """Steps by which a time may lie off an even grid."""
+ON_GRID = 0.1
+"""The same for times among which some are lost."""
 SAME_RATE = 1e-3
 """Part by which the campaign's rate may differ from the file's own."""
 HIGHEST_RATE = 5_000.0
@@ -130,7 +124,7 @@ class Signal:
     """A record's samples (n, channels) at `rate` in Hz: means of `averaged` neighbours of the file's at `raw_rate`.
 
     `count` and `missing`: samples of the file, and of each channel those that are no numbers; `off_grid`: by how many
-    steps a time lies off an even grid.
+    steps a time lies off an even grid; `units`: of each channel in the file, "" if the file gives none.
     """
 
     samples: Floats
@@ -139,6 +133,7 @@ class Signal:
     count: int
     missing: tuple[int, ...]
     off_grid: float
+    units: tuple[str, ...]
 
     @property
     def rate(self) -> float:
@@ -149,14 +144,6 @@ class Signal:
         """Return the gain that the averaging has at a frequency."""
         angle = np.pi * frequency_hz / self.raw_rate
         return float(np.sin(self.averaged * angle) / (self.averaged * np.sin(angle))) if self.averaged > 1 else 1.0
-
-    def sections(self) -> Iterator[Floats]:
-        """Yield the samples in sections; the last one has a quarter more at most."""
-        start = 0
-        while len(self.samples) - start >= SECTION + SECTION // 4:
-            yield self.samples[start : start + SECTION]
-            start += SECTION
-        yield self.samples[start:]
 
 
 def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, ...], shown: str) -> Signal:
@@ -182,22 +169,94 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
             column = others[0]
         columns.append(column)
     rate, stamps = _rate(recording, table, time, columns[0], shown)
-    for column, sensor in zip(columns, sensors, strict=True):
-        own = plain(channels[column].unit)
-        if sensor.scale == 1.0 and own and own != plain(sensor.unit):
-            limit = f"but {shown} says {own} for {channels[column].name}; declare sensor.scale, or the unit"
-            raise Refusal("sensor.unit", sensor.unit, limit, own if own in UNITS[sensor.quantity] else None)
+    units = tuple(plain(channels[column].unit) for column in columns)
+    factors = [
+        _factor(sensor, own, f"{shown}, {channels[column].name}")
+        for column, own, sensor in zip(columns, units, sensors, strict=True)
+    ]
     samples = recording.columns(columns)
     count, missing = len(samples), tuple(int(n) for n in np.count_nonzero(~np.isfinite(samples), axis=0))
     off_grid = 0.0
     if stamps is not None:
-        off = np.abs((stamps - stamps[0]) * rate - np.arange(count))
-        off_grid = float(off.max()) if np.isfinite(off).all() else np.inf
-    samples = samples * [sensor.scale for sensor in sensors]
+        off_grid = _off_grid(stamps, rate)
+        if off_grid > IRREGULAR and (places := _places(stamps)) is not None:
+            # A logger that lost samples: their places on the even grid stay empty.
+            whole = np.full((places[-1] + 1, samples.shape[1]), np.nan)
+            whole[places] = samples
+            rate, off_grid = float(places[-1] / (stamps[-1] - stamps[0])), 0.0
+            missing = tuple(int(n + len(whole) - count) for n in missing)
+            samples, count = whole, len(whole)
+    if (length := count / rate) > LONGEST_S:
+        raise Refusal(shown, None, f"lasts {length:.4g} s; cut the record to {LONGEST_S:g} s or less")
+    samples = samples * factors
     averaged = max(int(rate / HIGHEST_RATE), 1)
     if averaged > 1:
         samples = samples[: count // averaged * averaged].reshape(-1, averaged, samples.shape[1]).mean(axis=1)
-    return Signal(samples, rate, averaged, count, missing, off_grid)
+    return Signal(samples, rate, averaged, count, missing, off_grid, units)
+
+
+def _off_grid(stamps: Floats, rate: float) -> float:
+    """Return by how many steps a time lies off an even grid."""
+    off = np.abs((stamps - stamps[0]) * rate - np.arange(len(stamps)))
+    return float(off.max()) if np.isfinite(off).all() else np.inf
+
+
+def _places(stamps: Floats) -> Ints | None:
+    """Return the times' places on an even grid of at most twice as many; None if a time lies off it."""
+    steps = np.diff(stamps)
+    if not (np.isfinite(stamps).all() and (steps > 0).all()):
+        return None
+    step = float(np.median(steps))
+    places = np.cumsum(np.concatenate([[0], np.round(steps / step)])).astype(int)
+    step = float((stamps[-1] - stamps[0]) / places[-1])
+    off = np.abs((stamps - stamps[0]) / step - places)
+    return places if off.max() <= ON_GRID and np.diff(places).min() > 0 and places[-1] < 2 * len(places) else None
+
+
+def _factor(sensor: SensorTable, own: str, shown: str) -> float:
+    """Return the factor from numbers of a file to the sensor's unit; `own` is their unit, "" if the file gives none.
+
+    Raises Refusal for a unit that doesn't fit the sensor's, and for a scale that may be per one unit or another.
+    """
+    per = plain(sensor.per) if sensor.per else ""
+    if not own or own == per:
+        return sensor.scale
+    if per:
+        if (factor := ratio(own, per)) is None:
+            raise Refusal("sensor.per", sensor.per, f"but {shown}, says {own}", own)
+        return sensor.scale * factor
+    if own in UNITS[sensor.quantity]:
+        if sensor.scale != 1.0:
+            limit = f"{shown}, says {own}, which needs no scale; for a gain, set sensor.per = {own!r}"
+            raise Refusal("sensor.scale", sensor.scale, limit, 1.0)
+        return ratio(own, plain(sensor.unit)) or 1.0
+    if sensor.scale == 1.0:
+        limit = f"but {shown}, says {own}: declare sensor.scale and sensor.per, or another quantity"
+        raise Refusal("sensor.unit", sensor.unit, limit)
+    if ratio(own, "V") not in (None, 1.0):
+        limit = f"is needed: {shown}, says {own}; is the scale per {own} or per V?"
+        raise Refusal("sensor.per", None, limit, "V")
+    return sensor.scale
+
+
+def expect_one_unit(
+    stated: dict[SensorTable, tuple[str, str]],
+    units: tuple[str, ...],
+    sensors: tuple[SensorTable, ...],
+    shown: str,
+) -> None:
+    """Compare the units of a record with those of the records before, which `stated` has by sensor with their unit.
+
+    Raises Refusal for two units that this program can't convert into each other, or a unit and none.
+    """
+    for own, sensor in zip(units, sensors, strict=True):
+        before, file = stated.setdefault(sensor, (own, shown))
+        alone = plain(sensor.unit) if sensor.scale == 1.0 else ""  # the unit of numbers without one
+        if sensor.per is None and own != before and ratio(own or alone, before or alone) != 1.0:
+            if own and before and ratio(own, before) is not None:
+                continue
+            told = [f"{name} gives {unit or 'no unit'}" for name, unit in ((shown, own), (file, before))]
+            raise Refusal("sensor.per", None, f"is needed: {told[0]}, {told[1]}", own or before)
 
 
 def _rate(
@@ -263,9 +322,9 @@ class RecordResult:
     """A record's figures; amplitudes (peak) and standard uncertainties in um. `ratio` is to the motor's own channel.
 
     `usable`: it counts for levels. `by_chain` has each chain's amplitude over which a level is taken, without the
-    chains that the record is not fit for; `by_line` the same of each line in the band by the chain `line`, with its
-    frequency; `gains` what a chain's filters pass of the line; `picture` the samples and the spectrum of its first
-    section, in the sensor's unit.
+    chains that the record is not fit for; `gains` what a chain's filters pass of the line; `lines` the frequencies of a
+    record that has several lines, which has no amplitude; `picture` the samples and the spectrum, in the sensor's unit;
+    `units` the units of the channels in the file.
     """
 
     file: str
@@ -276,6 +335,7 @@ class RecordResult:
     unit: str
     picture: tuple[Floats, Floats, Floats, Floats]
     findings: tuple[LabFinding, ...]
+    units: tuple[str, ...] = ()
     usable: bool = False
     amplitude_um: float = 0.0
     u_um: float = 0.0
@@ -285,11 +345,10 @@ class RecordResult:
     snr: float = 0.0
     steady_s: float = 0.0
     masked: float = 0.0
-    lines: tuple[Line, ...] = ()
+    lines: tuple[float, ...] = ()
     ratio: float | None = None
     lag_deg: float | None = None
     by_chain: dict[str, float] = field(default_factory=dict)
-    by_line: tuple[tuple[float, float], ...] = ()
     gains: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -299,16 +358,14 @@ class RecordResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Return JSON-ready data, six significant digits; a record that counts for nothing has no uncertainty."""
-        size = "amplitude_um" if self.ratio is None else "ratio"
         data = {key: value for key, value in vars(self).items() if isinstance(value, float | int | str)}
         data |= {} if self.usable else {"u_um": None, "shared": None}
-        lines = [{"frequency_hz": one.frequency_hz, "amplitude_um": one.amplitude, "u_um": one.u} for one in self.lines]
+        data |= {} if self.frequency_hz else {"amplitude_um": None}
         data |= {
             "length_s": self.length_s,
             "by_chain": self.by_chain,
-            "by_line": [{"frequency_hz": hertz, size: value} for hertz, value in self.by_line],
             "gains": self.gains,
-            "lines": lines if self.usable else [one | {"u_um": None} for one in lines],
+            "lines": [{"frequency_hz": hertz} for hertz in self.lines],
             "findings": [one.as_dict() for one in self.findings],
         }
         return rounded(data, 6)
@@ -322,121 +379,93 @@ def measure_record(
     mains: tuple[Mains, ...],
     band: tuple[float, float],
     shown: str,
-    lines: int = 1,
 ) -> RecordResult:
     """Return a record's figures by every chain of the campaign; `mains` and `sensors` are the unit's, then the motor's.
 
-    `band` is where its line is looked for, in Hz; `lines` how many it is expected to have.
-    Raises Refusal for what can't be read.
+    `band` is where its line is looked for, in Hz. Raises Refusal for a record that can't be read.
     """
     with own_keys(campaign.recording, shown):
         signal = open_signal(path, recording_of(campaign.recording, shown), sensors, shown)
-    chains, whole_band, mains_hz = chains_of(campaign.chain), campaign.chain.band_hz, campaign.chain.mains_hz
-    names = (shown, f"{shown}, motor")
-    sections: list[_Section] = []
-    silent: list[tuple[float, int]] = []
-    clipped = np.full(len(sensors), np.inf)
-    outside: float | None = None
-    picture: tuple[Floats, ...] = ()
-    at_s = 0.0
-    for samples in signal.sections():
-        one = _fit_section(samples, signal.rate, band, mains, sensors, chains)
-        frequency, size = spectrum(np.where(np.isfinite(samples[:, 0]), samples[:, 0], 0.0), signal.rate)
-        low = frequency <= min(HIGHEST_HZ, signal.rate / 2)
-        frequency, size = frequency[low], size[low]
-        picture = picture or (np.arange(len(samples)) / signal.rate, samples[:, 0].copy(), frequency, size)
-        if isinstance(one, int):
-            silent.append((at_s, one))
-            parts = [_clipped(channel) for channel in samples.T]
-        else:
-            sections.append(one)
-            parts = [fit.clipped for fit in one.fits]
-            outside = outside or _outside(frequency, size, whole_band, mains_hz, one.fits[0].frequency_hz)
-        clipped = np.minimum(clipped, parts)
-        at_s += len(samples) / signal.rate
-    hertz = _outside(*picture[2:], band, mains_hz)
+    chains, mains_hz = chains_of(campaign.chain), campaign.chain.mains_hz
+    names = (shown, f"{shown}, motor")[: len(sensors)]
+    samples, rate = signal.samples, signal.rate
+    frequency, size = spectrum(np.where(np.isfinite(samples[:, 0]), samples[:, 0], 0.0), rate)
+    low = frequency <= min(HIGHEST_HZ, rate / 2)
+    frequency, size = frequency[low], size[low]
+    picture = (np.arange(len(samples)) / rate, samples[:, 0], frequency, size)
+    hertz = _outside(frequency, size, band, mains_hz)
     hint = f"; the strongest line outside that is at about {hertz:.0f} Hz" if hertz else ""
     findings: list[LabFinding] = []
     if signal.off_grid > IRREGULAR:
         findings.append(found("L103", shown, f"a time lies {signal.off_grid:.2g} steps off an even grid"))
-    for part, gaps, where in zip(clipped, signal.missing, names, strict=False):
-        if part < np.inf:
-            severity = "error" if part < LOWEST else "warning"
-            findings.append(found("L101", where, f"at about {part:.2f} of the amplitude", severity))
+    fits = _fits(samples, rate, band, mains, sensors)
+    for fit, channel, gaps, where in zip(fits, samples.T, signal.missing, names, strict=True):
+        level = fit.clipped if fit else _clipped(channel)
+        if level < np.inf:
+            findings.append(found("L101", where, f"at about {level:.2f} of the amplitude"))
         if gaps:
             message = f"{gaps} of {signal.count} samples ({gaps / signal.count:.2g} of them) are no numbers"
             severity = "error" if gaps > MOST_MASKED * signal.count else "warning"
             findings.append(found("L119", where, message, severity))
-    result = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, sensors[0].unit, picture, ())
-    if not sections:
-        message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz{hint}"
-        return replace(result, findings=(*findings, found("L111", names[silent[0][1]], message)))
-    counts = [one.count for one in sections]
-    fit, *motors = (_together(fits, counts) for fits in zip(*(one.fits for one in sections), strict=True))
+    none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, sensors[0].unit, picture, ())
+    none = replace(none, units=signal.units)
+    if any(one.code == "L101" for one in findings):
+        return replace(none, findings=tuple(findings))
+    for each, where in zip(fits, names, strict=True):
+        if each is None:
+            message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz{hint}"
+            return replace(none, findings=(*findings, found("L111", where, message)))
+        if each.lines:
+            listed = ", ".join(f"{one.frequency_hz:.2f} Hz" for one in each.lines)
+            message = f"{listed}, of {', '.join(_sizes(each))} of the strongest; run one motor at a time"
+            lines = tuple(one.frequency_hz for one in each.lines)
+            return replace(none, findings=(*findings, found("L104", where, message)), lines=lines)
+    fit, *motors = (each for each in fits if each)
     motor = motors[0] if motors else None
     for each, where, known in zip((fit, *motors), names, mains, strict=False):
-        for one in _of_line(each, signal.rate, signal.raw_rate, where, known, lines):
+        for one in _of_line(each, rate, signal.raw_rate, where, known):
             if (one.code, where) == ("L111", shown):
                 one = replace(one, message=one.message + hint)
             if each is fit or one.code not in _OF_THE_RATE:
                 findings.append(one)
-    steady, length = sum(one.fits[0].end_s - one.fits[0].start_s for one in sections), sum(counts) / signal.rate
+    steady, length = fit.end_s - fit.start_s, len(samples) / rate
     if steady < LEAST_STEADY * length and not any(one.severity == "error" for one in findings):
         message = f"steady for {steady:.2f} s of {length:.2f} s; only that part was used"
         findings.append(found("L107", shown, message))
-    if silent:
-        count = len(sections) + len(silent)
-        message = f"{len(silent)} of {count} sections, the first from {silent[0][0]:.0f} s of {at_s:.0f} s"
-        findings.append(found("L113", shown, message))
+    outside = _outside(frequency, size, campaign.chain.band_hz, mains_hz, fit.frequency_hz)
     if outside is not None:
         findings.append(found("L117", shown, f"a stronger line lies at about {outside:.0f} Hz, outside chain.band_hz"))
     hertz = fit.frequency_hz
     factor = displacement(sensors[0], hertz) / signal.gain(hertz)
-    whole, ratio, lag = fit.amplitude * factor, None, None
+    ratio, lag = None, None
     if motor is not None:  # displacement over the motor's, and its phase, behind the motor's where negative
         turn = [displacement(sensor, hertz) / 1j ** _ORDER[sensor.quantity] for sensor in sensors]
-        values = [one.fits[0].value / one.fits[1].value for one in sections]
-        value = complex(np.mean(values)) * turn[0] / turn[1]
-        whole = ratio = abs(value)
-        lag = float(np.degrees(np.angle(value)))
-
-    def over_motor(hertz: float) -> float:
-        return displacement(sensors[0], hertz) / displacement(sensors[1], hertz)
-
+        value = fit.value / motor.value * turn[0] / turn[1]
+        ratio, lag = abs(value), float(np.degrees(np.angle(value)))
+        over = displacement(sensors[0], hertz) / displacement(sensors[1], hertz)
+    else:
+        over = factor
     by_chain, gains, unfit = {}, {}, []
     for chain in chains:
-        values = [one.amplitudes[chain.name] for one in sections]
-        reason = chain.unfit([each for one in sections for each in one.fits])
-        reason = reason or next((one for one in values if isinstance(one, str)), "")
         if chain.gain:
             gains[chain.name] = chain.gain(hertz)
         if (gain := gains.get(chain.name, 1.0)) < LEAST_GAIN:
             message = f"the filters of the chain {chain.name} pass {gain:.3f} of {hertz:.2f} Hz"
             findings.append(found("L106", shown, message))
+        try:
+            values = [chain.amplitude(samples[:, i], rate, each) for i, each in enumerate((fit, *motors))]
+            reason = chain.unfit([fit, *motors])
+        except Refusal as refusal:
+            values, reason = [], refusal.limit
         if reason:
             unfit.append(found("L114", shown, f"{chain.name}: {reason}"))
         elif gain >= LEAST_GAIN:
-            mean = float(np.average(np.array(values, float), weights=counts))
-            by_chain[chain.name] = mean * (factor if motor is None else over_motor(hertz))
+            by_chain[chain.name] = over * (values[0] / values[1] if motor else values[0])
     if "line" in by_chain:
-        by_chain["line"] = whole
+        by_chain["line"] = fit.amplitude * factor if ratio is None else ratio
     findings += unfit
-    # The lines of the section that has most of them, each over the motor's line of the same frequency.
-    by_line = [(hertz, whole)]
-    most = max(sections, key=lambda one: len(one.fits[0].lines)).fits
-    if any(each.lines for each in most):
-        by_line = []
-        for line in _lines(most[0]):
-            size = line.amplitude * factor
-            if motor is not None:
-                near = min(_lines(most[1]), key=lambda one: abs(one.frequency_hz - line.frequency_hz))
-                if abs(near.frequency_hz - line.frequency_hz) > SAME_LINE_HZ:
-                    continue
-                size = line.amplitude / near.amplitude * over_motor(line.frequency_hz)
-            if whole_band[0] <= line.frequency_hz <= whole_band[1]:
-                by_line.append((line.frequency_hz, size))
     return replace(
-        result,
+        none,
         findings=tuple(findings),
         usable=not any(one.severity == "error" for one in findings),
         amplitude_um=fit.amplitude * factor,
@@ -447,13 +476,15 @@ def measure_record(
         snr=fit.snr,
         steady_s=steady,
         masked=fit.masked,
-        lines=tuple(Line(one.frequency_hz, one.amplitude * factor, one.u * factor) for one in fit.lines),
         ratio=ratio,
         lag_deg=lag,
         by_chain=by_chain,
-        by_line=tuple(by_line),
         gains=gains,
     )
+
+
+def _sizes(fit: LineFit) -> list[str]:
+    return [f"{one.amplitude / fit.lines[0].amplitude:.2f}" for one in fit.lines]
 
 
 def displacement(sensor: SensorTable, frequency_hz: float) -> float:
@@ -462,97 +493,35 @@ def displacement(sensor: SensorTable, frequency_hz: float) -> float:
     return 1e6 * si / (2 * np.pi * frequency_hz) ** _ORDER[sensor.quantity]
 
 
-@dataclass(frozen=True)
-class _Section:
-    """A section of `count` samples: the fit of the unit's channel and of the motor's, if there is one.
-
-    `amplitudes` has by chain the amplitude in the sensor's unit, over the motor's in its own if there is one; or the
-    reason why the chain can't take the section.
-    """
-
-    fits: tuple[LineFit, ...]
-    amplitudes: dict[str, float | str]
-    count: int
-
-
-def _fit_section(
+def _fits(
     samples: Floats,
     rate: float,
     band: tuple[float, float],
     mains: tuple[Mains, ...],
     sensors: tuple[SensorTable, ...],
-    chains: tuple[Chain, ...],
-) -> _Section | int:
-    """Fit one section: the motor's channel first, if there is one, whose phase the other channel then has.
-
-    Returns the number of the channel that has no line, if one has none: 0 the unit's, 1 the motor's.
-    """
-    fits: list[LineFit] = []
+) -> list[LineFit | None]:
+    """Return the line of each channel, None without one. The other channel has the phase of the motor's line."""
+    fits: list[LineFit | None] = []
     for i in reversed(range(samples.shape[1])):
-        shared = (fits[0].phase, (fits[0].start_s, fits[0].end_s)) if fits else (None, None)
+        motor = fits[0] if fits else None
+        shared = (motor.phase, (motor.start_s, motor.end_s)) if motor else (None, None)
         fit = fit_line(samples[:, i], rate, band, mains[i], sensors[i].full_scale, *shared)
-        if fit is None or not fit.amplitude > 0:
-            return i
-        fits.insert(0, fit)
-    amplitudes: dict[str, float | str] = {}
-    for chain in chains:
-        try:
-            values = [chain.amplitude(samples[:, i], rate, fit) for i, fit in enumerate(fits)]
-            amplitudes[chain.name] = values[0] / values[1] if len(values) > 1 else values[0]
-        except Refusal as refusal:
-            amplitudes[chain.name] = refusal.limit
-    return _Section(tuple(fits), amplitudes, len(samples))
+        fits.insert(0, fit if fit and fit.amplitude > 0 else None)
+    return fits
 
 
-def _lines(fit: LineFit) -> tuple[Line, ...]:
-    return fit.lines or (Line(fit.frequency_hz, fit.amplitude, fit.u),)
-
-
-def _together(fits: tuple[LineFit, ...], counts: list[int]) -> LineFit:
-    """Return one fit for all sections of `counts` samples: mean amplitude and frequency, the worst of what warns."""
-    if len(fits) == 1:
-        return fits[0]
-    weights = np.array(counts) / sum(counts)
-    amplitudes, hertz = ([getattr(fit, key) for fit in fits] for key in ("amplitude", "frequency_hz"))
-    amplitude, frequency = float(weights @ amplitudes), float(weights @ hertz)
-    u, u_noise = (float(np.linalg.norm(weights * [getattr(fit, key) for fit in fits])) for key in ("u", "u_noise"))
-    worst = {key: max(getattr(fit, key) for fit in fits) for key in ("u_mains", "drift", "scatter", "mains_hz")}
-    means = {key: float(weights @ [getattr(fit, key) for fit in fits]) for key in ("masked", "dropped", "missing")}
-    worst["drift"] = max(float(np.ptp(hertz)) / frequency, worst["drift"])
-    worst["scatter"] = max(float(np.std(amplitudes)) / amplitude, worst["scatter"])
-    return replace(
-        fits[0],
-        amplitude=amplitude,
-        u=float(np.hypot(u, worst["u_mains"])),
-        u_noise=u_noise,
-        frequency_hz=frequency,
-        snr=float(np.median([fit.snr for fit in fits])),
-        end_s=fits[0].start_s + sum(fit.end_s - fit.start_s for fit in fits),
-        clipped=min(fit.clipped for fit in fits),
-        lines=max((fit.lines for fit in fits), key=len),
-        phase=None,
-        blocks=(),
-        **worst,
-        **means,
-    )
-
-
-def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Mains, lines: int) -> list[LabFinding]:
-    """Return what is wrong with a line, in the order of the codes, beside clipping; `lines` are expected.
-
-    Of a channel that is clipped beyond repair nothing is said that follows from it: its fit leaves much, and changes.
-    """
+def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Mains) -> list[LabFinding]:
+    """Return the findings about a single line, in the order of their codes."""
     out = []
 
     def say(code: str, message: str, severity: str | None = None) -> None:
         out.append(found(code, where, message, severity))
 
     hertz = fit.frequency_hz
-    cut_off = fit.clipped < LOWEST
-    if fit.masked > MOST_MASKED and not cut_off:
+    if fit.masked > MOST_MASKED:
         say("L110", f"{fit.masked:.0%} of the samples were left out")
     own = float(np.sqrt(max(fit.u**2 - fit.u_mains**2, 0.0))) if fit.snr < 1 else fit.u_noise
-    if fit.amplitude < LEAST_OVER_U * own and not cut_off:  # nothing else can be said of a line that is not there
+    if fit.amplitude < LEAST_OVER_U * own:  # nothing else can be said of a line that is not there
         say("L111", f"the strongest has {fit.amplitude / own:.1f} times its uncertainty")
         return out
     if raw_rate < 4 * hertz:
@@ -564,20 +533,14 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
     if periods < LEAST_PERIODS:
         severity = "error" if periods < NO_PERIODS else "warning"
         say("L108", f"{periods:.0f} periods in the steady part", severity)
-    if not cut_off:
-        there = _lines(fit)
-        if len(there) != lines:
-            listed = ", ".join(f"{one.frequency_hz:.2f} Hz ({one.amplitude / fit.amplitude:.2f})" for one in there)
-            expected = f", {lines} expected" if lines > 1 else ""
-            say("L104", f"{len(there)} line{'s' if len(there) > 1 else ''}{expected}: {listed}")
-        noise = np.sqrt(2 / max(0.2 * rate, 1)) / fit.snr
-        scatter = float(np.sqrt(max(fit.scatter**2 - noise**2, 0.0)))
-        if not fit.lines and (scatter > MOST_SCATTER or fit.drift > MOST_DRIFT):
-            say("L107", f"amplitude varies by {scatter:.1%}, frequency by {fit.drift:.1%}")
-        if 2 * fit.u > fit.amplitude:
-            say("L118", f"twice the uncertainty is {2 * fit.u / fit.amplitude:.1f} times the amplitude", "error")
-        elif fit.snr < LEAST_SNR:
-            say("L118", f"the amplitude is {fit.snr:.1f} times the noise's standard deviation")
+    noise = np.sqrt(2 / max(0.2 * rate, 1)) / fit.snr
+    scatter = float(np.sqrt(max(fit.scatter**2 - noise**2, 0.0)))
+    if scatter > MOST_SCATTER or fit.drift > MOST_DRIFT:
+        say("L107", f"amplitude varies by {scatter:.1%}, frequency by {fit.drift:.1%}")
+    if 2 * fit.u > fit.amplitude:
+        say("L118", f"twice the uncertainty is {2 * fit.u / fit.amplitude:.1f} times the amplitude", "error")
+    elif fit.snr < LEAST_SNR:
+        say("L118", f"the amplitude is {fit.snr:.1f} times the noise's standard deviation")
     return sorted(out, key=lambda one: one.code)
 
 
@@ -608,4 +571,4 @@ def _clipped(samples: Floats) -> float:
     good = np.isfinite(samples)
     if good.sum() < 16 or not np.ptp(samples[good]) > 0:
         return float("inf")
-    return clip_mask(np.where(good, samples - np.median(samples[good]), 0.0), good)[1]
+    return clip_level(np.where(good, samples - np.median(samples[good]), 0.0), good)

@@ -1,7 +1,7 @@
 """A silicone's quasi-static modulus from the curves of its specimens, with a range and warnings. SI inside.
 
-The range covers what could be defended: the stable methods' least and largest value, widened by the scatter of the
-specimens (Student's t, 95 %, of the mean of logarithms) and by the error of the cross-section.
+The range runs from the least to the largest value of the methods, widened by the scatter of the specimens (Student's t,
+95 %, of the mean of logarithms) and by the error of the cross-section.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 
@@ -20,131 +19,7 @@ from unitcad import files
 from unitcad.catalogue import Material
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.lab.columns import Declared, column_of, columns, columns_of
-from unitcad.lab.readers import Layout, open_recording
-
-Law = Literal["neo-Hooke", "Mooney", "Yeoh", "Ogden"]
-MODES: Mapping[str, tuple[float, float]] = {"tension": (1.0, -0.5), "plane strain": (1.0, 0.0), "biaxial": (1.0, 1.0)}
-"""Logarithmic strains along the first two axes, per strain of the first: a bar, a wide strip, a sheet."""
-LEAST_POINTS_OF: Mapping[Law, int] = {"neo-Hooke": 2, "Mooney": 3, "Yeoh": 4, "Ogden": 3}
-"""Points that a fit needs: one more than constants."""
-_STEPS = 400
-
-
-@dataclass(frozen=True)
-class HyperelasticFit:
-    """A law with its constants (Pa; alpha is a number), fitted up to a strain.
-
-    `youngs_modulus`: at zero strain, Pa. `residual`: rms of the misfit over the rms of the stress. `unstable`: for each
-    mode the least strain at which Hill's condition fails.
-    """
-
-    law: Law
-    constants: Mapping[str, float]
-    up_to: float
-    youngs_modulus: float
-    residual: float
-    unstable: Mapping[str, float]
-
-    def stress(self, strain: np.ndarray) -> np.ndarray:
-        """Return the nominal stress (Pa) of a bar at engineering strains, any shape."""
-        return nominal_stress(self.law, self.constants, strain)
-
-
-def fit_law(law: Law, strain: np.ndarray, stress: np.ndarray, up_to: float, used: float) -> HyperelasticFit:
-    """Fit a law by least squares to the points (n,) with a strain of 0 to `up_to`; stress in Pa.
-
-    Stability is asked in tension up to `up_to` and in every mode up to `used`, the strain of the application.
-    """
-    from scipy.optimize import minimize_scalar
-
-    kept = (strain >= 0.0) & (strain <= up_to)
-    x, y = strain[kept], stress[kept]
-    if law == "Ogden":  # for each alpha the best mu is known, so one number is searched
-
-        def best(alpha: float) -> dict[str, float]:
-            column = nominal_stress(law, {"mu": 1.0, "alpha": alpha}, x)
-            return {"mu": float(column @ y / (column @ column)), "alpha": alpha}
-
-        def misfit(alpha: float) -> float:
-            return float(np.sum((nominal_stress(law, best(alpha), x) - y) ** 2))
-
-        # alpha and -alpha are different laws, and the misfit has a hill at 0: both signs on a grid first.
-        grid = np.concatenate([np.linspace(-12.0, -0.25, 48), np.linspace(0.25, 12.0, 48)])
-        at = float(grid[np.argmin(list(map(misfit, grid)))])
-        found: Any = minimize_scalar(misfit, bounds=(at - 0.25, at + 0.25), method="bounded", options={"xatol": 1e-10})
-        constants = best(float(found.x))
-    else:
-        columns = _columns(law, x)
-        values = np.linalg.lstsq(np.stack(list(columns.values()), axis=1), y, rcond=None)[0]
-        constants = dict(zip(columns, map(float, values), strict=True))
-    residual = float(np.sqrt(np.mean((nominal_stress(law, constants, x) - y) ** 2) / np.mean(y**2)))
-    reach = {mode: max(up_to, used) if mode == "tension" else used for mode in MODES}
-    unstable = first_unstable(law, constants, reach)
-    return HyperelasticFit(law, constants, up_to, youngs_modulus(law, constants), residual, unstable)
-
-
-def youngs_modulus(law: Law, constants: Mapping[str, float]) -> float:
-    """Return E = 3 mu at zero strain, Pa."""
-    if law == "Ogden":
-        return 3.0 * constants["mu"]
-    return 6.0 * (constants["c10"] + constants.get("c01", 0.0))
-
-
-def nominal_stress(law: Law, constants: Mapping[str, float], strain: np.ndarray) -> np.ndarray:
-    """Return the nominal stress (Pa) of a bar with free sides at engineering strains, any shape."""
-    if law == "Ogden":
-        mu, alpha, stretch = constants["mu"], constants["alpha"], 1.0 + np.asarray(strain, float)
-        return 2.0 * mu / alpha * (stretch ** (alpha - 1.0) - stretch ** (-alpha / 2.0 - 1.0))
-    columns = _columns(law, strain)
-    return np.sum([constants[name] * column for name, column in columns.items()], axis=0)
-
-
-def first_unstable(law: Law, constants: Mapping[str, float], reach: Mapping[str, float]) -> dict[str, float]:
-    """Return, for each mode that fails Hill's condition up to its strain in `reach`, the least strain that fails."""
-    failing = {}
-    for mode, most in reach.items():
-        strain = np.linspace(0.0, most, _STEPS + 1)
-        along = np.log1p(strain)
-        tangent = log_tangent(law, constants, along * MODES[mode][0], along * MODES[mode][1])
-        least = np.linalg.eigvalsh(tangent)[:, 0]
-        bad = np.flatnonzero(least <= 0.0)
-        if bad.size:
-            failing[mode] = float(strain[bad[0]])
-    return failing
-
-
-def log_tangent(law: Law, constants: Mapping[str, float], e1: np.ndarray, e2: np.ndarray) -> np.ndarray:
-    """Return the second derivatives of W (Pa) by the logarithmic strains e1, e2 (n,), volume kept: (n, 2, 2)."""
-    strains = np.stack([e1, e2, -e1 - e2])
-    to_three = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, -1.0]])  # d(e1, e2, e3) / d(e1, e2)
-
-    def first(per_axis: np.ndarray) -> np.ndarray:
-        return np.einsum("in,ia->na", per_axis, to_three)
-
-    def second(per_axis: np.ndarray) -> np.ndarray:
-        return np.einsum("in,ia,ib->nab", per_axis, to_three, to_three)
-
-    if law == "Ogden":
-        return second(2.0 * constants["mu"] * np.exp(constants["alpha"] * strains))
-    squares = np.exp(2.0 * strains)
-    over = squares.sum(axis=0) - 3.0
-    slope = sum(k * constants.get(f"c{k}0", 0.0) * over ** (k - 1) for k in (1, 2, 3))
-    bend = sum(k * (k - 1) * constants.get(f"c{k}0", 0.0) * over ** max(k - 2, 0) for k in (2, 3))
-    gradient = first(2.0 * squares)
-    tangent = np.multiply(slope, second(4.0 * squares).T).T
-    tangent = tangent + np.multiply(bend, np.einsum("na,nb->nab", gradient, gradient).T).T
-    return tangent + constants.get("c01", 0.0) * second(4.0 / squares)
-
-
-def _columns(law: Law, strain: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the nominal stress per unit of each constant."""
-    stretch = 1.0 + np.asarray(strain, float)
-    common = 2.0 * (stretch - stretch**-2)
-    if law == "Mooney":
-        return {"c10": common, "c01": common / stretch}
-    over = stretch**2 + 2.0 / stretch - 3.0
-    return {f"c{k}0": k * common * over ** (k - 1) for k in range(1, 4 if law == "Yeoh" else 2)}
-
+from unitcad.lab.readers import AS_FOUND, Layout, open_recording
 
 LEAST_POINTS = 5
 _HEADER_LINES = 200
@@ -199,7 +74,7 @@ class TensileCurve:
 
 
 def read_curve(
-    path: Path, given: Mapping[str, Declared], specimen: Specimen, layout: Layout = Layout()
+    path: Path, given: Mapping[str, Declared], specimen: Specimen, layout: Layout = AS_FOUND
 ) -> TensileCurve:
     """Return a file's curve. What `specimen` gives goes before the file's header.
 
@@ -320,16 +195,6 @@ def _cells(line: str) -> list[str]:
 
 SECANTS = (0.10, 0.15, 0.25, 0.50, 1.00)
 SLOPE_TO = 0.25
-LAWS: tuple[tuple[Law, float], ...] = (
-    ("neo-Hooke", 0.5),
-    ("Mooney", 1.0),
-    ("Mooney", 3.0),
-    ("Yeoh", 1.0),
-    ("Ogden", 1.0),
-)
-"""Each law with the strain up to which it is fitted."""
-MOST_LAW_STRAIN = 1.0
-"""A law that is fitted beyond this is shown, but it is no statement about small strain."""
 WIDEST_GAP = 0.5
 """Between two points of a curve, as a part of the strain of use, or of a secant's strain: nothing is made up beyond."""
 _GRID = 41
@@ -338,16 +203,11 @@ _PASSES = 3
 
 @dataclass(frozen=True)
 class Modulus:
-    """One method's Young's modulus of one curve, Pa; None with the reason where the method can't be used.
-
-    `defensible`: it may stand for the modulus at the strain of use, and counts in the range of methods.
-    """
+    """One method's Young's modulus of one curve, Pa; None with the reason if the method can't be used."""
 
     method: str
     value: float | None
     reason: str = ""
-    defensible: bool = True
-    fit: HyperelasticFit | None = None
 
 
 @dataclass(frozen=True)
@@ -445,16 +305,6 @@ def moduli(strain: np.ndarray, stress: np.ndarray, low: float, high: float) -> t
         made.append(Modulus(name, None, "fewer than three points, or the curve ends before"))
     else:
         made.append(Modulus(name, float(np.polyfit(strain[kept], stress[kept], 1)[0])))
-    for law, up_to in LAWS:
-        name = f"{law}{', one term,' if law == 'Ogden' else ''} up to {100 * up_to:g} %"
-        if strain[-1] < up_to or ((strain >= 0.0) & (strain <= up_to)).sum() < LEAST_POINTS_OF[law]:
-            made.append(Modulus(name, None, f"{ends}, or has too few points"))
-            continue
-        fit = fit_law(law, strain, stress, up_to, high)
-        reasons = [f"unstable in {mode} from {100 * at:.3g} %" for mode, at in fit.unstable.items()]
-        if up_to > MOST_LAW_STRAIN:
-            reasons.append(f"fitted up to {100 * up_to:g} %, far beyond the use")
-        made.append(Modulus(name, fit.youngs_modulus, "; ".join(reasons), not reasons, fit))
     return tuple(made)
 
 
@@ -551,9 +401,6 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
     warnings = []
     for curve, toe in zip(curves, toes, strict=True):
         warnings += [Warned(code, f"{curve.name}: {message}") for code, message in _doubts(curve, used, toe, sheet)]
-    unstable = {one.method: one.reason for methods in by_curve for one in methods if one.fit and one.fit.unstable}
-    for method, reason in unstable.items():
-        warnings.append(Warned("unstable", f"{method}: {reason}; its constants hold for no simulation"))
     if len(curves) == 1:
         warnings.append(Warned("specimens", "one curve: the scatter of specimens is not in the range"))
     if ratio > MOST_SCATTER:
@@ -591,7 +438,7 @@ def _row(methods: Sequence[Modulus]) -> MethodRow:
             math.exp(sum(map(math.log, known)) / len(known)) if len(positive) == len(known) else sum(known) / len(known)
         )
     reasons = list(dict.fromkeys(one.reason for one in methods if one.reason))
-    defensible = all(one.defensible for one in methods) and len(positive) == len(values)
+    defensible = len(positive) == len(values)
     return MethodRow(methods[0].method, mean, values, defensible, "; ".join(reasons[:2]))
 
 

@@ -25,9 +25,12 @@ Cavity = Annotated[int, Meta(ge=1, le=999, description="the unit of a cast recor
 class UnitNames(Protocol):
     """A table that names what a unit is: a template or spec file, or a cast record and a cavity of it."""
 
-    spec: str | None
-    cast: str | None
-    cavity: int | None
+    @property
+    def spec(self) -> str | None: ...
+    @property
+    def cast(self) -> str | None: ...
+    @property
+    def cavity(self) -> int | None: ...
 
 
 def file_of(folder: Path, name: str, field: str) -> Path:

@@ -22,7 +22,13 @@ UNITS: dict[str, dict[str, float]] = {
     "acceleration": {**{f"{name}/s2": factor for name, factor in LENGTHS.items()}, "g": GRAVITY},
 }
 """Factors to m, m/s and m/s2, by quantity and unit."""
-_OTHER = ("V", "mV", "A", "mA", "rad", "deg", "degC", "°C", "mm/min")
+ELECTRICAL = (
+    {"V": 1.0, "mV": 1e-3, "uV": 1e-6, "kV": 1e3},
+    {"A": 1.0, "mA": 1e-3, "uA": 1e-6},
+    {"C": 1.0, "nC": 1e-9, "pC": 1e-12},
+)
+"""Factors between units of a sensor's output: voltage, current, charge."""
+_OTHER = ("rad", "deg", "degC", "°C", "mm/min")
 _WORDS = {"volt": "V", "volts": "V", "sec": "s", "second": "s", "seconds": "s", "metre": "m", "meter": "m"}
 
 
@@ -38,8 +44,14 @@ def known(unit: str) -> bool:
     """Tell whether a text is a unit that this program knows by name."""
     name = plain(unit)
     return name in _OTHER or (
-        name != "1" and any(name in units for units in (TIMES, *UNITS.values(), *COLUMN_UNITS.values()))
+        name != "1" and any(name in units for units in (TIMES, *ELECTRICAL, *UNITS.values(), *COLUMN_UNITS.values()))
     )
+
+
+def ratio(unit: str, other: str) -> float | None:
+    """Return how many of the second unit one of the first is; None if they measure different quantities."""
+    both = next((units for units in (*ELECTRICAL, *UNITS.values()) if unit in units and other in units), None)
+    return both[unit] / both[other] if both else 1.0 if unit == other else None
 
 
 def to_si(unit: str, quantity: Quantity, field: str) -> float:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad import files
-from unitcad.errors import Missing, UnitcadError
+from unitcad.errors import UnitcadError, missing_extra
 from unitcad.report.records import BatchFile, expect
 
 JSON, PARQUET, CSV = TABLES = ("batch.json", "variants.parquet", "variants.csv")
@@ -46,7 +46,7 @@ def read_parquet(path: Path) -> dict[str, Any]:
         import pyarrow as pa
         from pyarrow import parquet
     except ImportError:
-        raise Missing(f"{path}: needs an extra: pip install 'unitcad[parquet]'") from None
+        raise missing_extra("parquet", f"{path}: needs pyarrow") from None
     try:
         table = parquet.read_table(pa.BufferReader(content))
         return {**json.loads((table.schema.metadata or {})[HEAD]), "variants": table.to_pylist()}

@@ -12,7 +12,7 @@ from typing import Any
 
 from unitcad.arrays.array_names import array_templates, is_array
 from unitcad.arrays.array_units import expanded
-from unitcad.errors import Missing, Refusal, UnitcadError, WrongArgument
+from unitcad.errors import Refusal, UnitcadError, WrongArgument, missing_extra
 from unitcad.files import read_text
 from unitcad.pipeline.write import ARRAY
 from unitcad.report.page import page_data
@@ -144,7 +144,7 @@ def _uvicorn():
         import tomlkit  # noqa: F401
         import uvicorn
     except ImportError as error:
-        raise Missing(f"the live page needs {error.name}: in a clone, pip install '.[serve]'") from None
+        raise missing_extra("serve", f"the live page needs {error.name}") from None
     return uvicorn
 
 

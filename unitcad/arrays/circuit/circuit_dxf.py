@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from unitcad.arrays.circuit.wiring import Wiring
-from unitcad.errors import Missing
+from unitcad.errors import missing_extra
 from unitcad.shape import Profile
 
 _DIGITS = 6
@@ -47,7 +47,7 @@ def _library() -> Any:
         import ezdxf
         import ezdxf.enums
     except ImportError as error:
-        raise Missing("ezdxf is not installed: in a clone, pip install '.[dxf]', or build without dxf") from error
+        raise missing_extra("dxf", "ezdxf is not installed; build without dxf, or install it") from error
     return ezdxf
 
 

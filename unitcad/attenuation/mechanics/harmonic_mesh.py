@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.errors import Missing
+from unitcad.errors import missing_extra
 
 try:
     import skfem
     from threadpoolctl import threadpool_limits
 except ImportError as error:  # pragma: no cover - depends on the installation
-    raise Missing("finite elements need scikit-fem and threadpoolctl: pip install 'unitcad[fem]'") from error
+    raise missing_extra("fem", "finite elements need scikit-fem and threadpoolctl") from error
 
 SIZE, GROWTH, LARGEST = 1e-3, 0.3, 4e-3
 """The mesh of fineness 1: an element's size at corners of the geometry (m), its growth per distance from one, and its

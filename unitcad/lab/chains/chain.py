@@ -38,11 +38,10 @@ class Mains:
 
 @dataclass(frozen=True)
 class Line:
-    """One line: frequency in Hz, amplitude (peak) and its standard uncertainty in the signal's unit."""
+    """One line: frequency in Hz, amplitude (peak) in the signal's unit."""
 
     frequency_hz: float
     amplitude: float
-    u: float
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,8 @@ class LineFit:
     amplitude over the residual's standard deviation, `scatter` the standard deviation of the amplitude of blocks over
     their mean. `masked` is the part of the samples left out by their residual, `dropped` the same where one of them
     lies further off than noise does, else 0; `missing` the part that are no numbers. `clipped` is the level at which
-    the signal is cut off over its true amplitude (infinite where it isn't). `lines` are all lines where several were
-    fitted together, the strongest first.
+    the signal is cut off over its true amplitude, infinite if it is not cut off. `lines` are the lines of a record that
+    has several near each other, the strongest first: `amplitude` is then none of theirs.
     """
 
     amplitude: float
@@ -105,14 +104,13 @@ class Chain:
     `amplitude(x, rate, fit)` is the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit; `fit` is what
     the chain `line` says of them. It raises Refusal for a record that it can't take. `unfit(fits)` says why a chain
     gives no amplitude of a record with such lines, empty where it does. `gain(hz)` is the chain's gain of an amplitude,
-    None for a chain without filters. `each_line`: it has an amplitude of every line, not of all in one.
+    None for a chain without filters.
     """
 
     name: str
     amplitude: Callable[[Floats, float, LineFit], float]
     unfit: Callable[[list[LineFit]], str] = lambda fits: ""
     gain: Callable[[float], float] | None = None
-    each_line: bool = False
     zeros_hz: float | None = None
     """The frequency whose multiples the chain takes away."""
     pass_hz: tuple[float, float] | None = None

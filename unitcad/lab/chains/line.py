@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -18,13 +17,12 @@ from unitcad.geometry.arrays import Bools, Floats
 from unitcad.lab.chains.chain import Chain, ChainTable, Line, LineFit, Mains, Phase
 
 BAND_HZ = (60.0, 250.0)
+NO_MAINS = Mains()
 HARMONICS = 3
 FAR = 4.5
 """Robust standard deviations of the residual beyond which a sample is left out, which noise exceeds here and there."""
 FALSE_ALARM = 1e-3
 """Part of the records of normal noise alone in which a sample may be called a drop-out, at most."""
-LEAST_FOLLOWED = 1.0
-"""Signal to noise from which short spectra tell the line's frequency to a hertz."""
 ROUNDS = 6
 LEAST_SAMPLES = 16
 RESOLVED = 1.5
@@ -33,14 +31,14 @@ RESOLVED = 1.5
 
 def chain(table: ChainTable) -> Chain:
     """Return the chain, whose amplitude is that of the fit that every record has."""
-    return Chain("line", lambda x, rate, fit: fit.amplitude, each_line=True)
+    return Chain("line", lambda x, rate, fit: fit.amplitude)
 
 
 def fit_line(
     x: Floats,
     rate: float,
     band: tuple[float, float] = BAND_HZ,
-    mains: Mains = Mains(),
+    mains: Mains = NO_MAINS,
     full_scale: float | None = None,
     phase: Phase | None = None,
     span: tuple[float, float] | None = None,
@@ -78,8 +76,6 @@ class _Solution:
     value: complex
     residual: Floats
     mains: Floats
-    mains_beyond: Floats
-    """The mains of the fit, continued over the whole record."""
     line: Floats
     good: Bools
     widening: float
@@ -104,21 +100,13 @@ def _fit_running(
         return None
     middle = float(np.median(x[good]))
     x = np.where(good, x - middle, 0.0)
-    cut, part = clip_mask(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
-    if part < LOWEST:  # nothing is left that says how high the line went
-        cut = np.zeros(len(x), bool)
+    clipped = clip_level(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
     deviation = 1.4826 * np.median(np.abs(x[good]))
-    allowed = known = good & ~cut
-    if deviation > 0 and part >= LOWEST:
-        known = known & (np.abs(x) < 6 * deviation)
+    known = good & (np.abs(x) < 6 * deviation) if deviation > 0 else good
     time = np.arange(len(x)) / rate
 
     def solved(phase: Phase, span: tuple[float, float]) -> _Solution | None:
-        """Fit a line of given phase over a span, without the samples whose residual is far off; None without samples.
-
-        Of samples that are `cut` the fit knows that the line lies beyond them. To leave them out, and those near them
-        by their own noise, would bias it; and where the rate is a small multiple of the frequency, too few are left.
-        """
+        """Fit a line of given phase over a span, without the samples of a far residual; None if too few are left."""
         inside = _within(time, span)
         here, part = time[inside], x[inside]
         frequencies = _frequencies(phase, span)
@@ -126,29 +114,22 @@ def _fit_running(
         orders = mains_orders(mains.frequency_hz, rate, (frequency,), span[1] - span[0], float(np.ptp(frequencies)))
         line = line_columns(phase.at(here), frequency, rate)
         columns = np.concatenate([line, mains_columns(here, mains.frequency_hz, orders), trend_columns(here)])
-        use, beyond = known[inside].copy(), cut[inside].copy()
+        use = known[inside].copy()
         if use.sum() < LEAST_SAMPLES:
             return None
-        side = np.where(beyond, np.sign(part), 0.0)
-        ends = [(1 - NEAR) * float(np.max(sign * x[cut], initial=0.0)) for sign in (1, -1)]
         for _ in range(ROUNDS):
-            if beyond.any():
-                plateau = np.where(side > 0, ends[0], -ends[1])
-                found, covariance = solve_censored(columns, part, use | beyond, side, plateau)
-            else:
-                found, covariance = solve(columns, part, use)
+            found, covariance = solve(columns, part, use)
             residual = part - found @ columns
             limit = FAR * 1.4826 * np.median(np.abs(residual[use]))
-            beyond &= residual * side < limit  # a drop-out may touch the plateau too
-            far = (np.abs(residual) > limit) & ~beyond if limit > 0 else np.zeros(len(part), bool)
+            far = np.abs(residual) > limit if limit > 0 else np.zeros(len(part), bool)
             far[1:] |= far[:-1].copy()
             far[:-1] |= far[1:].copy()
-            fresh = allowed[inside] & ~far
+            fresh = good[inside] & ~far
             if fresh.sum() < 0.3 * len(part) or np.array_equal(fresh, use):
                 break
             use = fresh
         deviation = 1.4826 * float(np.median(np.abs(residual[use])))
-        left_out = np.abs(residual[allowed[inside] & ~beyond])
+        left_out = np.abs(residual[good[inside]])
         hum, shape, left, kept = np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x)), known.copy()
         count = len(line)
         hum[inside] = found[count:-2] @ columns[count:-2]
@@ -157,12 +138,9 @@ def _fit_running(
         left[inside] = np.where(use, residual, 0.0)
         towards = found[:2] / max(float(np.hypot(*found[:2])), 1e-300)
         widening = np.sqrt(max(float(towards @ covariance[:2, :2] @ towards) * use.sum() / 2, 1.0))
-        beyond_span = found[count:-2] @ mains_columns(time, mains.frequency_hz, orders)
         far_off = deviation > 0 and np.any(left_out > most_of_noise(len(left_out)) * deviation)
         value = complex(found[0], -found[1])
-        return _Solution(
-            phase, span, frequency, value, left, hum, beyond_span, shape, kept, float(widening), bool(far_off)
-        )
+        return _Solution(phase, span, frequency, value, left, hum, shape, kept, float(widening), bool(far_off))
 
     if phase is not None and span is not None:
         found = solved(phase, span)
@@ -185,18 +163,12 @@ def _fit_running(
     if found is None:
         return None
     fit = _summary(found, time, rate, mains)
-    masked = float(np.mean(~found.good[allowed]))
+    masked, dropped = float(np.mean(~found.good[good])), found.beyond_noise
     fit = replace(
-        fit, masked=masked, dropped=masked if found.beyond_noise else 0.0, missing=float(np.mean(~good)), clipped=part
+        fit, masked=masked, dropped=masked if dropped else 0.0, missing=float(np.mean(~good)), clipped=clipped
     )
-    if fit.snr > LEAST_FOLLOWED:
-        clean = np.where(found.good, x - found.mains_beyond, found.line)
-        beyond = frequencies_beyond(clean, rate, found.span, fit.frequency_hz)
-        if beyond:
-            drift = np.ptp([*_frequencies(found.phase, found.span), *beyond]) / fit.frequency_hz
-            fit = replace(fit, drift=float(drift))
     use = (time >= found.span[0]) & (time <= found.span[1]) & found.good
-    return several_lines(x - found.mains, found.residual, time, use, fit, rate, mains.frequency_hz) or fit
+    return _with_lines(x - found.mains, found.residual, time, use, fit, rate)
 
 
 def _summary(found: _Solution, time: Floats, rate: float, mains: Mains) -> LineFit:
@@ -293,7 +265,7 @@ def solve(columns: Floats, x: Floats, weight: Floats | Bools) -> tuple[Floats, F
 
 def _waves(turns: Floats) -> Floats:
     """Return cosine and sine (2 k, n) of complex turns (k, n)."""
-    return np.stack([turns.real, turns.imag], 1).reshape(2 * len(turns), turns.shape[1])
+    return np.stack([np.real(turns), np.imag(turns)], 1).reshape(2 * len(turns), turns.shape[1])
 
 
 def line_columns(phase: Floats, frequency: float, rate: float) -> Floats:
@@ -329,22 +301,20 @@ def trend_columns(time: Floats) -> Floats:
 
 NEAR = 0.02
 """Part of the peak below it in which samples are counted."""
-LOWEST = 0.7
-"""Part of the amplitude down to which a cut-off sine can be fitted by the rest."""
 CROWD = 0.13
 """Part of the samples within NEAR of a peak beyond which it is a plateau: twice what a sine has there."""
 LEAST_VALUES = 8
 """Different values below which a channel shows its converter's steps and no motion that a limit could cut off."""
 
 
-def clip_mask(x: Floats, good: Bools, full_scale: tuple[float, float] | None = None) -> tuple[Bools, float]:
-    """Return the samples of a record about zero that lie on a plateau, and the lowest plateau's part.
+def clip_level(x: Floats, good: Bools, full_scale: tuple[float, float] | None = None) -> float:
+    """Return the level at which samples about zero are cut off, over their true amplitude; infinite without a plateau.
 
-    One plateau is enough. The part is of the amplitude that a sine would have which is cut off as often, 0 where that
-    is half of the time or more; infinite without a plateau.
-    `full_scale` is the height of the positive and the negative limit, where they are known.
+    The true amplitude is that of a sine which is cut off as often; the level is 0 if that is half of the time or more.
+    One plateau is enough, and the lower of two counts. `full_scale` is the height of the positive and the negative
+    limit, if they are known.
     """
-    cut, part = np.zeros(len(x), bool), float("inf")
+    part = float("inf")
     low, high = np.quantile(x[good], [0.05, 0.95])
     fine = len(np.unique(x[good])) >= LEAST_VALUES
     for sign, limit in zip((1.0, -1.0), full_scale or (None, None), strict=True):
@@ -360,9 +330,8 @@ def clip_mask(x: Floats, good: Bools, full_scale: tuple[float, float] | None = N
         near = good & (signed >= peak - below)
         at_limit = limit is not None and peak >= 0.999 * limit
         if at_limit or (fine and (near.sum() > CROWD * good.sum() or (peak > 0 and _repeats(signed[good], peak)))):
-            cut |= near
             part = min(part, max(float(np.cos(np.pi * near.sum() / good.sum())) / (1 - NEAR), 0.0))
-    return cut, part
+    return part
 
 
 def _repeats(x: Floats, peak: float) -> bool:
@@ -375,70 +344,12 @@ def _repeats(x: Floats, peak: float) -> bool:
     return at_peak > len(x) * (0.01 + 2 * np.arccos(max(1 - step / peak, -1.0)) / np.pi)
 
 
-def solve_censored(columns: Floats, x: Floats, use: Bools, side: Floats, limit: Floats) -> tuple[Floats, Floats]:
-    """Return the coefficients (k) of `columns` (k, n), and their covariance (k, k) for noise of unit variance.
-
-    Of the samples x (n) in `use`, those whose `side` is 1 lie above their `limit`, -1 below it; 0 are known (Tobin
-    1958). In the coefficients over the deviation and the inverse of the deviation the likelihood has one maximum (Olsen
-    1978).
-    """
-    from scipy.optimize import minimize
-    from scipy.special import log_ndtr
-
-    known, beyond = use & (side == 0), use & (side != 0)
-    y = np.where(side == 0, x, limit)
-    start = np.linalg.lstsq(columns[:, use].T, y[use], rcond=None)[0]
-    inverse = 1 / max(float(np.std((y - start @ columns)[use])), 1e-12 * float(np.ptp(x[known])))
-    # Rows that multiply (coefficients / deviation, 1 / deviation): the residual, and how far the line is beyond.
-    rows = np.concatenate([-columns, y[None]])[:, known]
-    ahead = (np.concatenate([columns, -y[None]]) * side)[:, beyond]
-    count, gram = rows.shape[1], rows @ rows.T
-
-    def hidden(at: Floats) -> tuple[Floats, Floats, Floats]:
-        far = at @ ahead
-        logs = log_ndtr(far)
-        return far, logs, np.exp(-0.5 * far**2 - 0.5 * np.log(2 * np.pi) - logs)
-
-    def loss(at: Floats) -> tuple[float, Floats]:
-        if at[-1] <= 0:
-            return np.inf, at
-        _, logs, mills = hidden(at)
-        slope = gram @ at - ahead @ mills
-        slope[-1] -= count / at[-1]
-        return float(0.5 * at @ gram @ at - logs.sum() - count * np.log(at[-1])), slope
-
-    def bend(at: Floats) -> Floats:
-        far, _, mills = hidden(at)
-        bent = gram + (ahead * (mills * (mills + far))) @ ahead.T
-        bent[-1, -1] += count / at[-1] ** 2
-        return bent
-
-    at = minimize(
-        loss,
-        np.append(start * inverse, inverse),
-        jac=True,
-        hess=bend,
-        method="trust-exact",
-        options={"gtol": 1e-6, "maxiter": 200},
-    ).x
-    found = at[:-1] / at[-1]
-    # The coefficients are a quotient; times the inverse deviation gives the covariance for unit variance.
-    to_coefficients = np.concatenate([np.eye(len(found)), -found[:, None]], axis=1)
-    return found, to_coefficients @ np.linalg.pinv(bend(at), hermitian=True) @ to_coefficients.T
-
-
 # From samples to a line's slowly varying phase.
 
 WINDOW_S = 0.25
 """Length of the Hann window that smooths a demodulated signal; it passes about 4 Hz to either side."""
 STEADY = 0.9
 """Part of the median envelope that a line reaches before its record is used, and keeps to its end."""
-RUNNING = 0.85
-"""Part of its size in the steady span that a line has in a short spectrum as long as the motor runs."""
-FOLLOWED_HZ = 12.0
-"""How far a line's frequency may lie from that of the window beside it, to be followed."""
-SPIN_UP_HZ_PER_S = 8.0
-"""How fast a frequency changes that is a spin-up's, where the steady span has less than a third of it."""
 NO_LINE = 1e-6
 """Part of a line's largest envelope below which its phase says nothing."""
 KNOTS_S = (0.5, 0.25)
@@ -503,52 +414,6 @@ def steady_span(time: Floats, line: Floats, length_s: float) -> tuple[float, flo
     start = float(time[first] + WINDOW_S / 2) if first else 0.0
     end = float(time[last] - WINDOW_S / 2) if last < len(time) - 1 else length_s
     return (start, end) if end - start > 0.25 * length_s else (0.0, length_s)
-
-
-def frequencies_beyond(x: Floats, rate: float, span: tuple[float, float], frequency: float) -> list[float]:
-    """Return the line's frequency in short windows before and after its steady span, as far as it runs on there.
-
-    A line that leaves the demodulator's band is cut off as if it had stopped: here it is followed from window to
-    window. A spin-up is not: it changes its frequency fast, and then levels off.
-    """
-    count = int(WINDOW_S * rate)
-    step = max(count // 4, 1)
-    starts = np.arange(0, len(x) - count + 1, step)
-    middles = (starts + count / 2) / rate
-    inside = np.flatnonzero((middles >= span[0]) & (middles <= span[1]))
-    if len(inside) in (0, len(starts)) or count < 16:
-        return []
-    window = np.hanning(count + 2)[1:-1]
-    points = 4 * _length(count)
-    hertz = np.fft.rfftfreq(points, 1 / rate)
-
-    def peak(i: int, near: float) -> tuple[float, float]:
-        size = np.abs(np.fft.rfft(x[starts[i] : starts[i] + count] * window, points))
-        at = int(np.argmax(np.where(np.abs(hertz - near) < FOLLOWED_HZ, size, 0.0)))
-        return float(hertz[at]), float(size[at])
-
-    sample = inside[np.unique(np.linspace(0, len(inside) - 1, 20).astype(int))]
-    peaks = np.array([peak(int(i), frequency) for i in sample])
-    least = RUNNING * float(np.median(peaks[:, 1]))
-    own = abs(peaks[-1, 0] - peaks[0, 0]) / max(int(inside[-1] - inside[0]), 1)
-    fastest = max(3 * own, SPIN_UP_HZ_PER_S * step / rate)
-    out: list[float] = []
-    for there, most in (
-        (range(int(inside[0]) - 1, -1, -1), fastest),
-        (range(int(inside[-1]) + 1, len(starts)), np.inf),
-    ):
-        near = float(peaks[0 if most < np.inf else -1, 0])
-        low = 0
-        for i in there:
-            hertz_here, size = peak(i, near)
-            low = low + 1 if size < least else 0
-            if low > count // step + 1:  # more windows than one jump of the frequency reaches
-                break
-            if not low:
-                if abs(hertz_here - near) <= most:
-                    out.append(hertz_here)
-                near = hertz_here
-    return out
 
 
 def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
@@ -721,40 +586,40 @@ def block_means(value: complex, residual: Floats, good: Bools, rate: float) -> F
     return value + 2 * np.add.reduceat(residual, edges) / np.maximum(np.add.reduceat(good.astype(float), edges), 1)
 
 
-# Several lines at once, each of constant frequency.
+# Other lines beside the strongest: another motor that runs.
 
 BESIDE_HZ = 15.0
 """To either side of the strongest line, where others are looked for."""
 LEAST_LINE = 0.05
 """Part of the strongest line's amplitude from which another one counts."""
+OVER_NOISE = 8
+"""Standard deviations of noise from which a peak of the spectrum counts as a line."""
 MOST_LINES = 6
 MOST_LEFT = 0.5
-"""Part of the one line's squares that several must leave at most, to be taken in its place."""
+"""Part that steady lines must leave at most of the power beside a single line, beyond the noise, to be preferred."""
 STEPS = 12
 SAME_PLACE, SAME_SIZE, SAME_PHASE = 0.4, 0.25, 0.4
 """How far lines to either side may be from a modulation's: periods of a record, logarithm of a ratio, rad."""
 
 
-def several_lines(
-    x: Floats, residual: Floats, time: Floats, use: Bools, fit: LineFit, rate: float, mains_hz: float
-) -> LineFit | None:
-    """Return the fit of several lines to samples x without mains, of which one line leaves `residual`.
+def _with_lines(x: Floats, residual: Floats, time: Floats, use: Bools, fit: LineFit, rate: float) -> LineFit:
+    """Return the fit with the steady lines of samples x without mains, if a single line explains them less well.
 
-    None where one line explains them as well. The amplitude is then the strongest line's.
+    `residual` is the rest that the single line leaves. Lines at equal distances to either side may be one line of
+    varying amplitude, whose standard deviation over the mean is then the fit's scatter.
     """
     if not fit.snr > 0:
-        return None
+        return fit
     first, last = np.flatnonzero(use)[[0, -1]]
     inside = slice(first, last + 1)
-    good = use[inside]
-    x, time, weight = np.where(good, x[inside], 0.0), time[inside], good.astype(float)
-    length = time[-1] - time[0]
+    weight, time = use[inside].astype(float), time[inside]
+    x, length = x[inside] * weight, time[-1] - time[0]
     noise = fit.amplitude / fit.snr if np.isfinite(fit.snr) else 0.0
-    least = max(LEAST_LINE * fit.amplitude, 8 * noise * np.sqrt(2 / max(weight.sum(), 1)))
-    frequency, size = spectrum(residual[inside] * weight, rate)
+    least = max(LEAST_LINE * fit.amplitude, OVER_NOISE * noise * np.sqrt(2 / max(weight.sum(), 1)))
+    frequency, single = spectrum(residual[inside] * weight, rate)
     beside = np.abs(frequency - fit.frequency_hz) < BESIDE_HZ
-    if not np.any(size[beside] > least):
-        return None
+    if not np.any(single[beside] > least):
+        return fit
     hertz, values, left = np.empty(0), np.empty(0, complex), x
     for _ in range(MOST_LINES):
         size = np.where(beside, spectrum(left * weight, rate)[1], 0.0)
@@ -762,39 +627,19 @@ def several_lines(
         if size[peak] < least or np.any(np.abs(frequency[peak] - hertz) < 0.5 / length):
             break
         hertz, values, left = _refined(x, time, weight, np.append(hertz, frequency[peak]))
-    if len(hertz) < 2:
-        return None
-    # Harmonics of the lines, sums of some of them and the mains are no noise.
-    orders = mains_orders(mains_hz, rate, tuple(hertz), length)
-    known = [order * mains_hz for order in orders]
-    for count in range(2, HARMONICS + 1):
-        for one in map(sum, combinations_with_replacement(hertz, count)):
-            if one < 0.5 * rate and all(abs(one - other) > 0.5 / length for other in known):
-                known.append(one)
-    base = np.concatenate([mains_columns(time - time.mean(), 1.0, known), trend_columns(time)])
-    left = left - solve(base, left, weight)[0] @ base
-    deviation = float(np.sqrt(np.mean(left[good] ** 2)))
+    powers = [sizes[beside] ** 2 for sizes in (single, spectrum(left * weight, rate)[1])]
+    floor = len(powers[1]) * float(np.median(powers[1])) / np.log(2)  # white noise, whose power is exponential
     order = np.argsort(-np.abs(values))
-    strong = order[np.abs(values[order]) > LEAST_LINE * abs(values[order[0]])]
-    if deviation**2 > MOST_LEFT * noise**2 or len(strong) < 2:
-        return None
+    strong = order[np.abs(values[order]) > LEAST_LINE * np.abs(values).max(initial=0.0)]
+    if len(strong) < 2 or powers[1].sum() - floor > MOST_LEFT * (powers[0].sum() - floor):
+        return fit
     hertz, values = hertz[strong], values[strong]
     if (swing := _modulation(hertz, values, length)) > 0:
-        ratio = fit.amplitude / deviation if deviation > 0 else float("inf")
-        return replace(fit, scatter=max(fit.scatter, swing), snr=ratio)
-    lines = []
-    for frequency_hz, value in zip(hertz, values, strict=True):
-        turned = left * weight * np.exp(-2j * np.pi * frequency_hz * (time - time.mean()))
-        noise = noise_beside(turned, good, rate)
-        towards = np.real(block_means(value, turned, good, rate) * np.conj(value)) / abs(value)
-        wander, _ = of_mean(towards, noise**2 * len(towards))
-        lines.append(Line(float(frequency_hz), float(abs(value)), float(np.hypot(noise, wander))))
-    main = lines[0]
-    return replace(
-        fit, amplitude=main.amplitude, u=float(np.hypot(main.u, fit.u_mains)), value=complex(values[0]),
-        frequency_hz=main.frequency_hz, drift=0.0, snr=main.amplitude / deviation if deviation > 0 else float("inf"),
-        lines=tuple(lines),
-    )  # fmt: skip
+        deviation = float(np.sqrt(np.mean(left[weight > 0] ** 2)))
+        snr = fit.amplitude / deviation if deviation > 0 else float("inf")
+        return replace(fit, scatter=max(fit.scatter, swing), snr=snr)
+    lines = (Line(float(f), float(abs(value))) for f, value in zip(hertz, values, strict=True))
+    return replace(fit, lines=tuple(lines))
 
 
 def _modulation(hertz: Floats, values: Floats, length_s: float) -> float:

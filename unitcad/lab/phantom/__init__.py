@@ -1,4 +1,4 @@
-"""A skin phantom that any lab can cast: description, recipes, box, coupons, expected response, each made once."""
+"""A skin phantom that any lab can cast: description, recipes, box, expected response, each made once."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from unitcad.catalogue import Printer, choose, printers, tissue
 from unitcad.errors import Refusal
 from unitcad.estimating import tissue_layer
 from unitcad.kernels.mesh import bounds, realise
-from unitcad.lab.phantom.box import BoxLengths, cast, coupon_moulds, coupon_volume_mm3, expect_apart, lengths, pieces
+from unitcad.lab.phantom.box import BoxLengths, cast, expect_apart, lengths, pieces
 from unitcad.lab.phantom.recipe import PhantomTable, Recipe, recipe, stiffening
 from unitcad.shape.body import Body
 
@@ -147,7 +147,7 @@ LONGEST_SOURCE = 500
 class PhantomSet:
     """A phantom ready to be written.
 
-    `volumes_mm3` and `coupon_mm3`: of each layer, skin first, and of its coupons.
+    `volumes_mm3`: of each layer, skin first.
     """
 
     table: PhantomTable
@@ -158,7 +158,6 @@ class PhantomSet:
     tools: tuple[Body, ...]
     layers: tuple[Body, ...]
     volumes_mm3: tuple[float, ...]
-    coupon_mm3: float
     expected: Expected
 
 
@@ -185,7 +184,7 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
         )
         raise Refusal("inside_mm", inside, limit, needed)
     size = lengths(table, inside, printer)
-    tools = (*pieces(table, size, printer), *coupon_moulds(table, printer))
+    tools = tuple(pieces(table, size, printer))
     for piece in printed(tools):
         x0, y0, z0, x1, y1, z1 = bounds(realise(piece.shape, SEGMENTS))
         long, short = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
@@ -200,15 +199,14 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
         over = max(short - bed[0], long - bed[1], 0.0)
         left = inside - over
         limit = f"the {piece.name} is {long:.0f} x {short:.0f} x {z1 - z0:.0f} mm, the bed {bed[1]:g} x {bed[0]:g}"
-        if over and left > 40 and (math.isclose(left, inside) or piece.kind != "coupon"):
+        if over and left > 40:
             echo = echo_pct(table, recipes, left / 2)
             limit += f"; about {left:.0f} mm inside would fit, whose walls echo {echo:.2g} %"
         raise Refusal("printer", printer.name, limit, fitting[0] if fitting else None)
     layers = tuple(cast(table, size))
     volumes = tuple(float(realise(body.shape, SEGMENTS).volume()) for body in layers)
     response = expected(table, recipes, inside / 2, wall, tuple(map(tissue_layer, tissue())))
-    coupons = coupon_volume_mm3(table.coupons)
-    return PhantomSet(table, recipes, printer, inside, size, tools, layers, volumes, coupons, response)
+    return PhantomSet(table, recipes, printer, inside, size, tools, layers, volumes, response)
 
 
 def _bed(printer: Printer) -> tuple[float, float, float]:
@@ -228,18 +226,17 @@ def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
 
     for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True):
         source = f"{one.silicone.name} + {one.thinner_pct:g} % thinner, {one.source}"
-        ended = "" if one.measured and one.measured.dynamic else also
         found[layer.name] = {
-            "status": "measured" if one.measured else "secondary",
-            "source": source[: LONGEST_SOURCE - len(ended)] + ended,
+            "status": "secondary",
+            "source": source[: LONGEST_SOURCE - len(also)] + also,
             "thickness_mm": layer.thickness_mm,
             "density_kg_m3": rounded(1e3 * one.density_g_cm3, 4),
             "youngs_modulus_kpa": ranged(one.modulus_kpa, one.low_kpa, one.high_kpa),
             "poisson_ratio": {"value": POISSON, "status": "assumed", "source": "silicone hardly changes its volume"},
             "loss_factor": {
                 **ranged(*one.loss),
-                "status": "measured" if one.loss_source else "assumed",
-                "source": one.loss_source[:LONGEST_SOURCE] or "tan delta of soft silicones at 100 to 150 Hz",
+                "status": "assumed",
+                "source": "tan delta of soft silicones at 100 to 150 Hz",
             },
         }
     found["plate"] = {"status": "secondary", "source": "cast acrylic, data sheets", **ACRYLIC}

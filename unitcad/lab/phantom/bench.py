@@ -21,7 +21,7 @@ EDGE_MM = 10.0
 
 @dataclass(frozen=True)
 class PhantomPour:
-    """One pour: grams of part A, part B and thinner to weigh, what goes into box and coupons, the layer's own weight.
+    """One pour: grams of part A, part B and thinner to weigh, and the layer's own weight.
 
     `grams_per_mm`: of the layer in the box, which tells its thickness by the scale. `frame_mm`: height that the frame
     (or, for the first pour, the tray's rim above the plate) gives.
@@ -33,7 +33,6 @@ class PhantomPour:
     part_a_g: float
     part_b_g: float
     thinner_g: float
-    net_g: float
     box_g: float
     grams_per_mm: float
     frame_mm: float
@@ -49,8 +48,7 @@ def pours(phantom: PhantomSet) -> list[PhantomPour]:
     for index, i in enumerate(reversed(range(len(table.layers))), 1):
         layer, one = table.layers[i], phantom.recipes[i]
         box = phantom.volumes_mm3[i] * one.density_g_cm3 / 1e3
-        net = box + phantom.coupon_mm3 * one.density_g_cm3 / 1e3
-        total = net * (1 + table.waste)
+        total = box * (1 + table.waste)
         silicone = total * 100.0 / (100.0 + one.thinner_pct)
         share = float(one.silicone.mix_ratio) / (1 + float(one.silicone.mix_ratio))
         height = float(phantom.printer.layer_mm)
@@ -64,7 +62,6 @@ def pours(phantom: PhantomSet) -> list[PhantomPour]:
                 silicone * share,
                 silicone * (1 - share),
                 total - silicone,
-                net,
                 box,
                 box / layer.thickness_mm,
                 layer.thickness_mm,
@@ -123,7 +120,7 @@ def casting_markdown(phantom: PhantomSet) -> str:
 
 
 def sheet_markdown(phantom: PhantomSet) -> str:
-    """Write the sheet to fill in: one row a pour, then the coupons, so that two labs' phantoms can be compared."""
+    """Write the sheet to fill in, a row a pour, so that two labs' phantoms can be compared."""
     lines = [
         f"# Bench sheet: phantom {markdown(phantom.table.name)}",
         "",
@@ -141,14 +138,7 @@ def sheet_markdown(phantom: PhantomSet) -> str:
             f"| {p.index} | {p.name} | | ({p.part_a_g:.1f}) | ({p.part_b_g:.1f}) | ({p.thinner_g:.1f}) | | | | | "
             f"{p.grams_per_mm:.2f} g/mm: |"
         )
-    lines += [
-        "",
-        "| coupon of pour | width, mm | thickness, mm | file of the curve | modulus, kPa (unitcad material) |",
-        "| --- | --- | --- | --- | --- |",
-    ]
     first, *further = pours(phantom)
-    for p in (first, *further):
-        lines += [f"| {p.index}.{i + 1} {p.name} | | | | |" for i in range(phantom.table.coupons)]
     lines += [
         "",
         "Frame heights by calliper, mm (wanted): " + ", ".join(f"{p.name} ({p.frame_mm:g})" for p in further)
@@ -197,7 +187,7 @@ def bill(phantom: PhantomSet) -> list[Item]:
         ("pen", "marks the skin through the lid"),
         ("thin blade", "loosens the slab from the wall"),
         ("rubber band", "holds the tray in its holder"),
-        ("emery paper, fine", "faces the grips; also roughens the plate" if table.coupons else "roughens the plate"),
+        ("emery paper, fine", "roughens the plate"),
         ("silicone primer", "optional: bonds the lowest layer to the plate, in place of roughening it"),
     ):
         items.append(Item(stuff, 1, "piece", "bought", note))
@@ -206,28 +196,20 @@ def bill(phantom: PhantomSet) -> list[Item]:
 
 
 def _moduli(phantom: PhantomSet) -> Iterator[str]:
-    """Say where the moduli come from: the table of thinned silicones, and the files of layers that were measured."""
+    """Say where the moduli come from, the table of thinned silicones, and what the frequency adds."""
     hertz = phantom.table.frequency_hz
-    by_table = [one for one in phantom.recipes if one.measured is None]
-    slow = [one for one in phantom.recipes if one.measured is None or not one.measured.dynamic]
-    if by_table:
-        yield f"Moduli: {by_table[0].source}. They are quasi-static."
-        yield "The range is two standard deviations of that table."
-    for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True):
-        if one.measured:
-            kind = f"at {hertz:g} Hz" if one.measured.dynamic else "quasi-static"
-            yield f"Modulus of the {layer.name}: measured, {kind}, {markdown(one.source)}."
-    if slow:
-        yield (
-            f"The upper end of a quasi-static range has a factor of {stiffening(hertz):.3g} for {hertz:g} Hz, by the "
-            "catalogue's fractional law (assumed to hold with thinner)."
-        )
+    yield f"Moduli: {phantom.recipes[0].source}. They are quasi-static."
+    yield "The range is two standard deviations of that table."
+    yield (
+        f"The upper end of a range has a factor of {stiffening(hertz):.3g} for {hertz:g} Hz, by the catalogue's "
+        "fractional law (assumed to hold with thinner)."
+    )
 
 
 def _preparation(phantom: PhantomSet, found: Sequence[PhantomPour]) -> Iterator[str]:
     table, size = phantom.table, phantom.size
     yield (
-        "Print the pieces as they lie in their files; the blade already lies edge up there, the lid its lettering up. "
+        "Print the pieces as they lie in their files; the blade already lies edge up there, the lid flat. "
         "Uncured resin and latex keep silicone from curing: wash and post-cure resin prints fully, cast a small trial "
         "on each, and wear nitrile gloves."
     )
@@ -250,9 +232,9 @@ def _preparation(phantom: PhantomSet, found: Sequence[PhantomPour]) -> Iterator[
         "stay free."
     )
     yield (
-        "Release agent sparingly on the inner walls of tray and frames and in the coupon moulds, none on the plate. "
-        f"Silicone that cures on acrylic does not bond to it: the {found[0].name} only clings. Roughen the plate, use "
-        "a silicone primer on it, or take a perforated one. Check before measuring: pushed sideways with a finger, the "
+        "Release agent sparingly on the inner walls of tray and frames, none on the plate. Silicone that cures on "
+        f"acrylic does not bond to it: the {found[0].name} only clings. Roughen the plate with emery paper, use a "
+        "silicone primer on it, or take a perforated one. Check before measuring: pushed sideways with a finger, the "
         "slab must not slip, and through the plate from below no air shows. Level the tray to 0.2 mm over its side."
     )
 
@@ -261,8 +243,6 @@ def _figures(phantom: PhantomSet, p: PhantomPour) -> Iterator[tuple[str, str, st
     one = phantom.recipes[p.layer]
     parts = "computed: volume x density (mixed by weight; thinner 0.97 g/cm3, assumed)"
     yield "in the box", f"{p.box_g:.1f} g", parts
-    if phantom.coupon_mm3:
-        yield "in the coupons", f"{p.net_g - p.box_g:.1f} g", parts
     yield "part A", f"{p.part_a_g:.1f} g", f"with {100 * phantom.table.waste:g} % extra"
     yield "part B", f"{p.part_b_g:.1f} g", f"with {100 * phantom.table.waste:g} % extra"
     yield "thinner", f"{p.thinner_g:.1f} g", f"{one.thinner_pct:g} parts to 100 of A + B, by weight (assumed)"
@@ -304,12 +284,11 @@ def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
     )
     rim = "the tray's rim" if p.index == 1 else f"the rim of {frame}"
     yield (
-        f"Pour in a thin thread at one corner until the silicone stands over {rim}, "
-        f"{_coupon_step(phantom, p)}and prick the bubbles that rise."
+        f"Pour in a thin thread at one corner until the silicone stands over {rim}, and prick the bubbles that rise."
     )
     yield (
         f"Strike off with the blade: along x, its edge on {rim} at both sides, drawn once from one end to the other "
-        "along y, between the pegs. Strike the coupons off too. Wipe the rims and weigh the box again: the "
+        "along y, between the pegs. Wipe the rims and weigh the box again: the "
         f"difference over {p.grams_per_mm:.2f} g/mm is the thickness; {0.05 * p.grams_per_mm:.2g} g are 0.05 mm. Top "
         "up and strike again if it is low."
     )
@@ -317,10 +296,6 @@ def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
         "Cure level, covered, until a touch on the overflow is dry. Much thinner stays tacky: talc, after the last "
         "layer."
     )
-
-
-def _coupon_step(phantom: PhantomSet, p: PhantomPour) -> str:
-    return f"fill coupon mould {p.index} ({p.name}) from the same mix, " if phantom.table.coupons else ""
 
 
 def _release(phantom: PhantomSet) -> Iterator[str]:
@@ -345,25 +320,15 @@ def _release(phantom: PhantomSet) -> Iterator[str]:
         "Thinner migrates between layers and out of the skin, so the moduli change with age: write down the age at "
         "each measurement, and compare labs at the same age, such as 7 days (assumed)."
     )
-    yield (
-        f"Keep what is measured {EDGE_MM:g} mm or more from the walls. Cut nothing off the skin. Demould coupons by "
-        "lifting one tab, and pull them at the phantom's own age, at one speed that is written down, with wide grips "
-        "faced with fine emery paper, just tight enough not to slip, "
-        "with the same machine each time, and read them with unitcad material. Name its material.toml as the layer's "
-        "measured in the phantom's file and run unitcad phantom again: tissue.toml and the response then have that "
-        "modulus, not the table's. A pull is quasi-static too; a dynamic test gives the modulus at "
-        f"{phantom.table.frequency_hz:g} Hz (unitcad material --dma)."
-    )
+    yield (f"Keep the measured points {EDGE_MM:g} mm or more from the walls. Cut nothing off the skin.")
 
 
 def _expectations(phantom: PhantomSet) -> Iterator[str]:
     table, e = phantom.table, phantom.expected
-    measured = any(one.measured for one in phantom.recipes)
-    moduli = "the moduli of the recipe" if measured else "moduli from quasi-static compression"
     yield (
-        f"|u_z| of the skin at {table.frequency_hz:g} Hz over its value at the unit's edge, the motor's disc "
-        f"pressing evenly, by the layered solver with {moduli}. The range takes loss factors (half to one and a half "
-        "times where they are assumed), moduli (up to what the frequency may bring) and thicknesses each by itself."
+        f"|u_z| of the skin at {table.frequency_hz:g} Hz over its value at the unit's edge, the motor's disc pressing "
+        "evenly, by the layered solver with moduli from quasi-static compression. The range takes loss factors (half "
+        "to one and a half times, assumed), moduli (up to what the frequency may bring) and thicknesses each by itself."
     )
     yield ""
     yield "| mm from the edge | expected | low | high | the forearm template |"

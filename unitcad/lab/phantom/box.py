@@ -11,7 +11,7 @@ r"""The phantom's box: a tray with the stiff plate in it, a screed frame a furth
                   '---'--o-----o--'---'-----'      holes: the plate is pushed up through them
 
 The cavity widens upwards, so the slab comes up with its plate. Layers are listed from the skin down and poured from the
-last; frames and coupon moulds have the number of their pour. The blade passes between the pegs and is drawn along y.
+last; frames have the number of their pour. The blade passes between the pegs and is drawn along y.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain, count, pairwise
+from itertools import chain, pairwise
 
 from unitcad.catalogue import Printer
 from unitcad.designs import layer_colour
@@ -33,11 +33,6 @@ from unitcad.shape.lettering import HEIGHT, engraving, text_width
 POINT_RADIUS = 1.25
 LEAST_APART = 2 * POINT_RADIUS + 1.0
 """Between two points, mm: the holes of nearer ones would leave no wall."""
-_FROM_HOLE, _FROM_SEAT, _APART = 2.0, 1.0, 1.0
-"""Of a number to its hole's edge, to the seat's, and to another number, mm."""
-
-Box = tuple[float, float, float, float]
-"""Least and largest x and y: x0, y0, x1, y1."""
 
 
 def expect_apart(points_mm: Sequence[float]) -> None:
@@ -46,112 +41,6 @@ def expect_apart(points_mm: Sequence[float]) -> None:
         if other - one < LEAST_APART:
             limit = f"{one:g} and {other:g} are nearer than {LEAST_APART:g} mm: their holes in the lid would meet"
             raise Refusal("points_mm", list(points_mm), limit)
-
-
-def marks(
-    points_mm: Sequence[float], seat_radius: float, stroke: float, depth: float, low: float, high: float
-) -> list[Shape]:
-    """Draw what is cut out of a lid from `low` to `high`; numbers are engraved `depth` deep by `stroke`. All in mm."""
-    points = sorted(points_mm)
-    tools: list[Shape] = [cylinder(seat_radius, low - 1.0, high + 1.0)]
-    for distance, (x0, y0, _, _) in zip(points, numbers(points, seat_radius, stroke), strict=True):
-        tools.append(moved(cylinder(POINT_RADIUS, low - 1.0, high + 1.0), seat_radius + distance, 0.0))
-        tools.append(moved(_number(f"{distance:g}", stroke, high - depth, high + 1.0), x0, y0))
-    return tools
-
-
-def numbers(points: Sequence[float], seat_radius: float, stroke: float) -> list[Box]:
-    """Return where the number of each point stands: beside its hole, above and below in turn, clear of what is cut.
-
-    `points` rise. A number moves along +x to clear the seat, and a row outwards to clear the numbers before it.
-    """
-    placed: list[Box] = []
-    height = HEIGHT * stroke
-    for i, distance in enumerate(points):
-        parts = f"{distance:g}".split(".")
-        width = sum(text_width(part, stroke) for part in parts) + 3 * stroke * (len(parts) - 1)
-        for row in count():
-            near = POINT_RADIUS + _FROM_HOLE + (row // 2) * (height + _APART)
-            y0 = near if (row + i) % 2 == 0 else -near - height
-            x0 = max(seat_radius + distance - width / 2, math.sqrt(max((seat_radius + _FROM_SEAT) ** 2 - near**2, 0.0)))
-            x1, y1 = x0 + width, y0 + height
-            if all(
-                x1 + _APART <= left or right + _APART <= x0 or y1 + _APART <= low or high + _APART <= y0
-                for left, low, right, high in placed
-            ):
-                placed.append((x0, y0, x1, y1))
-                break
-    return placed
-
-
-def _number(text: str, stroke: float, z0: float, z1: float) -> Shape:
-    """Draw a number, its decimal point a square of one stroke, the lower left corner at the origin."""
-    whole, _, rest = text.partition(".")
-    shape = engraving(whole, stroke, z0, z1)
-    if not rest:
-        return shape
-    x = text_width(whole, stroke) + stroke
-    return union(
-        (shape, box(x, x + stroke, 0.0, stroke, z0, z1), moved(engraving(rest, stroke, z0, z1), x + 2 * stroke))
-    )
-
-
-COUPON_LENGTH, TAB, COUPON_WIDTH, GAUGE, INNER_RADIUS, OUTER_RADIUS = 115.0, 25.0, 6.0, 33.0, 14.0, 25.0
-"""Over all, width of the tabs, width and length of the narrow part, radii beside it and at the tabs, mm."""
-COUPON_THICKNESS, COUPON_FLOOR, COUPON_MARGIN, COUPON_GAP = 3.0, 2.0, 5.0, 4.0
-_LABEL = 9.0
-_COUPON_COLOUR = (0.85, 0.75, 0.9)
-
-
-def coupon_outline() -> Profile:
-    """Return die C's coupon_outline about its middle, along x."""
-    half, narrow, wide = COUPON_LENGTH / 2, COUPON_WIDTH / 2, TAB / 2
-    low, high = narrow + INNER_RADIUS, wide - OUTER_RADIUS  # y of the two centres
-    reach = math.sqrt((INNER_RADIUS + OUTER_RADIUS) ** 2 - (low - high) ** 2)
-    share = INNER_RADIUS / (INNER_RADIUS + OUTER_RADIUS)
-    start, meet, tab = GAUGE / 2, GAUGE / 2 + share * reach, GAUGE / 2 + reach
-    y = low - share * (low - high)
-    bulge = math.tan(math.atan2(reach, low - high) / 4)
-    right = [(start, -narrow, -bulge), (meet, -y, bulge), (tab, -wide, 0.0), (half, -wide, 0.0)]
-    right += [(half, wide, 0.0), (tab, wide, bulge), (meet, y, -bulge), (start, narrow, 0.0)]
-    left = [(-x, -y, bulge) for x, y, bulge in right]  # turned by 180 degrees
-    return Profile(tuple(right + left))
-
-
-def coupon_moulds(phantom: PhantomTable, printer: Printer) -> list[Body]:
-    """Draw an open mould for each pour, its number engraved, as printed; none where no coupons are asked for.
-
-    A mould's name has the layer's too, which the engraving's characters can't write.
-    """
-    if not phantom.coupons:
-        return []
-    return [
-        Body(
-            f"coupons{pour}-{layer.name}",
-            "tool",
-            "coupon",
-            _coupon_mould(phantom.coupons, str(pour), printer),
-            _COUPON_COLOUR,
-        )
-        for pour, layer in enumerate(reversed(phantom.layers), 1)
-    ]
-
-
-def coupon_volume_mm3(count: int) -> float:
-    """Return what `count` coupons take."""
-    return count * coupon_outline().area * COUPON_THICKNESS
-
-
-def _coupon_mould(count: int, text: str, printer: Printer) -> Shape:
-    stroke, depth = float(printer.engraving_stroke_mm), float(printer.engraving_depth_mm)
-    half_x = COUPON_LENGTH / 2 + COUPON_MARGIN
-    width = count * TAB + (count - 1) * COUPON_GAP + 2 * COUPON_MARGIN
-    top = COUPON_FLOOR + COUPON_THICKNESS
-    plate = box(-half_x, half_x + _LABEL, 0.0, width, 0.0, top)
-    middles = [COUPON_MARGIN + TAB / 2 + i * (TAB + COUPON_GAP) for i in range(count)]
-    tools: list[Shape] = [moved(Extrude(coupon_outline(), COUPON_FLOOR, top + 1.0), 0.0, y) for y in middles]
-    tools.append(moved(engraving(text, stroke, top - depth, top + 1.0), half_x + 2.0, width / 2 - HEIGHT * stroke / 2))
-    return cut(plate, tools)
 
 
 WALL, FLOOR, LID, HOLDER = 4.0, 3.0, 4.0, 6.0
@@ -251,7 +140,7 @@ def pieces(phantom: PhantomTable, size: BoxLengths, printer: Printer) -> list[Bo
         Body("tray", "tool", "base", _tray(size), _COLOURS["base"]),
         Body("plate", "tool", "holder", plate, _PLATE, made="cut"),
         *frames,
-        Body("lid", "tool", "lid", _lid(phantom, size, stroke, depth), _COLOURS["lid"]),
+        Body("lid", "tool", "lid", _lid(phantom, size), _COLOURS["lid"]),
         Body("blade", "tool", "blade", blade, _BLADE, upside_down=True),
         Body("holder", "tool", "holder", _holder(phantom, size), _COLOURS["holder"]),
     ]
@@ -296,10 +185,13 @@ def _peg_holes(size: BoxLengths, low: float, high: float) -> list[Shape]:
     return _at_corners(cylinder(size.hole, low - 1.0, high + 1.0), size.peg_x, size.ear_y)
 
 
-def _lid(phantom: PhantomTable, size: BoxLengths, stroke: float, depth: float) -> Shape:
+def _lid(phantom: PhantomTable, size: BoxLengths) -> Shape:
+    """Draw the lid with the unit's seat and a hole at each point, all from its middle along x."""
     low, high = size.tops[0], size.tops[0] + LID
-    tools = marks(phantom.points_mm, phantom.unit_diameter_mm / 2, stroke, depth, low, high)
-    return cut(_outline(size, low, high), [*tools, *_peg_holes(size, low, high)])
+    seat = phantom.unit_diameter_mm / 2
+    points = [moved(cylinder(POINT_RADIUS, low - 1.0, high + 1.0), seat + one, 0.0) for one in phantom.points_mm]
+    seat_hole = cylinder(seat, low - 1.0, high + 1.0)
+    return cut(_outline(size, low, high), [seat_hole, *points, *_peg_holes(size, low, high)])
 
 
 def _holder(phantom: PhantomTable, size: BoxLengths) -> Shape:

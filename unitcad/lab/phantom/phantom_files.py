@@ -59,7 +59,7 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
 
 def box_picture(phantom: PhantomSet) -> bytes:
     """Draw the box taken apart as a PNG file. Raises NoPicture where this machine can't draw."""
-    shown = [body for body in phantom.tools if body.kind not in ("blade", "coupon")]
+    shown = [body for body in phantom.tools if body.kind != "blade"]
 
     def place(body: Body) -> tuple[float, bool]:
         """Return a body's place in the stack: its top's height, but the tray's foot, and a layer after its frame."""
@@ -107,7 +107,6 @@ def casting_data(phantom: PhantomSet) -> dict[str, Any]:
                 "density_g_cm3": one.density_g_cm3,
                 "source": one.source,
                 "loss_factor": list(one.loss),
-                "measured": {"file": one.measured.file, "sha256": one.measured.sha256} if one.measured else None,
             }
             for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True)
         ],

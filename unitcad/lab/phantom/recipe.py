@@ -9,17 +9,15 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta, Struct
-from msgspec.structs import replace
 
-from unitcad import files
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
-from unitcad.catalogue import Material, MaterialEntry, materials
+from unitcad.catalogue import Material, materials
 from unitcad.catalogue import entries as kinds
-from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
+from unitcad.errors import Refusal, WrongArgument, unknown_name
 from unitcad.spec import convert, read_toml
 from unitcad.validation.shipped_files import named_file, shipped_files
 
@@ -31,8 +29,7 @@ _NAME = "small letters a to z, digits and -, the first a letter or digit"
 class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One layer: a silicone of the table of thinned ones, its thinner in parts to 100 of A and B, and its thickness.
 
-    `loss_factor`: tan delta, assumed where nobody measured it. `measured`: what `unitcad material` wrote of the layer's
-    coupons; its modulus goes before the table's, and so does its loss factor.
+    `loss_factor`: tan delta, assumed.
     """
 
     name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[a-z][a-z0-9-]*$", description=_LAYER_NAME)]
@@ -40,7 +37,6 @@ class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     thinner_pct: Annotated[float, Meta(ge=0, le=100)]
     thickness_mm: Annotated[float, Meta(ge=LEAST_LAYER, le=60)]
     loss_factor: Annotated[float, Meta(ge=0.01, le=1)] = 0.2
-    measured: Annotated[str, Meta(min_length=1, max_length=1000)] | None = None
 
 
 class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -57,7 +53,6 @@ class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     inside_mm: Annotated[float, Meta(ge=40, le=400)] | None = None
     most_echo_pct: Annotated[float, Meta(ge=0.5, le=50)] = 5.0
     plate_thickness_mm: Annotated[float, Meta(ge=2, le=20, description="of the acrylic plate below")] = 5.0
-    coupons: Annotated[int, Meta(ge=0, le=4, description="tensile coupons of each pour")] = 3
     stage_pitch_mm: Annotated[float, Meta(ge=5, le=50, description="of the table's threaded holes")] = 25.0
     stage_bolt_mm: Annotated[float, Meta(ge=2, le=12, description="thread of the table's holes")] = 6.0
     printer: str = "fdm-0.4"
@@ -77,93 +72,9 @@ def phantoms() -> dict[str, Path]:
 
 
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
-    """Return the phantom of a shipped name or of a file, from whose folder its `measured` files are seen.
-
-    Raises Refusal or UnitcadError for what is not valid.
-    """
+    """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for what is not valid."""
     path = named_file(os.fspath(source), phantoms(), "phantom", WrongArgument)
-    table = convert(read_toml(path), PhantomTable)
-    layers = (
-        replace(layer, measured=str(path.parent / layer.measured)) if layer.measured else layer
-        for layer in table.layers
-    )
-    return replace(table, layers=tuple(layers))
-
-
-MOST_OFF = 0.02
-"""Relative difference from the file's own law at the phantom's frequency: beyond it the file is for another one."""
-_LAW = ("fractional_mu0_kpa", "fractional_tau_us", "fractional_n")
-
-
-@dataclass(frozen=True)
-class MeasuredLayer:
-    """Young's modulus, kPa, with its range; at the phantom's frequency where `dynamic`, else of a slow pull.
-
-    `loss`: tan delta with its range, where it was measured. `file`, `sha256`: of the file that was read.
-    """
-
-    modulus_kpa: float
-    low_kpa: float
-    high_kpa: float
-    dynamic: bool
-    source: str
-    file: str
-    sha256: str
-    loss: tuple[float, float, float] | None = None
-    loss_source: str = ""
-
-
-def measured_layer(path: Path, silicone: str, frequency_hz: float, field: str) -> MeasuredLayer:
-    """Return what a file of `unitcad material` says; a modulus at the motor's frequency goes before a slow pull's.
-
-    Raises Refusal, of `field`, for a file that is not there or holds something else: another silicone (`like`), no
-    modulus, one without a range, or one at another frequency.
-    """
-    shown = path.name
-
-    def refuse(limit: str) -> NoReturn:
-        raise Refusal(field, shown, limit)
-
-    if not path.is_file():
-        refuse(f"no such file in {files.seen_from(path.parent)}")
-    try:
-        found = read_toml(path).get("materials")
-        if isinstance(found, dict):
-            convert(found, dict[str, MaterialEntry], "materials")
-    except UnitcadError as error:
-        refuse(str(error))
-    if not isinstance(found, dict) or len(found) != 1:
-        refuse("must hold one table [materials.NAME], as unitcad material writes it")
-    (entry,) = found.values()
-    if entry.get("like", silicone) != silicone:
-        refuse(f"is of {entry['like']} (like), the layer of {silicone}")
-    dynamic = "youngs_modulus_kpa" in entry
-    key = "youngs_modulus_kpa" if dynamic else "quasistatic_modulus_kpa"
-    if key not in entry:
-        refuse("holds neither youngs_modulus_kpa nor quasistatic_modulus_kpa")
-    values, sources = {}, {}
-    for name in (key, "loss_factor"):
-        if name in entry:
-            one = entry[name] if isinstance(entry[name], dict) else {}
-            low, middle, high = (one.get(end) for end in ("low", "value", "high"))
-            if low is None or high is None or not 0 < low <= middle <= high:
-                refuse(f"{name} needs low and high about its value")
-            values[name] = (float(middle), float(low), float(high))
-            sources[name] = "; ".join(filter(None, (shown, one.get("method"), one.get("source"))))
-    value = values[key][0]
-    if dynamic and all(isinstance(entry.get(name), dict) for name in _LAW):
-        mu0, tau, n = (float(entry[name]["value"]) for name in _LAW)
-        omega = 2.0 * math.pi * frequency_hz
-        there = FractionalKelvinVoigt(tau * 1e-6, n).complex_shear(3.0 * mu0, omega).real
-        if abs(there / value - 1.0) > MOST_OFF:
-            refuse(
-                f"youngs_modulus_kpa is {value:.4g}, but the file's law has {there:.4g} at {frequency_hz:g} Hz: run "
-                f"unitcad material --dma again with --frequency-hz {frequency_hz:g}"
-            )
-    return MeasuredLayer(
-        *values[key], dynamic, sources[key], shown, files.sha256(path), values.get("loss_factor"),
-        sources.get("loss_factor", ""),
-    )  # fmt: skip
+    return convert(read_toml(path), PhantomTable)
 
 
 THINNER_DENSITY = 0.97
@@ -176,8 +87,7 @@ LOSS_RANGE = (0.5, 1.5)
 class Recipe:
     """A silicone with thinner: Young's modulus kPa, tan delta and their ranges, density g/cm3.
 
-    `high_kpa` has what the phantom's frequency may bring over a slow test. `measured`: the file of the layer's own
-    coupons, else the modulus is the table's, with two standard deviations.
+    The modulus is the table's, its range two standard deviations. `high_kpa` includes the stiffening at the frequency.
     """
 
     silicone: Material
@@ -188,32 +98,27 @@ class Recipe:
     density_g_cm3: float
     source: str
     loss: tuple[float, float, float]
-    loss_source: str = ""
-    measured: MeasuredLayer | None = None
 
 
 def recipe(layer: PhantomLayer, frequency_hz: float, field: str) -> Recipe:
     """Return a layer's recipe for a phantom that moves at a frequency; `field` is for refusals.
 
-    A layer without measured modulus needs a tested silicone and share of thinner. Raises Refusal.
+    Raises Refusal for a silicone or a share of thinner that nobody tested.
     """
-    loss, loss_source = tuple(part * layer.loss_factor for part in (1.0, *LOSS_RANGE)), ""
-    known, found = materials(), None
-    if layer.measured is None:
-        value, low, high = modulus_by_table(layer.silicone, layer.thinner_pct, field)
-        source = str(_table()["source"])
-    elif layer.silicone not in known:
-        raise unknown_name(f"{field}.silicone", layer.silicone, known)
-    else:
-        found = measured_layer(Path(layer.measured), layer.silicone, frequency_hz, f"{field}.measured")
-        value, low, high, source = found.modulus_kpa, found.low_kpa, found.high_kpa, found.source
-        loss, loss_source = found.loss or loss, found.loss_source
-    if found is None or not found.dynamic:
-        high = stiffening(frequency_hz) * high
-    material = known[layer.silicone]
+    value, low, high = modulus_by_table(layer.silicone, layer.thinner_pct, field)
+    material = materials()[layer.silicone]
     volume = 100.0 / float(material.density_g_cm3) + layer.thinner_pct / THINNER_DENSITY
-    density = (100.0 + layer.thinner_pct) / volume
-    return Recipe(material, layer.thinner_pct, value, low, high, density, source, loss, loss_source, found)
+    least, most = LOSS_RANGE
+    return Recipe(
+        material,
+        layer.thinner_pct,
+        value,
+        low,
+        stiffening(frequency_hz) * high,
+        (100.0 + layer.thinner_pct) / volume,
+        str(_table()["source"]),
+        (layer.loss_factor, least * layer.loss_factor, most * layer.loss_factor),
+    )
 
 
 def modulus_by_table(silicone: str, thinner_pct: float, field: str) -> tuple[float, float, float]:

@@ -16,23 +16,45 @@ from typing import Any
 import numpy as np
 
 from unitcad import files
-from unitcad.errors import Missing, Refusal, UnitcadError
+from unitcad.errors import Refusal, UnitcadError, missing_extra
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.units import TIMES, plain
 from unitcad.workers import Pool, TimedOut, WorkerEnded
 
 LARGEST = 250_000_000
 """Bytes of a file that is read: all formats are read whole."""
-TIME_NAMES = ("time", "t", "zeit", "temps", "timestamp", "time stamp")
+TIME_NAMES = ("time", "t", "zeit", "temps", "timestamp", "time stamp", "second", "seconds", "x_value", "时间")
 """Names of a column that is time, if the file gives a unit of time with one of them."""
 LONGEST_S = 60.0
 """Seconds that a format's library may take to read a file."""
 MEMORY = 3 << 30
 """Bytes that a format's library may take."""
-VENDOR = (".svd", ".pvd")
+MOST_NUMBERS = 2**26
+"""Numbers that a file may state: a small file can state more than fits into memory."""
+OTHER_PROGRAMS = {
+    **dict.fromkeys((".svd", ".pvd"), "only Polytec's library reads it: export UFF"),
+    **dict.fromkeys((".xls", ".xlsx", ".ods"), "a spreadsheet: save the sheet with the numbers as CSV"),
+}
+"""Endings that no reader has, and the way to a file that one reads."""
+MOST_SHOWN = 10
+"""Channels that a message lists."""
 _MOST = 1e30
 """Beyond it, and beyond its inverse, a number is none that was measured."""
 _EXTRA = {"pyuff": "pyuff", "nptdms": "npTDMS", "h5py": "h5py"}
+
+
+def expect_held(path: Path, name: str, stated: int, held: int, size: int = 1) -> None:
+    """Raise Unreadable if a file states more numbers than it holds or than are read; `size` is a number's in bytes.
+
+    `held`: the most bytes that its stored data can stand for.
+    """
+    if stated > MOST_NUMBERS:
+        limit = f"{name} states {stated} numbers; at most {MOST_NUMBERS} are read: cut the record"
+        raise Unreadable(str(path), None, limit)
+    if stated * size > held:
+        raise Unreadable(
+            str(path), None, f"{name} states {stated * size} bytes and stores {held} at most: it is damaged"
+        )
 
 
 class Unreadable(Refusal):
@@ -46,6 +68,9 @@ class Layout:
     delimiter: str = ""
     decimal: str = ""
     skip_lines: int = 0
+
+
+AS_FOUND = Layout()
 
 
 @dataclass(frozen=True)
@@ -67,14 +92,19 @@ class Recording:
 
     @property
     def time(self) -> int | None:
+        """The channel of time: by its name and unit, or the first one if only that has a unit of time."""
         found = [i for i, c in enumerate(self.channels) if _last(c.name).strip().lower() in TIME_NAMES]
         found = [i for i in found if plain(self.channels[i].unit) in TIMES]
+        if not found:
+            found = [i for i, c in enumerate(self.channels) if plain(c.unit) in TIMES]
+            found = found if found == [0] and len(self.channels) > 1 else []
         return found[0] if len(found) == 1 else None
 
     def numbered(self, indices: Iterable[int] | None = None) -> str:
-        """Return the channels' numbers and names, of some or of all."""
-        shown = range(len(self.channels)) if indices is None else indices
-        return ", ".join(f"{i + 1} {self.channels[i].name}" for i in shown)
+        """Return the first channels' numbers and names, of some or of all."""
+        shown = list(range(len(self.channels)) if indices is None else indices)
+        more = f" and {len(shown) - MOST_SHOWN} more" if len(shown) > MOST_SHOWN else ""
+        return ", ".join(f"{i + 1} {self.channels[i].name}" for i in shown[:MOST_SHOWN]) + more
 
     def index(self, wanted: str | int, field: str) -> int:
         """Return the index of a channel by its name or its number, which counts from 1. Raises Refusal.
@@ -84,7 +114,7 @@ class Recording:
         names = [channel.name for channel in self.channels]
         if isinstance(wanted, int):
             if not 1 <= wanted <= len(names):
-                raise Refusal(field, wanted, f"{self.path.name} has {len(names)} channels: {', '.join(names)}", 1)
+                raise Refusal(field, wanted, f"{self.path.name} has {len(names)} channels: {self.numbered()}", 1)
             return wanted - 1
         found = [i for i, name in enumerate(names) if name == wanted]
         if len(found) > 1:
@@ -102,7 +132,7 @@ class Recording:
         chosen = [self.channels[i] for i in indices]
         counts = [len(channel.samples) for channel in chosen]
         if len(set(counts)) > 1:
-            listed = ", ".join(f"{c.name} {count}" for c, count in zip(chosen, counts, strict=True))
+            listed = ", ".join(f"{c.name} {count}" for c, count in zip(chosen[:MOST_SHOWN], counts, strict=False))
             raise Refusal("channel", self.path.name, f"its channels have different counts of samples: {listed}")
         table = np.column_stack([np.asarray(channel.samples, float) for channel in chosen])
         size = np.abs(table)
@@ -130,14 +160,14 @@ def _by_ending() -> dict[str, str]:
 def expect_ending(path: Path, field: str) -> str:
     """Return the ending of a file's name, in small letters. Raises Unreadable for one that no reader has."""
     ending = path.suffix.lower()
-    if ending in VENDOR:
-        raise Unreadable(field, path.name, "Polytec's own format is read by Polytec's library alone: export UFF")
+    if ending in OTHER_PROGRAMS:
+        raise Unreadable(field, path.name, OTHER_PROGRAMS[ending])
     if ending not in _by_ending():
-        raise Unreadable(field, path.name, f"no reader; known endings: {', '.join((*_by_ending(), *VENDOR))}", ".csv")
+        raise Unreadable(field, path.name, f"no reader; known endings: {', '.join(_by_ending())}", ".csv")
     return ending
 
 
-def open_recording(path: Path, layout: Layout = Layout()) -> Recording:
+def open_recording(path: Path, layout: Layout = AS_FOUND) -> Recording:
     """Return the recording in a file.
 
     Raises Unreadable (a Refusal) for a file that can't be read without a guess, Missing without the library of its
@@ -185,7 +215,7 @@ def _refusing(path: Path) -> Iterator[None]:
         yield
     except ModuleNotFoundError as missing:
         name = _EXTRA.get(missing.name or "", missing.name)
-        raise Missing(f"{path}: needs {name}: pip install 'unitcad[lab]'") from None
+        raise missing_extra("lab", f"{path}: needs {name}") from None
     except TimedOut:
         raise Unreadable(str(path), None, f"is damaged: its library did not return in {LONGEST_S:g} s") from None
     except MemoryError:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from math import prod
 from pathlib import Path
 from typing import Any
 
-from unitcad.lab.readers import Channel, Layout, Unreadable
+import numpy as np
+
+from unitcad.lab.readers import MOST_NUMBERS, Channel, Layout, Unreadable, expect_held
 
 ENDINGS = (".h5", ".hdf5")
 LIBRARY = "h5py"
 MOST_COLUMNS = 4096
+MOST_PACKED = 1100
+"""Bytes that a compressed byte stands for at most (deflate: 1,032)."""
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
@@ -32,6 +37,7 @@ def channels(path: Path) -> list[Channel]:
     sizes += [("IEEE_F", bits) for bits in (16, 32, 64)]
     plain = [getattr(h5py.h5t, f"{start}{bits}{order}") for start, bits in sizes for order in ("LE", "BE")]
     found: list[Channel] = []
+    counts: list[int] = []
 
     def visit(name: str, node: Any) -> None:
         if not isinstance(node, h5py.Dataset) or name.startswith("#") or node.ndim not in (1, 2):
@@ -40,10 +46,11 @@ def channels(path: Path) -> list[Channel]:
             return
         if node.is_virtual or node.external:
             raise Unreadable(str(path), None, f"{name} lies in another file")
-        if not node.id.get_storage_size():
-            raise Unreadable(str(path), None, f"{name} has no samples stored")
+        _expect_stored(path, name, node)
         if not any(node.id.get_type() == kind for kind in plain):
             raise Unreadable(str(path), None, f"the numbers of {name} have no standard layout: it is damaged")
+        counts.append(prod(node.shape))
+        expect_held(path, "the file", sum(counts), MOST_NUMBERS)
         table = node[:].reshape(len(node), -1)
         table = table if table.shape[0] >= table.shape[1] else table.T
         if table.shape[1] > MOST_COLUMNS:
@@ -75,5 +82,22 @@ def _expect_whole(path: Path) -> None:
         raise Unreadable(str(path), None, f"states {end} bytes and has {size}: it was not closed, or is damaged")
 
 
+def _expect_stored(path: Path, name: str, node: Any) -> None:
+    """Raise Unreadable if a data set states more than its stored bytes can stand for, or has chunks beyond memory."""
+    stored = node.id.get_storage_size()
+    if not stored:
+        raise Unreadable(str(path), None, f"{name} has no samples stored")
+    if stored > path.stat().st_size:
+        limit = f"{name} states {stored} stored bytes in a file of {path.stat().st_size}: it is damaged"
+        raise Unreadable(str(path), None, limit)
+    packed = MOST_PACKED ** node.id.get_create_plist().get_nfilters()
+    expect_held(path, name, prod(node.shape), stored * packed, node.dtype.itemsize)
+    if node.chunks:
+        expect_held(path, f"a chunk of {name}", prod(node.chunks), stored * packed, node.dtype.itemsize)
+
+
 def _text(value: Any) -> str:
+    """Return an attribute's text; of an array the first one."""
+    if isinstance(value, np.ndarray) and value.size:
+        value = value.flat[0]
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value if isinstance(value, str) else ""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 import warnings
+import zlib
 from collections.abc import Iterator
 from math import prod
 from pathlib import Path
@@ -10,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.lab.readers import Channel, Layout, Unreadable
+from unitcad.lab.readers import Channel, Layout, Unreadable, expect_held
 
 ENDINGS = (".mat",)
 LIBRARY = "scipy"
-MOST_NUMBERS = 2**26
-"""Numbers that a file's variables may have together: compressed, a small file can state many."""
+MOST_BYTES = 2**27
+"""Bytes of the decompressed file; a byte may stand for a number of eight."""
 DEEPEST = 3
 """Structs in structs that are looked into."""
 
@@ -24,11 +26,12 @@ def read(path: Path, layout: Layout) -> list[Channel]:
     """Return the numeric vectors and columns of a file; a struct's field x is named struct.x. Raises Unreadable."""
     from scipy.io import loadmat, whosmat
 
+    _expect_small(path)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         listed = whosmat(str(path))
-        if sum(prod(shape) for _, shape, _ in listed) > MOST_NUMBERS:
-            raise Unreadable(str(path), None, "states more numbers than can be read whole; save it with -v7.3")
+        stated = sum(prod(shape) for _, shape, _ in listed)
+        expect_held(path, "the file", stated, 8 * MOST_BYTES)
         names = [
             name for name, _, kind in listed if kind.removeprefix("u").startswith(("int", "double", "single", "struct"))
         ]
@@ -37,6 +40,32 @@ def read(path: Path, layout: Layout) -> list[Channel]:
     if not found:
         raise Unreadable(str(path), None, "holds no vector and no matrix of numbers")
     return found
+
+
+def _expect_small(path: Path) -> None:
+    """Raise Unreadable if the elements of a version 5 file take more than MOST_BYTES: whosmat looks into no struct."""
+    with open(path, "rb") as file:
+        order = {b"IM": "<", b"MI": ">"}.get(file.read(128)[126:])
+        size, total = path.stat().st_size, 0
+        while order and len(tag := file.read(8)) == 8:
+            kind, length = struct.unpack(f"{order}II", tag)
+            if length > size - file.tell():
+                raise Unreadable(str(path), None, f"an element states {length} bytes beyond the end: it is damaged")
+            if kind != _COMPRESSED:
+                total += length
+                file.seek(length, 1)
+            else:
+                packed, unpack = file.read(length), zlib.decompressobj()
+                while packed and not unpack.eof and total <= MOST_BYTES:
+                    total += len(unpack.decompress(packed, 2**20))
+                    packed = unpack.unconsumed_tail
+            if total > MOST_BYTES:
+                limit = f"states more than {MOST_BYTES} bytes of numbers; cut the record, or save it with -v7.3"
+                raise Unreadable(str(path), None, limit)
+
+
+_COMPRESSED = 15
+"""The type of a compressed element."""
 
 
 def _columns(name: str, value: Any, depth: int) -> Iterator[Channel]:

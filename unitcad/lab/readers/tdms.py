@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from unitcad.lab.readers import Channel, Layout, Unreadable
+from unitcad.lab.readers import MOST_NUMBERS, Channel, Layout, Unreadable, expect_held
 
 ENDINGS = (".tdms",)
 LIBRARY = "nptdms"
+MOST_SCALES = 100
+"""Scales of a channel: the library looks for each one that is stated."""
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
@@ -23,7 +25,7 @@ def read(path: Path, layout: Layout) -> list[Channel]:
     log_manager.set_level(logging.CRITICAL)  # it writes whole damaged strings to standard error
     size = path.stat().st_size
     stated = _raw_bytes(path, size)
-    found = []
+    found, counts = [], 0
     with warnings.catch_warnings(), open(path, "rb") as opened, TdmsFile.open(opened) as file:
         warnings.simplefilter("error")
         everything = [channel for group in file.groups() for channel in group.channels()]
@@ -32,12 +34,18 @@ def read(path: Path, layout: Layout) -> list[Channel]:
             held = sum(len(channel) * (bytes_ or 0) for channel, bytes_ in zip(everything, sizes, strict=True))
             if held != stated:
                 raise Unreadable(str(path), None, f"its channels state {held} bytes of samples, its segments {stated}")
+        if file.file_status.channel_statuses is not None:
+            raise Unreadable(str(path), None, "its last segment holds fewer samples than it states: it is damaged")
+        for place in (file, *file.groups(), *everything):  # a channel has its own scales, or its group's, or the file's
+            scales = place.properties.get("NI_Number_Of_Scales", 0)
+            if not isinstance(scales, int | np.integer) or scales > MOST_SCALES:
+                limit = f"states {scales} scales of a channel; at most {MOST_SCALES} are read"
+                raise Unreadable(str(path), None, limit)
         for channel in everything:
+            expect_held(path, f"channel {channel.name!r}", len(channel), size)
+            expect_held(path, "the file", counts := counts + len(channel), MOST_NUMBERS)
             if not (isinstance(channel.dtype, np.dtype) and channel.dtype.kind in "fiu" and len(channel)):
                 continue
-            if len(channel) > size:
-                limit = f"channel {channel.name!r} states {len(channel)} samples in a file of {size} bytes"
-                raise Unreadable(str(path), None, limit)
             step, unit = channel.properties.get("wf_increment"), channel.properties.get("unit_string")
             known = isinstance(step, float | int) and np.isfinite(step) and step > 0
             name = f"{channel.group_name}/{channel.name}"
@@ -58,18 +66,21 @@ def _raw_bytes(path: Path, size: int) -> int | None:
     with open(path, "rb") as file:
         while at < size:
             file.seek(at)
-            lead = file.read(_LEAD.size)
-            if len(lead) < _LEAD.size or not lead.startswith(b"TDSm"):
+            lead = file.read(_LEAD)
+            if len(lead) < _LEAD or not lead.startswith(b"TDSm"):
                 raise Unreadable(str(path), None, f"has no segment at byte {at}, where one is stated")
-            _, contents, _, following, before = _LEAD.unpack(lead)
+            (contents,) = struct.unpack("<I", lead[4:8])
+            _, following, before = struct.unpack(f"{'>' if contents & _BIG_ENDIAN else '<'}IQQ", lead[8:])
             plain = plain and not contents & _DAQMX
             raw += following - before
-            at += _LEAD.size + following
+            at += _LEAD + following
     if at != size or raw < 0:
         raise Unreadable(str(path), None, f"states {at} bytes and has {size}: it was not closed, or is damaged")
     return raw if plain else None
 
 
-_LEAD = struct.Struct("<4sIIQQ")
-"""A segment's lead-in: tag, contents, version, bytes to the next segment, bytes to the raw data."""
+_LEAD = 28
+"""Bytes of a segment's lead-in: tag, contents, version, bytes to the next segment, bytes to the raw data."""
+_BIG_ENDIAN = 1 << 6
+"""Of the contents, which are little-endian in every file."""
 _DAQMX = 1 << 7

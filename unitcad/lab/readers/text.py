@@ -1,6 +1,7 @@
-"""Text of numbers in columns: the longest run of lines with the same count of numeric fields is the data.
+"""Text of numbers in columns: the longest run of lines with the same columns of numbers is the data.
 
-Whatever would have to be guessed is refused: a line of another width among the numbers, two delimiters that both fit.
+A guess is refused: a line of another width among the numbers, two delimiters that both fit. Columns of words beside the
+numbers are left out. An empty cell, and the sign that an instrument writes for a value beyond its range, are no number.
 """
 
 from __future__ import annotations
@@ -21,22 +22,34 @@ ENDINGS = (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tab")
 HEAD = 1_000_000
 """Characters from a file's beginning in which its header ends."""
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[nN][aA][nN]", re.ASCII)
+_OVER_RANGE = re.compile(r"[+-]?(?:∞|inf(?:inity)?|f{4,}|-{3,}|\*{3,}|#{3,})", re.ASCII | re.IGNORECASE)
+"""Signs for a value beyond the range: of PicoScope, Keyence, and spreadsheets."""
+_CLOCK = re.compile(r"(?:\d[\d/.-]*[ T])?(\d{1,2}):(\d\d):(\d\d(?:\.\d+)?)", re.ASCII)
+"""A time of day, perhaps after a date."""
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?(?:[eE][+-]?\d+)?", re.ASCII)
 _DIALECTS = (("\t", "."), (";", "."), (",", "."), (" ", "."), ("\t", ","), (";", ","), (" ", ","), (",", ","))
 """Delimiter and decimal sign; the same sign for both only where quotes tell them apart."""
-_MAYBE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+", re.ASCII)
 _UNIT_ALONE = re.compile(r"[\[(][^\[\]()]*[\])]")
 _NAMED_UNIT = re.compile(r"(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*")
+_END_OF_HEADER = "***End_of_Header***"
 
 
 @dataclass(frozen=True)
 class Block:
-    """Where the numbers are: the first line, counted from 0, the count of lines in the head, and of columns."""
+    """The numbers' place: the first line, counted from 0, the count of lines in the head, and the kind of each column.
+
+    A kind is n for numbers, t for words, and empty if all cells of the column are.
+    """
 
     delimiter: str
     decimal: str
     start: int = 0
     lines: int = 0
-    width: int = 0
+    kinds: tuple[str, ...] = ()
+
+    @property
+    def width(self) -> int:
+        return len(self.kinds)
 
     def split(self, line: str) -> list[str]:
         """Return the fields of a line; one delimiter at its end separates nothing. An open quote stays."""
@@ -46,47 +59,94 @@ class Block:
             line = line.strip(" ").removesuffix(self.delimiter)
             fields = _quoted(line, self.delimiter) if '"' in line else line.split(self.delimiter)
             fields = [field.strip() for field in fields or line.split(self.delimiter)]
-        if self.decimal == ",":
-            fields = [field.replace(".", "?").replace(",", ".") for field in fields]
-        return fields
+        if self.decimal == ",":  # each sign becomes the other one
+            fields = [field.translate(_SWAPPED) for field in fields]
+        return [field.replace(",", "") if "," in field and _THOUSANDS.fullmatch(field) else field for field in fields]
 
-    def numbers(self, line: str) -> list[str] | None:
-        """Return a line's fields with a point for the decimal sign; None where one of them is no number."""
+    def row(self, line: str, width: int = 0) -> tuple[list[str], tuple[str, ...]]:
+        """Return a line's fields with a point for the decimal sign, and their kinds; none without a number.
+
+        A delimiter at the end of a line of `width` - 1 fields stands before an empty one.
+        """
         fields = self.split(line)
-        return fields if fields and all(map(_NUMBER.fullmatch, fields)) else None
+        if len(fields) == width - 1 and self.delimiter != " " and line.endswith(self.delimiter):
+            fields.append("")
+        kinds = tuple("n" if _is_number(field) else "t" if field else "" for field in fields)
+        return (fields, kinds) if any(map(_NUMBER.fullmatch, fields)) else ([], ())
+
+    def numbers(self, line: str) -> list[float]:
+        """Return the numbers of a line."""
+        return [_value(field) for field, kind in zip(*self.row(line), strict=True) if kind == "n"]
+
+
+_SWAPPED = str.maketrans(",.", ".,")
+
+
+def _is_number(field: str) -> bool:
+    return any(kind.fullmatch(field) for kind in (_NUMBER, _OVER_RANGE, _CLOCK))
+
+
+def _value(field: str) -> float:
+    """Return the number in a field; NaN for an empty one and for the sign of a value beyond the range."""
+    if clock := _CLOCK.fullmatch(field):
+        return 3600 * float(clock[1]) + 60 * float(clock[2]) + float(clock[3])
+    return float(field) if _NUMBER.fullmatch(field) else np.nan
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
-    """Return the columns of a text file. Raises Unreadable where it has no block of numbers, or an ambiguous one."""
-    with open(path, "rb", opener=files.regular()) as file:
-        content = file.read()
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise Unreadable(str(path), None, "is UTF-16; save it as UTF-8")
-    if b"\0" in content:
-        raise Unreadable(str(path), None, "holds zero bytes: it is no text")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    head = lines[: text.count("\n", 0, HEAD)] if len(text) > HEAD else lines
+    """Return the columns of a text file. Raises Unreadable if it has no block of numbers, or an ambiguous one."""
+    lines = _beside(_text(path).replace("\r\n", "\n").replace("\r", "\n").split("\n"))
+    sizes = np.cumsum([len(line) + 1 for line in lines])
+    head = lines[: max(int(np.searchsorted(sizes, HEAD)), 1)] if sizes[-1] > HEAD else lines
     block = _block(path, head, layout)
     for i, line in enumerate(lines[layout.skip_lines : block.start], layout.skip_lines):
         fields = block.split(line)
-        numbers = [bool(_NUMBER.fullmatch(field.strip('"'))) for field in fields]
-        if numbers and numbers[0] and (len(fields) == block.width or (all(numbers) and len(fields) > 1)):
+        numbers = [_is_number(field) for field in fields]
+        if fields[:1] and numbers[0] and (len(fields) == block.width or (all(numbers) and len(fields) > 1)):
             limit = f"{path.name}: line {i + 1} ({line.strip()[:40]!r}) looks like data, but the block begins at line "
             raise Unreadable("skip_lines", None, f"{limit}{block.start + 1}; correct the file, or skip that line")
     rows = _rows(path, lines, block)
     names, units, step = _header(lines[layout.skip_lines : block.start] or lines[: block.start], block)
-    return [
-        Channel(column, name or f"column {i}", unit, step)
-        for i, (column, name, unit) in enumerate(zip(rows.T, names, units, strict=True), 1)
-    ]
+    clocks = [bool(_CLOCK.fullmatch(field)) for field in block.row(lines[block.start], block.width)[0]]
+    shown = [i for i, kind in enumerate(block.kinds) if kind == "n"]
+    if step is not None and names[0] == "X":  # a counter of the samples
+        shown = shown[1:]
+    return [Channel(rows[:, i], names[i] or f"column {i + 1}", "s" if clocks[i] else units[i], step) for i in shown]
+
+
+def _text(path: Path) -> str:
+    """Return a file's text, in UTF-8, UTF-16, GBK, or Latin-1. Raises Unreadable for a file of other bytes."""
+    with open(path, "rb", opener=files.regular()) as file:
+        content = file.read()
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return content.decode("utf-16", "replace")
+    if b"\0" in content:
+        raise Unreadable(str(path), None, "holds zero bytes: it is no text")
+    for encoding in ("utf-8-sig", "gb2312"):
+        # Latin-1 text has single bytes above ASCII, such as its sign of micro; Chinese characters are pairs.
+        if encoding == "gb2312" and any(len(run) % 2 for run in re.findall(rb"[\x80-\xff]+", content)):
+            continue
+        try:
+            return content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    return content.decode("latin-1")
+
+
+def _beside(lines: list[str]) -> list[str]:
+    """Return the lines of an oscilloscope that writes its header beside the data (Tektronix) with the header above."""
+    if not re.match(r'"?Record Length"?,', lines[0]):
+        return lines
+    rows = [[cell.strip(' "') for cell in line.split(",")] for line in lines if line.strip(" ,")]
+    starts = range(0, len(rows[0]) - 4, 6)
+    said = [{row[k]: row[k + 1] for row in rows if len(row) > k + 1} for k in starts]
+    names = [f"{one.get('Source', f'CH{i}')} ({one.get('Vertical Units', '')})" for i, one in enumerate(said, 1)]
+    head = ",".join([f"Time ({said[0].get('Horizontal Units', '')})", *names])
+    return [head, *(",".join([row[3], *(row[k + 4] for k in starts)]) for row in rows if len(row) > starts[-1] + 4)]
 
 
 def _quoted(line: str, delimiter: str, strict: bool = True) -> list[str]:
-    """Return the fields of a line with quotes; none where one is not closed."""
+    """Return the fields of a line with quotes; none if one is not closed."""
     try:
         return next(csv.reader([line], delimiter=delimiter, strict=strict, skipinitialspace=strict), [])
     except csv.Error:
@@ -94,52 +154,62 @@ def _quoted(line: str, delimiter: str, strict: bool = True) -> list[str]:
 
 
 def _block(path: Path, lines: list[str], layout: Layout) -> Block:
-    """Return the longest run of lines of constant width, over all delimiters that may be meant."""
+    """Return the longest run of lines of the same columns, over all delimiters that may be meant."""
     runs = []
     for delimiter, decimal in _DIALECTS:
         if layout.delimiter not in ("", delimiter) or layout.decimal not in ("", decimal):
             continue
-        run = _longest_run(lines, Block(delimiter, decimal), layout.skip_lines)
-        if delimiter != decimal or any('"' in line for line in lines[run.start : run.start + run.lines]):
-            runs.append(run)
-    best = max(runs, key=lambda run: run.lines, default=None)
+        for run in _longest_runs(lines, Block(delimiter, decimal), layout.skip_lines):
+            if delimiter != decimal or any('"' in line for line in lines[run.start : run.start + run.lines]):
+                runs.append(run)
+    # Words are columns only if a delimiter without them explains less than half of the lines.
+    whole = max((run for run in runs if "t" not in run.kinds), key=lambda run: run.lines, default=None)
+    longest = max(runs, key=lambda run: run.lines, default=None)
+    best = whole if whole and longest and 2 * whole.lines >= longest.lines else longest
     if best is None or best.lines < 2:
         raise Unreadable(str(path), None, "holds no block of lines with the same count of numbers")
-    first = lines[best.start]
-    others = [run for run in runs if run.lines == best.lines and run.start == best.start]
-    if any(other.numbers(first) != best.numbers(first) for other in others):
-        limit = f"line {best.start + 1} ({first.strip()[:40]!r}) may be read in two ways; declare delimiter and decimal"
-        raise Unreadable("delimiter", None, f"{path.name}: {limit}")
-    if best.delimiter == best.decimal and not layout.decimal:
-        quoted = [_quoted(line.strip(" "), ",") for line in lines[best.start : best.start + best.lines]]
+    if not layout.decimal:
+        quoted = [_quoted(line.strip(" "), best.delimiter) for line in lines[best.start :] if '"' in line]
         fields = [field.strip() for line in quoted for field in line if "," in field]
-        if fields and all(map(_MAYBE_THOUSANDS.fullmatch, fields)):
+        if fields and all(_THOUSANDS.fullmatch(field) and "." not in field for field in fields):
             limit = f"{path.name}: the comma in {fields[0]!r} may be a decimal sign or part thousands; declare decimal"
             raise Unreadable("decimal", None, limit)
+    first = lines[best.start]
+    others = [run for run in runs if run.lines == best.lines and run.start == best.start]
+    others = [run for run in others if ("t" in run.kinds) <= ("t" in best.kinds)]
+    if any(str(other.numbers(first)) != str(best.numbers(first)) for other in others):
+        limit = f"line {best.start + 1} ({first.strip()[:40]!r}) may be read in two ways; declare delimiter and decimal"
+        raise Unreadable("delimiter", None, f"{path.name}: {limit}")
     return best
 
 
-def _longest_run(lines: list[str], dialect: Block, skip: int) -> Block:
-    best, start, width, count = dialect, skip, 0, 0
+def _longest_runs(lines: list[str], dialect: Block, skip: int) -> list[Block]:
+    """Return the longest run of lines with numbers in the same columns, and the longest one without words."""
+    best: dict[bool, Block] = {}
+    start, count, kinds, open_end = skip, 0, (), False
     for i, line in enumerate(lines[skip:], skip):
         if not line.strip():
             continue
-        found = len(dialect.numbers(line) or ())
-        if found != width:
-            start, width, count = i, found, 0
-        count += 1
-        if width and count > best.lines:
-            best = Block(dialect.delimiter, dialect.decimal, start, count, width)
-    return best
+        fresh = dialect.row(line, len(kinds))[1]
+        if open_end and len(fresh) == len(kinds) + 1:  # the run began with lines whose last cell is empty
+            kinds = (*kinds, "")
+        if len(fresh) != len(kinds) or any({one, other} == {"n", "t"} for one, other in zip(fresh, kinds, strict=True)):
+            start, count, kinds, open_end = i, 0, fresh, dialect.delimiter != " "
+        open_end = open_end and line.endswith(dialect.delimiter)
+        kinds, count = tuple(one or other for one, other in zip(kinds, fresh, strict=True)), count + 1
+        words = kinds.count("t")
+        if kinds and words <= kinds.count("n") and (bool(words) not in best or count > best[bool(words)].lines):
+            best[bool(words)] = Block(dialect.delimiter, dialect.decimal, start, count, kinds)
+    return list(best.values())
 
 
 def _rows(path: Path, lines: list[str], block: Block) -> Floats:
     """Return the block's numbers (lines, columns). Raises Unreadable for numbers behind its end: words may follow."""
-    plain = block.delimiter != block.decimal and not any('"' in line for line in lines)
+    plain = block.delimiter != block.decimal and "t" not in block.kinds and not any('"' in line for line in lines)
     if plain:
         clean = [line.rstrip(" ").removesuffix(block.delimiter.strip(" ")) for line in lines[block.start :]]
         if block.decimal == ",":
-            clean = [line.replace(".", "?").replace(",", ".") for line in clean]
+            clean = [line.translate(_SWAPPED) for line in clean]
         try:
             found = np.loadtxt(clean, delimiter=block.delimiter.strip(" ") or None, comments=None, ndmin=2)
             if found.shape[1] == block.width and not np.isinf(found).any():
@@ -151,13 +221,14 @@ def _rows(path: Path, lines: list[str], block: Block) -> Floats:
     for i, line in enumerate(lines[block.start :], block.start):
         if not line.strip():
             continue
-        fields = block.numbers(line)
-        ended = ended or fields is None or len(fields) != block.width
-        if not ended and fields:
-            rows.append(list(map(float, fields)))
+        fields, kinds = block.row(line, block.width)
+        pairs = zip(kinds, block.kinds, strict=False)
+        ended = ended or len(kinds) != block.width or any(one == "t" and other != "t" for one, other in pairs)
+        if not ended:
+            rows.append([np.nan if kind == "t" else _value(field) for field, kind in zip(fields, kinds, strict=True)])
             continue
         fields = [field.strip('"') for field in block.split(line)]
-        if _NUMBER.fullmatch(fields[0]) or any(map(_NUMBER.fullmatch, fields[1:])):
+        if any(map(_NUMBER.fullmatch, fields)):
             limit = f"line {i + 1} ({line.strip()[:40]!r}) does not have {block.width} numbers as those above"
             raise Unreadable(str(path), None, limit)
     return np.array(rows, float)
@@ -165,8 +236,11 @@ def _rows(path: Path, lines: list[str], block: Block) -> Floats:
 
 def _header(header: list[str], block: Block) -> tuple[list[str], list[str], float | None]:
     """Return the columns' names and units by the last lines of the header, and the step that it may state, in s."""
-    rows = [_words(line, block.delimiter) for line in header if line.strip()][-2:]
+    rows = [_words(line, block.delimiter) for line in header if line.strip()]
     names, units, step = [""] * block.width, [""] * block.width, None
+    if any(row[:1] == [_END_OF_HEADER] for row in rows):
+        return _lvm_header(rows, block.width)
+    rows = rows[-2:]
     if len(rows) == 2 and rows[0][:1] == ["X"] and rows[1][:1] == ["Sequence"] and "Increment" in rows[0][1:]:
         # An oscilloscope whose first column is an index (Rigol).
         value = (rows[1] + [""] * len(rows[0]))[rows[0].index("Increment")]
@@ -178,8 +252,9 @@ def _header(header: list[str], block: Block) -> tuple[list[str], list[str], floa
     last = rows[-1][: block.width]
     alone = [bool(_UNIT_ALONE.fullmatch(word)) for word in last]
     units_row = any(last) and all(known(word) or a for word, a in zip(last, alone, strict=True) if word)
-    if (len(rows) == 2 and (step is not None or units_row)) or all(alone):
-        names = rows[0][: block.width] if len(rows) == 2 else names
+    if step is not None or units_row or all(alone):
+        names = rows[0][: block.width] if len(rows) == 2 else [word.strip("[]() ") for word in last]
+        names = [""] * block.width if len(rows) == 1 and all(alone) else names
         units = [word.strip("[]() ") if known(word) or a else "" for word, a in zip(last, alone, strict=True)]
     elif not any(alone):  # a unit by itself among names: its spaces have split them
         for i, word in enumerate(last):
@@ -188,8 +263,18 @@ def _header(header: list[str], block: Block) -> tuple[list[str], list[str], floa
     return names, units, step
 
 
+def _lvm_header(rows: list[list[str]], width: int) -> tuple[list[str], list[str], float | None]:
+    """Return names, units and step of a LabVIEW file, which has a value for each channel next to each key."""
+    keys = {row[0]: [*row[1:], *[""] * width] for row in rows}
+    units = ["s" if keys.get("X_Dimension", [""])[0] in ("", "Time") else "", *keys.get("Y_Unit_Label", [""] * width)]
+    step = keys.get("Delta_X", [""])[0].replace(",", ".")
+    names = rows[-1] if rows[-1][0] == "X_Value" else []
+    rising = float(step) if _NUMBER.fullmatch(step) else 0.0
+    return [*names, *[""] * width][:width], units[:width], rising if rising > 0 else None
+
+
 def _words(line: str, delimiter: str) -> list[str]:
-    line = line.strip().lstrip("#%").strip()
+    line = re.sub(r"^[#%]+ *(?=[^\s,;])", "", line.strip(" "))  # the sign of a comment, not of a percentage
     if delimiter == " ":
         return line.split()
-    return [word.strip() for word in _quoted(line.removesuffix(delimiter), delimiter, strict=False)]
+    return [word.strip() for word in _quoted(line.rstrip().removesuffix(delimiter), delimiter, strict=False)]

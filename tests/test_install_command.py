@@ -1,0 +1,52 @@
+"""The command that a missing extra's message gives, by the place that the installation came from."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from importlib import metadata
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from unitcad.errors import install_command
+
+
+@pytest.fixture
+def installed_from(monkeypatch: pytest.MonkeyPatch):
+    def set_source(source: dict | None) -> list[str]:
+        text = None if source is None else json.dumps(source)
+        monkeypatch.setattr(metadata, "distribution", lambda name: SimpleNamespace(read_text=lambda file: text))
+        return shlex.split(install_command("lab"))
+
+    return set_source
+
+
+def test_a_clones_command_names_its_folder_and_its_constraints(installed_from, tmp_path: Path) -> None:
+    folder = tmp_path / "a clone"
+    folder.mkdir()
+    (folder / "pyproject.toml").touch()
+    pip = [sys.executable, "-m", "pip", "install"]
+    assert installed_from({"url": folder.as_uri(), "dir_info": {}}) == [*pip, f"{folder}[lab]"]
+    (folder / "constraints.txt").touch()
+    pip += ["-c", str(folder / "constraints.txt")]
+    editable = {"url": folder.as_uri(), "dir_info": {"editable": True}}
+    assert installed_from(editable) == [*pip, "-e", f"{folder}[lab]"]
+
+
+def test_an_address_is_installed_from_again(installed_from) -> None:
+    vcs = {
+        "url": "https://git.example/unitcad",
+        "vcs_info": {"vcs": "git", "commit_id": "abc", "requested_revision": "v1"},
+    }
+    assert installed_from(vcs)[-1] == "unitcad[lab] @ git+https://git.example/unitcad@abc"
+    archive = {"url": "https://git.example/unitcad-1.whl", "archive_info": {}}
+    assert installed_from(archive)[-1] == "unitcad[lab] @ https://git.example/unitcad-1.whl"
+
+
+def test_a_folder_that_is_gone_is_a_clone_to_be_found(installed_from, tmp_path: Path) -> None:
+    gone = {"url": (tmp_path / "gone").as_uri(), "dir_info": {}}
+    assert installed_from(gone)[:3] == ["in", "a", "clone,"]
+    assert installed_from(gone)[-1] == ".[lab]"
