@@ -89,9 +89,9 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
 
         return check_3mf(view, options, deadline)
     if kind == "step":
-        from unitcad.check.readers.read_step import check_step
+        from unitcad.check.step_solids import check_step
 
-        return check_step(path, view, options)
+        return check_step(path, view, options, deadline)
     if kind == "glb" and options.unit is None:
         options = replace(options, unit="meter")  # as the format says
     findings: list[Finding] = []

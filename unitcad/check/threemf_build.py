@@ -18,6 +18,7 @@ from unitcad.check.geometry.topology import diagonals, topology_of
 from unitcad.check.geometry.triangle_mesh import LARGEST, solid_of
 from unitcad.check.one_mesh import CheckedMesh, check_on_bed, check_surface
 from unitcad.check.options import Options
+from unitcad.check.overlaps import Solid, overlapping
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.opc import Package, open_package
 from unitcad.check.readers.threemf.placement import Instance, Key
@@ -38,10 +39,6 @@ if TYPE_CHECKING:
 
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
 _FILLED = {"G001", "G002", "G008"}
-MOST = 2000
-"""At most this many instances are compared; where there are more, a finding says "among those compared"."""
-_PAIRS = 2000
-_SHARE = 1e-6  # of the smaller volume, below which solids only touch
 
 
 def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
@@ -126,7 +123,12 @@ def _geometry(
     )
     if options.cross:
         solids = ((facts.watertight and volume > 0) for (facts, _), volume in zip(each, volumes, strict=True))
-        findings += overlapping(list(compress(zip(instances, volumes, strict=True), solids)), deadline)
+        sound = (
+            Solid(instance.mesh(placed=True), volume, str(instance.object.id))
+            for instance, volume in compress(zip(instances, volumes, strict=True), solids)
+        )
+        with keeping(change=_filled):
+            findings += _filled(overlapping(sound, "instances", deadline))
     findings += s_scale.likely_unit(whole, build.unit)
     findings += g_shells.expected(whole.shells, options.shells)
     if options.printer is not None:
@@ -151,41 +153,6 @@ def _filled(findings: Iterable[Finding]) -> Iterator[Finding]:
             yield replace(item, severity="warning", message=f"{item.message} (3MF's fill rule says what is solid)")
         else:
             yield item
-
-
-def overlapping(solids: Sequence[tuple[Instance, float]], deadline: Deadline) -> list[Finding]:
-    """Apply G002, as a warning, to pairs of sound solids that share volume, mm3 each, by manifold3d's boolean."""
-    meshes = [instance.mesh(placed=True) for instance, _ in solids[:MOST]]
-    if len(meshes) < 2:
-        return []
-    boxes = np.array([extent(mesh.vertices) for mesh in meshes])
-    low, high = boxes[:, 0], boxes[:, 1]
-    made: dict[int, Manifold] = {}
-    places: list[Location] = []
-    pairs = box_pairs(low, high, deadline.tick)
-    try:
-        for a, b in pairs[:_PAIRS].tolist():
-            deadline.tick()
-            least = _SHARE * min(solids[a][1], solids[b][1])
-            inner, outer = np.maximum(low[a], low[b]), np.minimum(high[a], high[b])
-            if float(np.prod(outer - inner)) <= least:
-                continue
-            for i in {a, b} - made.keys():
-                made[i] = solid_of(meshes[i].vertices, meshes[i].faces)
-            if (made[a] ^ made[b]).volume() > least:  # 0 where manifold3d refuses one, whose faults are reported
-                names = f"{solids[a][0].object.id} and {solids[b][0].object.id}"
-                places.append(Location(xyz=point((inner + outer) / 2), object=names))
-    except Unreadable as stop:
-        stop.findings = (*_overlaps(places, among=True), *stop.findings)
-        raise
-    return _overlaps(places, among=len(solids) > MOST or len(pairs) > _PAIRS)
-
-
-def _overlaps(places: list[Location], *, among: bool) -> list[Finding]:
-    if not places:
-        return []
-    text = f"{counted(len(places), 'pair')} of instances that share volume{' among those compared' if among else ''}"
-    return [G002.finding(f"{text} (3MF's fill rule says what is solid)", len(places), places, "warning")]
 
 
 def printed(instances: Sequence[Instance], printer: Printer, deadline: Deadline) -> list[Finding]:

@@ -98,12 +98,9 @@ def _read(path: Path) -> Configuration | None:
     shown, text = seen_from(path.absolute()), files.read_text(path)
     if path.name == "pyproject.toml" and "unitcad" not in text and "\\" not in text:  # with escapes it may be meant
         return None
-    import tomllib
+    from unitcad.spec.toml import parse_toml
 
-    try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UnitcadError(f"{shown}: not TOML: {error}") from None
+    data: Any = parse_toml(text, shown)
     table = _table(path, data)
     *above, last = table.split(".")
     if not above and "design" in data:

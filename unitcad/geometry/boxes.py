@@ -42,7 +42,7 @@ class Frame:
 
     def even(self, steps: list[Ints]) -> list[Ints]:
         """Return steps of about one length, by powers of two, so that a space-filling curve's cells are near cubes."""
-        shift = np.round(np.log2(self.scale / self.scale.min())).clip(0, 15).astype(np.uint16)
+        shift = np.round(np.log2(self.scale) - np.log2(self.scale.min())).clip(0, 15).astype(np.uint16)
         return [step >> bits for step, bits in zip(steps, shift, strict=True)]
 
 

@@ -51,7 +51,7 @@ class _Element:
 def read_ply(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
     """Read a PLY file, as `sniff.Reader` says."""
     raw = bytes(data)
-    if _TEXT.search(raw[:1000]):
+    if raw.startswith(rows.UTF16) or _TEXT.search(raw[:1000]):
         raw = rows.plain(raw, findings)
     if not raw.startswith(b"ply"):
         raise F005.unreadable("named .ply, but does not begin with ply")
