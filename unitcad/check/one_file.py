@@ -129,7 +129,7 @@ def _check_surface(mesh: Mesh, options: Options, deadline: Deadline) -> tuple[li
     from unitcad.check.one_mesh import check_on_bed, check_surface
     from unitcad.check.rules import g_shells, s_scale
 
-    checked = check_surface(mesh, deadline, cross=options.cross)
+    checked = check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
     findings, facts = [*checked.findings, *s_scale.likely_unit(checked.facts, options.unit)], checked.facts
     if options.printer is not None and checked.inspection is not None:
         with keeping(findings, facts):

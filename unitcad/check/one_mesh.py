@@ -36,8 +36,8 @@ class CheckedMesh:
     inspection: Inspection | None = None
 
 
-def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> CheckedMesh:
-    """Apply the rules that need no printer; `cross=False` leaves out what compares faces with each other."""
+def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict: bool = False) -> CheckedMesh:
+    """Apply the rules that need no printer; `cross` and `strict` are those of `Inspection`."""
     facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
     points = representable(mesh.vertices)
     # What was made 0 may be where another vertex is.
@@ -50,7 +50,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Chec
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):
-        part = _inspected(mesh, deadline.tick, cross=cross)
+        part = replace(_inspected(mesh, deadline.tick, cross=cross), strict=strict)
     topology = part.topology
     area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
     facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)

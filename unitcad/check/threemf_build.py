@@ -142,7 +142,7 @@ def _check_object(instance: Instance, options: Options, deadline: Deadline) -> C
     if one.type not in SOLID or one.attributes.get(f"{elements.SLICE} meshresolution") == "lowres":
         return CheckedMesh((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)))
     with keeping(change=_filled):
-        checked = check_surface(mesh, deadline, cross=options.cross)
+        checked = check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
     return replace(checked, findings=tuple(_filled(checked.findings)))
 
 

@@ -8,9 +8,9 @@ from itertools import chain
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, point
-from unitcad.check.geometry.predicates import orient2d
 from unitcad.check.geometry.topology import Topology, diagonals, max_side_squared
 from unitcad.check.geometry.triangle_mesh import Mesh, float32_step, float32_steps
+from unitcad.check.geometry.triangles import without_area
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_edges, at_faces
 from unitcad.check.rules.rule import Rule
@@ -127,8 +127,9 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     if n := len(topology.pinched):
         text = counted(n, "pinch vertex", "pinch vertices")
         yield T004.finding(text, n, (Location(xyz=point(xyz)) for xyz in mesh.vertices[topology.pinched]))
-    if n := len(topology.twice):
-        yield T009.finding(counted(n, "duplicate face"), n, at_faces(mesh.vertices, mesh.faces, kept, topology.twice))
+    twice = topology.twice[~without_area(mesh.vertices[mesh.faces[topology.twice]])]  # the others are T010
+    if n := len(twice):
+        yield T009.finding(counted(n, "duplicate face"), n, at_faces(mesh.vertices, mesh.faces, kept, twice))
     if n := len(topology.unbalanced):
         text = f"{counted(n, 'edge')} along which more faces run one way than the other"
         yield T007.finding(text, n, at_edges(mesh.vertices, edges, kept, topology.unbalanced))
@@ -175,7 +176,7 @@ def _thin(topology: Topology) -> Iterator[Finding]:
     suspect = np.flatnonzero(double < 8 * max(step, 1e-7 * whole) * whole)
     corners = vertices[faces[suspect]]
     longest = np.sqrt(max_side_squared(corners))
-    flat = _exactly_flat(corners)
+    flat = without_area(corners)
     lines = suspect[flat]
     n = len(repeated) + len(lines)
     if n:
@@ -186,16 +187,6 @@ def _thin(topology: Topology) -> Iterator[Finding]:
     thin = suspect[~flat & (height < float32_steps(corners)) & (longest > SLIVER * size[suspect])]
     if len(thin):
         yield T011.finding(counted(len(thin), "sliver"), len(thin), at_faces(vertices, faces, kept, thin))
-
-
-def _exactly_flat(corners: Floats) -> Bools:
-    """Return whether the corners of each face (n, 3, 3) lie on one line: seen along no axis do they have an area."""
-    flat = np.ones(len(corners), bool)
-    for axis in range(3):
-        left = np.flatnonzero(flat)
-        plan = np.delete(corners[left], axis, axis=2)
-        flat[left] = orient2d(plan[:, 0], plan[:, 1], plan[:, 2]) == 0
-    return flat
 
 
 def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats) -> Iterator[Finding]:
