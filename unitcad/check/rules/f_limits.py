@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from unitcad.check.findings import Facts, Finding, Unreadable, counted
 from unitcad.check.rules.rule import Rule
+from unitcad.geometry.ticks import TooMany
 
 F011 = Rule("""
     F011 error: resource limit reached
@@ -75,13 +76,15 @@ def keeping(
 ) -> Iterator[None]:
     """Put the findings by then, and the facts, beside what ends the check inside; `change` all of them.
 
-    Raises `Unreadable`, with F011 where memory runs out or calls nest too deeply.
+    Raises `Unreadable`, with F011 where memory runs out, pairs are too many or calls nest too deeply.
     """
     try:
         yield
-    except (Unreadable, MemoryError, RecursionError) as error:
+    except (Unreadable, TooMany, MemoryError, RecursionError) as error:
         if isinstance(error, Unreadable):
             stop = error
+        elif isinstance(error, TooMany):
+            stop = F011.unreadable(str(error))
         else:
             why = "out of memory (--memory)" if isinstance(error, MemoryError) else "nested too deeply"
             stop = F011.unreadable(why)

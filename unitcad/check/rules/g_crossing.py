@@ -141,7 +141,8 @@ def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterato
         return faces.original[distinct_values(touching[begin:end])], (x / 2, y / 2, z / 2)
 
     places = _places(topology, faces, touching[first], region)
-    yield G003.finding(f"{counted(n, 'pair')} of shells that touch", n, places)
+    some = " among those compared" if contact.full else ""
+    yield G003.finding(f"{counted(n, 'pair')} of shells that touch{some}", n, places)
 
 
 def _places(

@@ -12,13 +12,13 @@ from unitcad.check.findings import Finding, Location, counted, number, point
 from unitcad.check.geometry.topology import Topology, diagonals
 from unitcad.check.geometry.triangle_mesh import solid_of
 from unitcad.check.geometry.triangles import without_area
-from unitcad.check.geometry.volumes import winding_number
+from unitcad.check.geometry.volumes import winding_numbers
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Bools, Floats, Ints, among, grouped
 from unitcad.geometry.boxes import box_pairs
-from unitcad.geometry.ticks import Interrupted, Tick
+from unitcad.geometry.ticks import Interrupted, Tick, TooMany
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -75,6 +75,7 @@ T008 = Rule("""
 FLAT = 1e-6  # G007: a shell's volume over its area times its diagonal
 SPECK = 0.02  # G010, mm; a tenth of the least feature of the finest printer in the catalogue
 BODY = 1.0  # G010, mm; the size of a body beside which a speck is one
+_BOOLEANS = 100_000  # pairs of shells
 _SHARE = 1e-6  # of the smaller shell's volume: shells that share no more only touch
 
 
@@ -98,6 +99,8 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     yield from specks(low, high, sound & (volumes > 0))
     depth, overlaps = np.zeros(n, int), dict[tuple[int, int], float]()
     try:
+        if crossings.contact.full:
+            raise TooMany(crossings.contact.most, "shells")
         if n > 1:
             meeting = box_pairs(low, high, part.tick) if crossings.meeting is None else crossings.meeting
             _relate(topology, np.asarray(sound), meeting, crossings.touching(), depth, overlaps, part.tick)
@@ -180,6 +183,8 @@ def _relate(
     size = np.abs(volumes)
     least = np.minimum(size.take(one), size.take(other))
     close = np.flatnonzero(touch & (room > _SHARE * least))
+    if len(close) > _BOOLEANS:
+        raise TooMany(_BOOLEANS, "shells")
     solids: dict[int, Manifold] = {}
     before = -1
     for at in close.tolist():
@@ -192,11 +197,15 @@ def _relate(
             overlaps[(a, b)] = thickness if thickness < SPECK and common < least[at] / 2 else math.inf
         elif common > (1 - _SHARE) * least[at]:  # a cavity that touches the wall
             depth[a if abs(volumes[a]) < abs(volumes[b]) else b] += 1
+    order, first, count = grouped(topology.shells, n)
+    by_shell = faces[order]
     for inner, outer, within in ((one, other, inside), (other, one, outside)):
-        for at in np.flatnonzero(within & ~touch).tolist():
-            tick()
-            point = vertices[faces[faces_of(inner[at])[0], 0]]
-            depth[inner[at]] += winding_number(vertices, faces[faces_of(outer[at])], point) != 0
+        some = np.flatnonzero(within & ~touch)
+        shell, around = inner[some], outer[some]
+        points = vertices[by_shell[first[shell], 0]]
+        depth += np.bincount(
+            shell[winding_numbers(vertices, by_shell, first[around], count[around], points, tick) != 0], minlength=n
+        )
 
 
 def _common_room(topology: Topology, one: Ints, other: Ints) -> tuple[Floats, Bools, Bools]:
