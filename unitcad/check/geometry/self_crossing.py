@@ -239,6 +239,12 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings
     if faces.several:
         some = np.flatnonzero((state == _FLUSH) | ((state == _APART) & (shared > 0)))
         _contacts(faces, i[some], j[some], crossings)
+    twice = np.flatnonzero(shared == 3)  # in one place: a face that the file lists twice, or another one
+    if faces.places is not faces.corners:
+        twice = twice[_common(*(faces.corners.take(f[twice], axis=1) for f in (i, j))) == 3]
+    state[twice] = _APART
+    if faces.several:
+        _note(faces, i, j, twice, crossings.contact)
     left = np.flatnonzero(state == _OPEN)
     _decide_exactly(faces, i[left], j[left], shared[left], crossings)
 
@@ -319,12 +325,10 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Cro
     meeting = triangles.meet(a[some], b[some])
     overlaps[some] = meeting.overlaps
     wide = np.flatnonzero(overlaps)
-    wide = wide[~_same_corners(faces, i[wide], j[wide])]
     crossings.covering.append(pair[wide[coverings.wide(a[wide], b[wide])]])
     if faces.several:
         meets[some] |= meeting.touches | meeting.crosses
-        meets &= faces.shell[i] != faces.shell[j]
-        crossings.contact.add(crossings.contact.keys(faces.shell[i[meets]], faces.shell[j[meets]]), pair[meets])
+        _note(faces, i, j, np.flatnonzero(meets), crossings.contact)
     crossing = some[meeting.crosses & (shared[some] < 2)]
     crossings.crossing.append(pair[crossing])
     crossings.kept += len(crossing) + len(wide)
@@ -339,15 +343,19 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Cro
         crossings.leaning.append(_edges_inside(faces, face, holder, one, other, sides))
 
 
+def _note(faces: Faces, i: Ints, j: Ints, some: Ints, contact: Contacts) -> None:
+    """Note the shells of `some` pairs of faces, which meet."""
+    if contact.full:
+        return
+    one, other = faces.shell.take(i[some]), faces.shell.take(j[some])
+    apart = np.flatnonzero(one != other)
+    some, keys = some[apart], contact.keys(one[apart], other[apart])
+    contact.add(keys, np.stack([i[some], j[some]], axis=1))
+
+
 def facing(faces: Faces, i: Ints, j: Ints) -> Floats:
     """Return the product of both faces' normals: positive where they look the same way."""
     return np.einsum("ij,ij->j", faces.normal.take(i, axis=1), faces.normal.take(j, axis=1))
-
-
-def _same_corners(faces: Faces, i: Ints, j: Ints) -> Bools:
-    """Return which pairs i, j are one face that is listed twice, with the same vertices."""
-    one, other = (np.sort(np.stack([corner[f] for corner in faces.corners]), axis=0) for f in (i, j))
-    return np.asarray((one == other).all(axis=0))
 
 
 def _edges_inside(faces: Faces, face: Ints, holder: Ints, one: Floats, other: Floats, sides: Ints) -> Ints:
