@@ -20,7 +20,7 @@ from unitcad.check.rules.f_file import F001
 from unitcad.check.rules.f_limits import Deadline, keeping
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import not_finite
-from unitcad.geometry.arrays import extent
+from unitcad.geometry.arrays import distinct_values, extent
 from unitcad.geometry.ticks import Tick
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict:
         return CheckedMesh(in_file(broken, mesh), facts)
     if not len(mesh.faces):
         return CheckedMesh(ending([F001.finding("the mesh has no face")]), facts)
-    low, high = extent(mesh.vertices)
+    low, high = extent(mesh.vertices[distinct_values(mesh.faces)] if mesh.indexed else mesh.vertices)
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):

@@ -66,9 +66,7 @@ def _pieces(ready: Arranged, faces: Ints, corner: Ints) -> tuple[Ints, Ints]:
     frame, n = frame_of(ready.columns.T), max(min(_PIECES, _MOST_PIECES // len(faces)), 1)
     part = np.linspace(0, 1, n + 1)[:, None, None]
     ids = ready.corners[:, faces]
-    hub, one, other = (
-        ready.columns[:, np.take_along_axis(ids, (corner[None] + k) % 3, axis=0)[0]].T for k in range(3)
-    )
+    hub, one, other = (ready.columns[:, np.take_along_axis(ids, (corner[None] + k) % 3, axis=0)[0]].T for k in range(3))
     ends = []
     for far in (one, other):
         points = (hub + part * (far - hub)).reshape(-1, 3)

@@ -73,7 +73,9 @@ def winding_numbers(vertices: Floats, faces: Ints, first: Ints, count: Ints, poi
             numbers[start] = winding_number(vertices, surface, points[start])
         else:
             row = np.repeat(np.arange(start, stop), count[start:stop])
-            place = np.arange(len(row)) - np.repeat(ends[start:stop] - count[start:stop] - ends[start] + count[start], count[start:stop])
+            place = np.arange(len(row)) - np.repeat(
+                ends[start:stop] - count[start:stop] - ends[start] + count[start], count[start:stop]
+            )
             angles = _half_angles(vertices, faces[first[row] + place], points[row])
             numbers[start:stop] = np.round(np.bincount(row - start, angles, stop - start) / (2 * np.pi))
         start = stop

@@ -14,7 +14,7 @@ from unitcad.check.geometry.triangles import without_area
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_edges, at_faces
 from unitcad.check.rules.rule import Rule
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Floats, Ints
 
 T001 = Rule("""
     T001 error: boundary edge
@@ -117,8 +117,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     topology = part.topology
     mesh, edges, kept = topology.mesh, topology.edges, topology.kept
     if topology.unused:
-        text = f"{counted(topology.unused, 'vertex', 'vertices')} that no face uses"
-        yield T012.finding(text, topology.unused)
+        yield unreferenced(topology.unused)
     yield from _open_edges(topology)
     if part.mesh.normals is not None:
         yield from _stored_normals(part.mesh, part.mesh.normals, kept, topology.stored_areas)
@@ -133,6 +132,11 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     if n := len(topology.unbalanced):
         text = f"{counted(n, 'edge')} along which more faces run one way than the other"
         yield T007.finding(text, n, at_edges(mesh.vertices, edges, kept, topology.unbalanced))
+
+
+def unreferenced(n: int) -> Finding:
+    """Make the finding T012 about n vertices, for a reader too, which leaves them out."""
+    return T012.finding(f"{counted(n, 'vertex', 'vertices')} that no face uses", n)
 
 
 def _open_edges(topology: Topology) -> Iterator[Finding]:
