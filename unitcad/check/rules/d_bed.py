@@ -31,7 +31,8 @@ D004 = Rule("""
 
 D005 = Rule("""
     D005 warning: not on the bed
-    The lowest point is not at z = 0, or no flat of the part lies there to stand on.
+    The lowest point floats above z = 0, reaches below it, or no flat of the part lies there to stand on; the message
+    says which.
     Example: The underside of a part lies at z = 5 mm.
     Fix: Place the part with a flat on z = 0.
 """)

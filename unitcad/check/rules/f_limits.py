@@ -14,11 +14,11 @@ from unitcad.geometry.ticks import TooMany
 
 F011 = Rule("""
     F011 error: resource limit reached
-    The file asks for more bytes, faces, time or memory than the limits allow, so it was not checked to its end. It
-    never passes.
+    The file asks for more bytes, faces, time or memory than the limits allow, or has too many pairs of faces that lie
+    at each other, so it was not checked to its end. It never passes. What was found by then is reported.
     Example: A mesh has 12 million faces, and --max-faces is 10 million.
     Fix: If the file is meant to be so large, raise the limit that the message names: --timeout, --max-faces or
-    --memory. Limits without an option, such as 4 GB a file and 100,000 instances of a 3MF, are fixed.
+    --memory, of which a file may take a quarter. Limits without an option, such as 4 GB a file and 100,000 instances of a 3MF, are fixed.
 """)
 
 

@@ -24,8 +24,9 @@ from unitcad.geometry.arrays import Floats, Ints, among, distinct, distinct_valu
 
 G001 = Rule("""
     G001 error: self-crossing
-    Two faces pass through each other. Decided exactly: touching is not crossing. In a 3MF file a warning, since the
-    core specification (4.1) says what is solid.
+    Two faces pass through each other. Decided exactly: touching is not crossing. A warning, unless --strict is given, if
+    they do so by no more than 0.02 mm or four float32 steps, of which the message says the depth. In a 3MF file a
+    warning, since the core specification (4.1) says what is solid.
     Example: A bolt passes through a wall and is not united with it.
     Fix: Unite the bodies with a boolean, or move the surfaces apart.
 """)
@@ -49,8 +50,8 @@ G008 = Rule("""
     G008 error: shell overlaps itself
     A shell passes through itself along edges that four or more of its faces share, or two of its faces cover each other
     in one plane and look the same way: its winding number takes another value than 0 and 1, such as 2 in the middle of
-    a pentagram or -1 in one half of a bow tie. In a 3MF file a warning, since the core specification (4.1) says what is
-    solid.
+    a pentagram or -1 in one half of a bow tie. A warning, unless --strict is given, if two faces cover each other by
+    no more than 0.02 mm. In a 3MF file a warning, since the core specification (4.1) says what is solid.
     Example: A prism stands on a pentagram that is drawn in one stroke.
     Fix: Unite the body with itself by a boolean, or correct the outline that it was made from.
 """)
@@ -59,7 +60,7 @@ G009 = Rule("""
     G009 error: wall or gap without thickness
     Two faces cover each other in one plane and look opposite ways, and they do not belong to two solids that lie side
     by side: a fin, a fold, a crack, or a cavity that reaches the surface. Also where two neighbours fold onto each
-    other to within two float32 steps.
+    other to within two float32 steps. A warning, unless --strict is given, if they cover each other by no more than 0.02 mm.
     Example: A fin is drawn as one surface and exported with both of its sides.
     Fix: Give the wall or the gap a thickness, or remove both faces.
 """)

@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 G002 = Rule("""
     G002 error: shells overlap
     Two shells share volume: one faces outwards inside the other, or where their faces meet, they share more than a
-    millionth of the smaller one. Fill rules decide what is solid, and they differ between slicers. In a 3MF file a
-    warning, since the core specification (4.1) says what is solid.
+    millionth of the smaller one. Fill rules decide what is solid, and they differ between slicers. A warning, unless
+    --strict is given, if the part that they share is less than 0.02 mm thick. In a 3MF file a warning, since the core
+    specification (4.1) says what is solid. The solids of a STEP file are compared by meshes of them.
     Example: A box lies inside a larger one, and both face outwards.
     Fix: Unite the bodies with a boolean.
 """)
@@ -51,7 +52,8 @@ G006 = Rule("""
 
 G007 = Rule("""
     G007 error: volume about zero
-    A shell encloses less than a millionth of its area times its diagonal: a sheet without thickness.
+    A shell encloses less than a millionth of its area times its diagonal: a sheet without thickness. Faces without an
+    area are T010 alone.
     Example: A sheet is drawn as two faces back to back.
     Fix: Give it thickness.
 """)

@@ -33,7 +33,7 @@ T002 = Rule("""
 T003 = Rule("""
     T003 warning: edge with more than two faces, an even number
     Two shells meet along an edge. Slicers pair the faces in different ways; shells are counted here with the solid
-    between the faces of a pair.
+    between the faces of a pair. An error in a 3MF with --3mf-strict, since the core specification (4.1) forbids it.
     Example: Two boxes share one edge: four faces meet there.
     Fix: Move the shells apart, or unite them with some overlap.
 """)
@@ -57,7 +57,8 @@ T006 = Rule("""
     Edges match only once vertices are joined that are listed apart. Two are joined where they are in one place, or
     where they are nearer than 1e-5 of their own shell's diagonal (or two float32 steps there) and than a tenth of the
     shortest edge at either. So a gap wider than that stays a boundary (T001), no face collapses, and other shells of
-    the file have no influence. Crossings, stored normals and slivers are checked on the faces as stored.
+    the file have no influence. Crossings, stored normals and slivers are checked on the faces as stored. An error in a
+    3MF with --3mf-strict, since the core specification (4.1) asks for common vertices.
     Example: Two halves of a ball were exported apart, and their rims differ by 0.000001 mm.
     Fix: Weld vertices at export.
 """)
@@ -71,7 +72,7 @@ T007 = Rule("""
 
 T009 = Rule("""
     T009 error: duplicate face
-    Two faces have the same three vertices. Where two closed shells stand side by side there, they touch instead (G003,
+    Two faces with an area have the same three vertices. Where two closed shells stand side by side there, they touch instead (G003,
     T003).
     Example: The lid of a box is in the file twice.
     Fix: Remove one, or both if they face each other.
