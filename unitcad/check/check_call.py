@@ -84,10 +84,10 @@ def check(
 
     `files` are files, folders or globs. `printer`, a name of the catalogue or an entry, asks for the rules of fit and
     printability. `unit` ("mm", "in" and so on) is that of formats that have none. `select` and `ignore` are prefixes
-    of codes; `shells` is the number expected; with `strict`, crossings too shallow for any printer are errors. `timeout` is in seconds a file. With `jobs` above 1 worker processes
-    check the files; a script that asks for them needs the guard `if __name__ == "__main__":`. What is wrong with a
-    file, or that it is missing, is in the result; lengths in mm. Raises Refusal or UnitcadError for an invalid
-    argument.
+    of codes; `shells` is the number expected; with `strict`, crossings too shallow for any printer are errors.
+    `timeout` is in seconds a file. With `jobs` above 1 worker processes check the files; a script that asks for them
+    needs the guard `if __name__ == "__main__":`. What is wrong with a file, or that it is missing, is in the result;
+    lengths in mm. Raises Refusal or UnitcadError for an invalid argument.
     """
     from unitcad.check import many_files
     from unitcad.check.rules.registry import check_prefixes

@@ -30,7 +30,8 @@ def expand(
 ) -> tuple[list[str], list[FileReport]]:
     """Return files for names that may be folders or globs, without repeats; a report for each name that gives none.
 
-    Of what folders and globs hold, `left_out` says which files to leave out.     A folder's STEP files that cannot be read here give a warning each, since they were not named.
+    Of what folders and globs hold, `left_out` says which files to leave out. A folder's STEP files that cannot be
+    read here give a warning each, since they were not named.
     """
     files: list[str] = []
     empty: list[FileReport] = []

@@ -14,6 +14,7 @@ MOST = 20_000
 """Pairs whose depth is worked out; more of them are no rounding."""
 _MOST_NEIGHBOURS = 4_000_000
 _STEPS = 4  # float32 steps: no less is told from rounding
+_SEEN = 3  # pairs in which one fold shows
 _PART = 0.1  # of a face: of finer faces none reaches deep, though all of them together do
 
 
@@ -77,7 +78,8 @@ def covering_depths(vertices: Floats, corners: Ints, pairs: Ints, least: float) 
     """Return how deep pairs of faces (n, 2) in one plane cover each other, mm; infinity if that is not shallow.
 
     A pair's depth is the way in the plane by which the faces come apart, or the mean
-    width that all faces together cover of one of the two, if that is more. The others are as in `crossing_depths`.
+    width that all faces together cover of one of the two, by fold, if that is more. The others are as in
+    `crossing_depths`.
     """
     if not 0 < len(pairs) <= MOST:
         return np.full(len(pairs), np.inf)
@@ -88,7 +90,7 @@ def covering_depths(vertices: Floats, corners: Ints, pairs: Ints, least: float) 
     depth = np.min([_overlap(a, b, axis) for axis in _across(a, b, normal)], axis=0)
     longest = [np.sqrt(max_side_squared(of)) for of in (a, b)]
     strip, both = depth * np.minimum(*longest), pairs.T.reshape(-1)
-    covered = np.bincount(both, np.concatenate([strip, strip]))[pairs]
+    covered = np.bincount(both, np.concatenate([strip, strip]))[pairs] / _SEEN
     depth = np.max([depth, covered[:, 0] / longest[0], covered[:, 1] / longest[1]], axis=0)
     height = np.maximum(double[0] / longest[0], double[1] / longest[1])
     return _shallow(depth, a, b, height, least)

@@ -1,7 +1,8 @@
 """PLY as Greg Turk defined it (Stanford, 1994), text and binary of either byte order.
 
 Elements stand in the header's order, records without padding, lists with a count of their own before them. Of all that
-a file holds, `x`, `y` and `z` of `vertex` and `vertex_indices` (or `vertex_index`) of `face` and of `tristrips` are kept.
+a file holds, `x`, `y` and `z` of `vertex` and `vertex_indices` (or `vertex_index`) of `face` and of `tristrips` are
+kept.
 """
 
 from __future__ import annotations

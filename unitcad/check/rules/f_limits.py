@@ -18,7 +18,8 @@ F011 = Rule("""
     at each other, so it was not checked to its end. It never passes. What was found by then is reported.
     Example: A mesh has 12 million faces, and --max-faces is 10 million.
     Fix: If the file is meant to be so large, raise the limit that the message names: --timeout, --max-faces or
-    --memory, of which a file may take a quarter. Limits without an option, such as 4 GB a file and 100,000 instances of a 3MF, are fixed.
+    --memory, of which a file may take a quarter. Limits without an option, such as 4 GB a file and 100,000 instances of
+    a 3MF, are fixed.
 """)
 
 

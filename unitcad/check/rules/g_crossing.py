@@ -24,8 +24,8 @@ from unitcad.geometry.arrays import Floats, Ints, among, distinct, distinct_valu
 
 G001 = Rule("""
     G001 error: self-crossing
-    Two faces pass through each other. Decided exactly: touching is not crossing. A warning, unless --strict is given, if
-    they do so by no more than 0.02 mm or four float32 steps, of which the message says the depth. In a 3MF file a
+    Two faces pass through each other. Decided exactly: touching is not crossing. A warning, unless --strict is given,
+    if they do so by no more than 0.02 mm or four float32 steps, of which the message says the depth. In a 3MF file a
     warning, since the core specification (4.1) says what is solid.
     Example: A bolt passes through a wall and is not united with it.
     Fix: Unite the bodies with a boolean, or move the surfaces apart.
@@ -60,7 +60,8 @@ G009 = Rule("""
     G009 error: wall or gap without thickness
     Two faces cover each other in one plane and look opposite ways, and they do not belong to two solids that lie side
     by side: a fin, a fold, a crack, or a cavity that reaches the surface. Also where two neighbours fold onto each
-    other to within two float32 steps. A warning, unless --strict is given, if they cover each other by no more than 0.02 mm.
+    other to within two float32 steps. A warning, unless --strict is given, if they cover each other by no more than
+    0.02 mm.
     Example: A fin is drawn as one surface and exported with both of its sides.
     Fix: Give the wall or the gap a thickness, or remove both faces.
 """)

@@ -169,7 +169,7 @@ def _relate(
     overlaps: dict[tuple[int, int], float],
     tick: Tick,
 ) -> None:
-    """Add to `depth` how many sound shells each one lies in, and to `overlaps` the pairs that touch and share volume, by `_overlapping`.
+    """Add to `depth` how many sound shells each one lies in, and to `overlaps` the pairs that touch and share volume.
 
     `pairs` are those whose boxes meet, sorted. Shells that touch are given to manifold3d, unless their boxes have too
     little room in common.
@@ -241,7 +241,7 @@ def _faces_by_shell(labels: Ints, n: int) -> Callable[[int], Ints]:
 def _shared(
     topology: Topology, faces_of: Callable[[int], Ints], a: int, b: int, solids: dict[int, Manifold]
 ) -> tuple[float, float]:
-    """Return the volume that two shells share, mm3, and its mean thickness, mm; `solids` keeps what manifold3d has made.
+    """Return the volume that two shells share, mm3, and its mean thickness, mm, by manifold3d; `solids` keeps its solids.
 
     Shells that face inwards are turned first; one that manifold3d refuses gives 0 (its own faults are reported).
     """

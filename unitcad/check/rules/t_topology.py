@@ -72,8 +72,8 @@ T007 = Rule("""
 
 T009 = Rule("""
     T009 error: duplicate face
-    Two faces with an area have the same three vertices. Where two closed shells stand side by side there, they touch instead (G003,
-    T003).
+    Two faces with an area have the same three vertices. Where two closed shells stand side by side there, they touch
+    instead (G003, T003).
     Example: The lid of a box is in the file twice.
     Fix: Remove one, or both if they face each other.
 """)
