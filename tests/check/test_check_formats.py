@@ -207,7 +207,9 @@ def test_sarif_says_the_first_place_in_words_and_the_line_as_a_region() -> None:
     said = FileReport("a.3mf", (Finding("P017", "error", "bad", 2, places),))
     (result,) = json.loads(render([said], "sarif"))["runs"][0]["results"]
     assert result["message"]["text"] == f"bad (at 3D/a.model line 7). Fix: {rules()['P017'].fix}"
-    assert result["locations"][0]["physicalLocation"]["region"] == {"startLine": 7}
+    assert result["locations"][0]["physicalLocation"]["region"] == {"startLine": 9}, "7 is a line of a part's XML"
+    annotation, _ = render([said], "github").splitlines()
+    assert annotation.startswith("::error file=a.3mf,line=9,title=P017")
 
 
 def test_a_place_of_which_nothing_is_known_is_none(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ NOTCHED = [(0, 0), (3, 0), (6, 0), (6, 5), (4, 5), (4, 2), (2, 2), (2, 5), (0, 5
 def read(name: str, content: bytes) -> Mesh:
     findings: list[Finding] = []
     mesh = reader_of(name.rpartition(".")[2])(memoryview(content), Limits(), Deadline(60), findings)
-    assert findings == []
+    assert {found.code for found in findings} <= {"T012"}
     assert mesh is not None
     return mesh
 

@@ -25,6 +25,7 @@ Drive = Annotated[
     Literal["flat", "axial"],
     Meta(description="how the motor's force acts: turning in the can's plane (ERM) or along its axis (coin LRA)"),
 ]
+Support = Annotated[Literal["printed", "none"], Meta(description="printed under overhangs, or none: an overhang fails")]
 Technology = Annotated[Literal["fdm", "sla"], Meta(description="molten filament, or cured resin")]
 Density = Annotated[float, Meta(ge=0.1, le=25, description="of the cured silicone")]
 Viscosity = Annotated[float, Meta(ge=1, le=1e8, description="of both parts mixed")]
@@ -167,6 +168,7 @@ class Printer(Struct, frozen=True, kw_only=True):
     overhang_deg: Value[Overhang]
     bridge_mm: Value[Bridge]
     rib_interference_mm: Value[RibInterference] | None = None
+    support: Value[Support] | None = None
 
 
 class Tissue(Struct, frozen=True, kw_only=True):

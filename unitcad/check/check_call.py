@@ -74,6 +74,7 @@ def check(
     select: Sequence[str] = (),
     ignore: Sequence[str] = (),
     shells: int | None = None,
+    strict: bool = False,
     strict_3mf: bool = False,
     max_faces: int | None = None,
     timeout: float | None = None,
@@ -83,9 +84,9 @@ def check(
 
     `files` are files, folders or globs. `printer`, a name of the catalogue or an entry, asks for the rules of fit and
     printability. `unit` ("mm", "in" and so on) is that of formats that have none. `select` and `ignore` are prefixes
-    of codes; `shells` is the number expected. `timeout` is in seconds a file. With `jobs` above 1 worker processes
-    check the files. What is wrong with a file, or that it is missing, is in the result; lengths in mm. Raises Refusal
-    or UnitcadError for an invalid argument.
+    of codes; `shells` is the number expected; with `strict`, crossings too shallow for any printer are errors.
+    `timeout` is in seconds a file. With `jobs` above 1 worker processes check the files. What is wrong with a file, or
+    that it is missing, is in the result; lengths in mm. Raises Refusal or UnitcadError for an invalid argument.
     """
     from unitcad.check import many_files
     from unitcad.check.rules.registry import check_prefixes
@@ -110,6 +111,7 @@ def check(
         unit=unit_named("unit", unit),
         printer=printer,
         shells=shells,
+        strict=strict,
         strict_3mf=strict_3mf,
         limits=replace(
             default,

@@ -193,6 +193,11 @@ def ending(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(replace(item, ends=True) if item.severity == "error" else item for item in findings)
 
 
+def first_line(finding: Finding) -> int | None:
+    """Return the first line of the file among a finding's places; those of a package's parts are not the file's."""
+    return next((place.line for place in finding.locations if place.line is not None and place.part is None), None)
+
+
 def with_places(finding: Finding, places: int) -> str:
     """Return the message, and in brackets its first `places` locations."""
     shown = ", ".join(text for place in finding.locations[:places] if (text := str(place)))

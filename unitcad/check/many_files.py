@@ -25,17 +25,20 @@ _GRACE = 5.0  # s, beyond half of the limit more, until code that never looks at
 Then = Callable[[FileReport], FileReport]
 
 
-def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
+def expand(
+    names: Sequence[str], left_out: Callable[[str], bool] = lambda _: False
+) -> tuple[list[str], list[FileReport]]:
     """Return files for names that may be folders or globs, without repeats; a report for each name that gives none.
 
-    A folder's STEP files that cannot be read here give a warning each, since they were not named.
+    Of what folders and globs hold, `left_out` says which files to leave out. A folder's STEP files that cannot be
+    read here give a warning each, since they were not named.
     """
     files: list[str] = []
     empty: list[FileReport] = []
     for name in names:
         path = Path(name)
         if path.is_dir():
-            inside = _inside(_walked(path))
+            inside = _inside(file for file in _walked(path) if not left_out(file))
             if not inside:
                 empty.append(FileReport(name, (F012.finding("no mesh file in this folder"),)))
             for file in inside:
@@ -45,7 +48,7 @@ def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
                 else:
                     files.append(file)
         elif not path.exists() and glob.has_magic(name):
-            inside = _inside(p for p in glob.glob(name, recursive=True) if os.path.isfile(p))
+            inside = _inside(p for p in glob.glob(name, recursive=True) if os.path.isfile(p) and not left_out(p))
             if not inside:
                 empty.append(FileReport(name, (F012.finding("no file matches"),)))
             files += inside

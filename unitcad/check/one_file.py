@@ -18,7 +18,7 @@ from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.options import Options
 from unitcad.check.readers import sniff
 from unitcad.check.rules.f_file import F001, F005, F012
-from unitcad.check.rules.f_limits import F011, Deadline, Limits, Unreadable, keeping
+from unitcad.check.rules.f_limits import Deadline, Limits, Unreadable, keeping
 from unitcad.check.rules.p_package import P011
 from unitcad.check.units import UNITS_MM
 from unitcad.geometry.arrays import Floats, Ints
@@ -89,9 +89,9 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
 
         return check_3mf(view, options, deadline)
     if kind == "step":
-        from unitcad.check.readers.read_step import check_step
+        from unitcad.check.step_solids import check_step
 
-        return check_step(path, view, options)
+        return check_step(path, view, options, deadline)
     if kind == "glb" and options.unit is None:
         options = replace(options, unit="meter")  # as the format says
     findings: list[Finding] = []
@@ -114,8 +114,7 @@ def _bytes_of(path: Path, limits: Limits) -> bytes:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             raise F012.unreadable(f"{_KINDS.get(stat.S_IFMT(status.st_mode), 'a special file')}, not a regular file")
-        if status.st_size > limits.max_bytes:
-            raise F011.unreadable(f"{status.st_size} bytes, more than the limit of {limits.max_bytes}")
+        limits.check_bytes(status.st_size)
         with path.open("rb") as file:
             return file.read(status.st_size)
     except FileNotFoundError as error:
@@ -129,7 +128,7 @@ def _check_surface(mesh: Mesh, options: Options, deadline: Deadline) -> tuple[li
     from unitcad.check.one_mesh import check_on_bed, check_surface
     from unitcad.check.rules import g_shells, s_scale
 
-    checked = check_surface(mesh, deadline, cross=options.cross)
+    checked = check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
     findings, facts = [*checked.findings, *s_scale.likely_unit(checked.facts, options.unit)], checked.facts
     if options.printer is not None and checked.inspection is not None:
         with keeping(findings, facts):

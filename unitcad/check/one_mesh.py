@@ -20,7 +20,7 @@ from unitcad.check.rules.f_file import F001
 from unitcad.check.rules.f_limits import Deadline, keeping
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import not_finite
-from unitcad.geometry.arrays import extent
+from unitcad.geometry.arrays import distinct_values, extent
 from unitcad.geometry.ticks import Tick
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ class CheckedMesh:
     inspection: Inspection | None = None
 
 
-def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> CheckedMesh:
-    """Apply the rules that need no printer; `cross=False` leaves out what compares faces with each other."""
+def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict: bool = False) -> CheckedMesh:
+    """Apply the rules that need no printer; `cross` and `strict` are those of `Inspection`."""
     facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
     points = representable(mesh.vertices)
     # What was made 0 may be where another vertex is.
@@ -46,11 +46,11 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Chec
         return CheckedMesh(in_file(broken, mesh), facts)
     if not len(mesh.faces):
         return CheckedMesh(ending([F001.finding("the mesh has no face")]), facts)
-    low, high = extent(mesh.vertices)
+    low, high = extent(mesh.vertices[distinct_values(mesh.faces)] if mesh.indexed else mesh.vertices)
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):
-        part = _inspected(mesh, deadline.tick, cross=cross)
+        part = replace(_inspected(mesh, deadline.tick, cross=cross), strict=strict)
     topology = part.topology
     area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
     facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)

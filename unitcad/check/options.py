@@ -19,7 +19,8 @@ class Options:
     `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all. An error
     that ended the check of a file (not readable, a limit reached, no mesh) is kept whatever they say.
     `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
-    `shells`: the number of shells expected (G005). `cross`: look for self-crossing. `strict_3mf`: what the 3MF
+    `shells`: the number of shells expected (G005). `cross`: look for self-crossing. `strict`: what is too
+    shallow for a printer is an error all the same. `strict_3mf`: what the 3MF
     specification forbids and common programs write all the same is an error, not a warning. `unwanted`: prefixes of
     codes that no select brings back. `locations`: how many are kept of a finding; `draw`: keep meshes with the report.
     """
@@ -30,6 +31,7 @@ class Options:
     printer: Printer | None = None
     shells: int | None = None
     cross: bool = True
+    strict: bool = False
     strict_3mf: bool = False
     limits: Limits = field(default_factory=Limits)
     unwanted: tuple[str, ...] = ()

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check.findings import Facts, Finding, Location, counted, ending, point
+from unitcad.check.findings import Facts, Finding, ending, point
 from unitcad.check.geometry.topology import diagonals, topology_of
-from unitcad.check.geometry.triangle_mesh import LARGEST, solid_of
+from unitcad.check.geometry.triangle_mesh import LARGEST
 from unitcad.check.one_mesh import CheckedMesh, check_on_bed, check_surface
 from unitcad.check.options import Options
+from unitcad.check.overlaps import Solid, overlapping
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.opc import Package, open_package
 from unitcad.check.readers.threemf.placement import Instance, Key
@@ -25,23 +27,18 @@ from unitcad.check.readers.threemf.read_3mf import Build, read_build
 from unitcad.check.readers.threemf.references import SOLID
 from unitcad.check.rules import g_shells, s_scale, v_values
 from unitcad.check.rules.f_limits import Deadline, Unreadable, keeping
-from unitcad.check.rules.g_shells import G002
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import V001
-from unitcad.geometry.arrays import Floats, cross, extent
-from unitcad.geometry.boxes import box_pairs
+from unitcad.geometry.arrays import Floats, cross, distinct_values, extent
 
 if TYPE_CHECKING:
-    from manifold3d import Manifold
 
     from unitcad.catalogue import Printer
 
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
 _FILLED = {"G001", "G002", "G008"}
-MOST = 2000
-"""At most this many instances are compared; where there are more, a finding says "among those compared"."""
-_PAIRS = 2000
-_SHARE = 1e-6  # of the smaller volume, below which solids only touch
+# It asks for two faces at each edge, by the indices of vertices.
+_MANIFOLD = {"T003", "T006"}
 
 
 def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
@@ -80,9 +77,10 @@ def _turned(instance: Instance) -> _Turned:
     linear = instance.matrix[:3]
     with np.errstate(all="ignore"):
         points = (instance.triangles.vertices @ linear) * instance.unit_mm
-        a, b, c = (points[instance.triangles.rows[:, i]] for i in range(3))
+        corners = instance.triangles.rows[:, :3]
+        a, b, c = (points[corner] for corner in corners.T)
         area = float(np.linalg.norm(cross(b - a, c - a), axis=1).sum()) / 2
-        return _Turned(np.stack(extent(points)), area, abs(float(np.linalg.det(linear))))
+        return _Turned(np.stack(extent(points[distinct_values(corners)])), area, abs(float(np.linalg.det(linear))))
 
 
 def _geometry(
@@ -126,7 +124,12 @@ def _geometry(
     )
     if options.cross:
         solids = ((facts.watertight and volume > 0) for (facts, _), volume in zip(each, volumes, strict=True))
-        findings += overlapping(list(compress(zip(instances, volumes, strict=True), solids)), deadline)
+        sound = (
+            Solid(instance.mesh(placed=True), volume, str(instance.object.id))
+            for instance, volume in compress(zip(instances, volumes, strict=True), solids)
+        )
+        with keeping(change=_filled):
+            findings += _filled(overlapping(sound, "instances", deadline))
     findings += s_scale.likely_unit(whole, build.unit)
     findings += g_shells.expected(whole.shells, options.shells)
     if options.printer is not None:
@@ -139,53 +142,22 @@ def _check_object(instance: Instance, options: Options, deadline: Deadline) -> C
     mesh, one = instance.mesh(placed=False), instance.object
     if one.type not in SOLID or one.attributes.get(f"{elements.SLICE} meshresolution") == "lowres":
         return CheckedMesh((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)))
-    with keeping(change=_filled):
-        checked = check_surface(mesh, deadline, cross=options.cross)
-    return replace(checked, findings=tuple(_filled(checked.findings)))
+    judged = partial(_filled, strict=options.strict_3mf)
+    with keeping(change=judged):
+        checked = check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
+    return replace(checked, findings=tuple(judged(checked.findings)))
 
 
-def _filled(findings: Iterable[Finding]) -> Iterator[Finding]:
-    """Return the findings, as warnings those that 3MF settles by its fill rule."""
+def _filled(findings: Iterable[Finding], strict: bool = False) -> Iterator[Finding]:
+    """Return the findings, as warnings those that 3MF settles by its fill rule; `strict`: what it forbids as errors."""
     for item in findings:
+        if strict and item.code in _MANIFOLD:
+            yield replace(item, severity="error", message=f"{item.message} (3MF's core specification, 4.1, forbids it)")
+            continue
         if item.code in _FILLED:
             yield replace(item, severity="warning", message=f"{item.message} (3MF's fill rule says what is solid)")
         else:
             yield item
-
-
-def overlapping(solids: Sequence[tuple[Instance, float]], deadline: Deadline) -> list[Finding]:
-    """Apply G002, as a warning, to pairs of sound solids that share volume, mm3 each, by manifold3d's boolean."""
-    meshes = [instance.mesh(placed=True) for instance, _ in solids[:MOST]]
-    if len(meshes) < 2:
-        return []
-    boxes = np.array([extent(mesh.vertices) for mesh in meshes])
-    low, high = boxes[:, 0], boxes[:, 1]
-    made: dict[int, Manifold] = {}
-    places: list[Location] = []
-    pairs = box_pairs(low, high, deadline.tick)
-    try:
-        for a, b in pairs[:_PAIRS].tolist():
-            deadline.tick()
-            least = _SHARE * min(solids[a][1], solids[b][1])
-            inner, outer = np.maximum(low[a], low[b]), np.minimum(high[a], high[b])
-            if float(np.prod(outer - inner)) <= least:
-                continue
-            for i in {a, b} - made.keys():
-                made[i] = solid_of(meshes[i].vertices, meshes[i].faces)
-            if (made[a] ^ made[b]).volume() > least:  # 0 where manifold3d refuses one, whose faults are reported
-                names = f"{solids[a][0].object.id} and {solids[b][0].object.id}"
-                places.append(Location(xyz=point((inner + outer) / 2), object=names))
-    except Unreadable as stop:
-        stop.findings = (*_overlaps(places, among=True), *stop.findings)
-        raise
-    return _overlaps(places, among=len(solids) > MOST or len(pairs) > _PAIRS)
-
-
-def _overlaps(places: list[Location], *, among: bool) -> list[Finding]:
-    if not places:
-        return []
-    text = f"{counted(len(places), 'pair')} of instances that share volume{' among those compared' if among else ''}"
-    return [G002.finding(f"{text} (3MF's fill rule says what is solid)", len(places), places, "warning")]
 
 
 def printed(instances: Sequence[Instance], printer: Printer, deadline: Deadline) -> list[Finding]:

@@ -40,6 +40,14 @@ def check(
             help="Follow the 3MF specification strictly: vendors' attributes, lost thumbnails fail.",
         ),
     ] = None,
+    strict: Annotated[
+        bool | None,
+        typer.Option("--strict/--no-strict", help="Crossings and folds too shallow for any printer are errors."),
+    ] = None,
+    exclude: Annotated[
+        list[str] | None,
+        typer.Option(help="Files of folders and globs to leave out: a pattern of a path, or of a name in it."),
+    ] = None,
     manifest: Annotated[str | None, typer.Option(help="manifest.json of a build, or its folder (M rules).")] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes.")] = Asked.jobs,
     max_faces: Annotated[int | None, typer.Option(min=1, help="Faces a file may have (default 10000000).")] = None,
@@ -62,8 +70,10 @@ def check(
         bool, typer.Option(help="Count findings by rule: in place of the text, beside other formats on stderr.")
     ] = False,
     explain: Annotated[
-        str | None, typer.Option(help="Print what a code means, why it matters and how to fix it.")
+        list[str] | None,
+        typer.Option(help="Print what codes mean, why they matter and how to fix them (comma or repeated)."),
     ] = None,
+    list_rules: Annotated[bool, typer.Option("--list-rules", help="List all rules.")] = False,
 ) -> None:
     """Check mesh files as they are, before any repair.
 

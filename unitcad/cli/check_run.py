@@ -33,6 +33,8 @@ class Asked:
     unit: str | None = None
     shells: int | None = None
     strict_3mf: bool | None = None
+    strict: bool | None = None
+    exclude: list[str] | None = None
     manifest: str | None = None
     jobs: int = 1
     max_faces: int | None = None
@@ -45,7 +47,8 @@ class Asked:
     config: str | None = None
     no_config: bool = False
     statistics: bool = False
-    explain: str | None = None
+    explain: list[str] | None = None
+    list_rules: bool = False
 
 
 def run(asked: Asked) -> int:
@@ -53,13 +56,16 @@ def run(asked: Asked) -> int:
     from unitcad.check import Options, detail, many_files
     from unitcad.check.output import as_text
     from unitcad.check.output.render import FORMATS, render
-    from unitcad.check.rules.registry import check_prefixes
+    from unitcad.check.rules.registry import check_prefixes, rules
     from unitcad.check.rules.registry import explain as explanation
     from unitcad.check.units import unit_named
     from unitcad.cli import check_settings
 
+    if asked.list_rules:
+        sys.stdout.write("".join(f"{rule.code} {rule.severity}: {rule.title}\n" for rule in rules().values()))
+        return 0
     if asked.explain is not None:
-        sys.stdout.write(explanation(asked.explain) + "\n")
+        sys.stdout.write(explanation(",".join(asked.explain)) + "\n")
         return 0
     output_format = "json" if asked.as_json else asked.output_format
     if output_format not in FORMATS:
@@ -89,6 +95,7 @@ def run(asked: Asked) -> int:
         unit=unit_named(*configuration.chosen("unit", asked.unit)),
         printer=_printer(*configuration.chosen("printer", asked.printer)),
         shells=asked.shells,
+        strict=bool(configuration.value("strict") if asked.strict is None else asked.strict),
         strict_3mf=bool(configuration.value("strict_3mf") if asked.strict_3mf is None else asked.strict_3mf),
         limits=_limits(
             asked.max_faces or configuration.value("max_faces"), *configuration.chosen("timeout", asked.timeout)
@@ -107,7 +114,9 @@ def run(asked: Asked) -> int:
         draw = partial(finding_pictures.write, Path(asked.show))
     memory = asked.memory or configuration.value("memory") or 8000
     check_all = partial(many_files.check_files, jobs=asked.jobs, memory_mb=memory, then=draw)
-    reports = _reports(asked.files or [], configuration, options, asked.manifest, check_all)
+    left_out = configuration.left_out(asked.exclude or [])
+    files, unread = many_files.expand(asked.files or [], left_out)
+    reports = unread + _reports(files, configuration, options, asked.manifest, check_all)
     shown = detail.MOST if asked.all_locations else detail.SHOWN
     if base is not None:
         known = baselines.write(base, known, reports) if asked.write_baseline else known
@@ -161,28 +170,26 @@ def _write(text: str, *, plain: bool) -> None:
 
 
 def _reports(
-    names: list[str],
+    paths: list[str],
     configuration: Configuration,
     options: Options,
     manifest: str | None,
     check_all: Callable[[list[tuple[str, Options]]], Iterator[FileReport]],
 ) -> list[FileReport]:
     """Return the reports of all files, compared with a manifest if there is one."""
-    from unitcad.check import many_files
 
     def of_path(path: str) -> Options:
         """Return the options of a file: without what the settings ignore for it."""
         return replace(options, unwanted=tuple(code.strip().upper() for code in configuration.ignored(path)))
 
-    paths, reports = many_files.expand(names)
     if manifest is None:
-        return reports + list(check_all([(path, of_path(path)) for path in paths]))
+        return list(check_all([(path, of_path(path)) for path in paths]))
     from unitcad.check import manifest as listing
 
     listed = listing.read(manifest)
     work = listing.work(listed, paths, of_path, options.printer is not None)
     compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
-    return reports + compared + listing.unchecked(listed, [path for path, _ in work], of_path)
+    return compared + listing.unchecked(listed, [path for path, _ in work], of_path)
 
 
 def _printer(field: str, name: str | None) -> Printer | None:

@@ -5,7 +5,7 @@ The nearest file with such a table, from the working directory upwards, is used;
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -59,11 +59,30 @@ class Configuration:
             return []
         below = seen_from(path, self.path.parent)
         return [
-            code
-            for pattern, codes in self.settings.per_file_ignores.items()
-            if fnmatchcase(below, pattern) or ("/" not in pattern and fnmatchcase(Path(below).name, pattern))
-            for code in codes
+            code for pattern, codes in self.settings.per_file_ignores.items() if _fits(below, pattern) for code in codes
         ]
+
+    def left_out(self, given: Sequence[str]) -> Callable[[str], bool]:
+        """Return whether `exclude` or one of the patterns `given` on the command line names a path or a folder of it.
+
+        Patterns start at the folder of the settings, and those given at the working directory.
+        """
+        set_here = [] if self.path is None or self.settings is None else self.settings.exclude
+        sets = [(Path.cwd() if self.path is None else self.path.parent, set_here), (Path.cwd(), given)]
+
+        def named(path: str) -> bool:
+            for folder, patterns in sets:
+                below = Path(seen_from(path, folder)) if patterns else Path()
+                for pattern in patterns:
+                    if any(_fits(part.as_posix(), pattern.rstrip("/")) for part in (below, *below.parents)):
+                        return True
+            return False
+
+        return named
+
+
+def _fits(path: str, pattern: str) -> bool:
+    return fnmatchcase(path, pattern) or ("/" not in pattern and fnmatchcase(Path(path).name, pattern))
 
 
 def find(named: str | None = None, *, wanted: bool = True) -> Configuration:
@@ -98,12 +117,9 @@ def _read(path: Path) -> Configuration | None:
     shown, text = seen_from(path.absolute()), files.read_text(path)
     if path.name == "pyproject.toml" and "unitcad" not in text and "\\" not in text:  # with escapes it may be meant
         return None
-    import tomllib
+    from unitcad.spec.toml import parse_toml
 
-    try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UnitcadError(f"{shown}: not TOML: {error}") from None
+    data: Any = parse_toml(text, shown)
     table = _table(path, data)
     *above, last = table.split(".")
     if not above and "design" in data:

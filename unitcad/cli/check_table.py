@@ -16,6 +16,8 @@ class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, re
     fail_on: Literal["error", "warning"] | None = None
     printer: str | None = None
     unit: str | None = None
+    strict: bool | None = None
+    exclude: list[str] = []
     strict_3mf: bool | None = field(default=None, name="3mf-strict")
     max_faces: Annotated[int, Meta(ge=1)] | None = None
     timeout: Annotated[float, Meta(ge=0.001)] | None = None

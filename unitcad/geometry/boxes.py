@@ -15,11 +15,15 @@ from operator import ge, gt
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, extent, sorted_with_order
-from unitcad.geometry.ticks import Tick
+from unitcad.geometry.ticks import Tick, TooMany
+
+MOST_PAIRS = 10_000_000
+"""Pairs of boxes that `box_pairs` returns."""
 
 _FAN = 4
 _PART = 512  # pairs of nodes in a part at least
 _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at
+_WIDE = 1 << 20  # pairs of nodes whose children are held together
 _STEP_BITS = 13
 _STEP = 1 << _STEP_BITS  # pairs of nodes looked at together
 _FEW = 4096  # points, which are sorted in less time than all steps are gone through
@@ -42,7 +46,7 @@ class Frame:
 
     def even(self, steps: list[Ints]) -> list[Ints]:
         """Return steps of about one length, by powers of two, so that a space-filling curve's cells are near cubes."""
-        shift = np.round(np.log2(self.scale / self.scale.min())).clip(0, 15).astype(np.uint16)
+        shift = np.round(np.log2(self.scale) - np.log2(self.scale.min())).clip(0, 15).astype(np.uint16)
         return [step >> bits for step, bits in zip(steps, shift, strict=True)]
 
 
@@ -190,8 +194,11 @@ def meeting_between(boxes: Ints, others: Ints, tick: Tick = lambda: None) -> Ite
 
 
 def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
-    """Return pairs of boxes that meet (k, 2), the smaller number first, sorted; low and high corners (n, 3)."""
-    n = len(low)
+    """Return pairs of boxes that meet (k, 2), the smaller number first, sorted; low and high corners (n, 3).
+
+    Raises `TooMany` beyond MOST_PAIRS.
+    """
+    n, found = len(low), 0
     corners = np.concatenate([low, high])
     steps = frame_of(corners).steps(corners)
     order = morton_order(steps, np.arange(n))
@@ -204,6 +211,9 @@ def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
             meet &= least.take(i) <= most.take(j)
             meet &= least.take(j) <= most.take(i)
         i, j = i[meet], j[meet]
+        found += len(i)
+        if found > MOST_PAIRS:
+            raise TooMany(MOST_PAIRS, "boxes")
         keys.append(np.minimum(i, j).astype(np.uint64) << half | np.maximum(i, j).astype(np.uint64))
     key = np.concatenate(keys)
     key.sort()
@@ -248,6 +258,11 @@ def _descend(
 ) -> Iterator[tuple[Ints, Ints]]:
     """Yield the pairs of leaves below pairs of nodes of a level; `own`: of one tree, each pair once."""
     for above in range(level, 1, -1):
+        if len(first) > _WIDE:  # one part after the other, since all of the next level would take too much memory
+            for start in range(0, len(first), _WIDE):
+                part = slice(start, start + _WIDE)
+                yield from _descend(here, there, above, first[part], second[part], tick, own=own)
+            return
         first, second = _joined(_below(here, there, above, first, second, tick, own=own))
     yield from _below(here, there, 1, first, second, tick, own=own)
 

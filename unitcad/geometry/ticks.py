@@ -10,3 +10,10 @@ Tick = Callable[[], object]
 
 class Interrupted(Exception):
     """A computation that a tick has ended; what it has computed may still be of use."""
+
+
+class TooMany(Interrupted):
+    """A computation that would have to look at more pairs than there is time or memory for."""
+
+    def __init__(self, most: int, noun: str) -> None:
+        super().__init__(f"more than {most} pairs of {noun} lie at each other; not all are compared")

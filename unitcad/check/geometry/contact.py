@@ -80,16 +80,23 @@ def ranked_boxes(ranks: Sequence[NDArray[np.unsignedinteger]], ids: Ints) -> Fac
     return FaceBoxes(low, high)
 
 
+MOST_CONTACTS = 1_000_000
+"""Pairs of faces that `Contacts` holds, unless it is told another number."""
+
+
 @dataclass(eq=False)
 class Contacts:
     """Pairs of shells that meet, each with the first pair of faces found, or with `every` one.
 
-    `noted` are pairs of faces in blocks, some of shells that were noted before. `recent_keys` has the keys of some
+    `noted` are pairs of faces in blocks, some of shells that were noted before; with more than `most` of them it is
+    `full`, and takes no more. `recent_keys` has the keys of some
     shells that were, each at its own place, and `first_place` is room to find the first of several in.
     """
 
     shells: int
     every: bool = False
+    most: int = MOST_CONTACTS
+    full: bool = False
     noted: list[tuple[Ints, Ints]] = field(default_factory=list)
     recent_keys: Ints = field(default_factory=lambda: np.full(_RECENT, -1))
     first_place: Ints = field(default_factory=lambda: np.empty(_RECENT, np.int32))
@@ -100,6 +107,8 @@ class Contacts:
 
     def open(self, keys: Ints) -> Ints:
         """Return which keys (k,) may not be known yet: all that are not, and some others."""
+        if self.full:
+            return np.empty(0, np.intp)
         if self.every:
             return np.arange(len(keys))
         return np.flatnonzero(self.recent_keys.take(keys & (_RECENT - 1)) != keys)
@@ -119,11 +128,14 @@ class Contacts:
 
     def add(self, keys: Ints, pairs: Ints) -> None:
         """Note pairs of faces that meet (k, 2), one for each pair of shells or `every` one."""
+        if self.full:
+            return
         if not self.every and len(keys):
             first = self.foremost(keys)
             keys, pairs = keys[first], pairs[first]
             self.recent_keys[keys & (_RECENT - 1)] = keys
         self.noted.append((keys, pairs))
+        self.full = sum(len(block) for block, _ in self.noted) > self.most and len(self.pairs()[0]) > self.most // 2
 
     def pairs(self) -> tuple[Ints, Ints]:
         """Return the keys of shells that meet and pairs of their faces (k, 2), in the order of the keys."""

@@ -76,8 +76,11 @@ def through_edges(turns: Turns | None, shells: Ints) -> Ints:
     return turns.many[distinct_values(group[start][(high - low > 1) & evenly])]
 
 
-def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> Ints:
-    """Return edges of two faces that look opposite ways and are in one plane as float32 has it, though not exactly."""
+def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> tuple[Ints, Floats, Floats]:
+    """Return edges of two faces that look opposite ways and are in one plane as float32 has it, though not exactly.
+
+    And for each of them the heights of its two faces, mm, the lower one first.
+    """
     two = edges.size == 2
     if not edges.closed:  # two faces that run alike are turned over, not folded
         two &= edges.balanced
@@ -90,7 +93,7 @@ def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> 
         facing[block] = np.einsum("ij,ij->i", one, other)
     against = np.flatnonzero(facing < 0)
     if not len(against):
-        return against
+        return against, np.empty(0), np.empty(0)
     pair, left, right, facing = pair[against], left[against], right[against], facing[against]
     square = [np.einsum("ij,ij->i", areas[face], areas[face]) for face in (left, right)]
     flat = facing * facing > (1 - 1e-6) * square[0] * square[1]
@@ -100,8 +103,9 @@ def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> 
     corners = vertices[np.stack([*ends, tip], axis=1)]
     step = float32_steps(corners)
     length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
-    height = np.sqrt(np.minimum(*square)) / length
+    height, higher = (np.sqrt(of(*square)) / length for of in (np.minimum, np.maximum))
     apart = np.abs(np.einsum("ij,ij->i", areas[left], corners[:, 3] - corners[:, 0])) / np.sqrt(square[0])
     thin = np.flatnonzero((height > _WIDE * step) & (apart <= _FLAT * step))
     exact = orient3d(*(corners[thin, k] for k in range(4))) == 0
-    return np.flatnonzero(two)[against][flat][thin[~exact]]
+    thin = thin[~exact]
+    return np.flatnonzero(two)[against][flat][thin], height[thin], higher[thin]

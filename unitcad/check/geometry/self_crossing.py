@@ -9,6 +9,7 @@ A crossing is one of: two faces pass through each other; an edge lies in a face 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -17,14 +18,15 @@ import numpy as np
 from unitcad.check.geometry import coverings, triangles
 from unitcad.check.geometry.arranged import Arranged
 from unitcad.check.geometry.common_corners import CommonCorners, common_corners
-from unitcad.check.geometry.contact import Contacts, FaceBoxes, face_boxes
+from unitcad.check.geometry.contact import MOST_CONTACTS, Contacts, FaceBoxes, face_boxes
+from unitcad.check.geometry.hubs import hub_walks
 from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.stars import Stars
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import MANY, same_place
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct
 from unitcad.geometry.boxes import Slabs, box_pairs, meeting_parts
-from unitcad.geometry.ticks import Interrupted, Tick
+from unitcad.geometry.ticks import Interrupted, Tick, TooMany
 
 LEAST_SHELLS = 200  # compared shell by shell, where they are small
 _BLOCK = 1 << 17
@@ -33,6 +35,8 @@ _PAIRS = 1 << 15  # pairs looked at together: enough to outweigh the calls, few 
 _RARE = 16  # of so many faces less than one has such a corner: most pairs need no look for one in common
 _SPARSE = 4  # of so many faces less than one is in a pair: a sieve of those few is the cheaper one
 _OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothing but perhaps touching
+_MOST_LOOKS, _LOOKS = 50_000_000, 100  # pairs looked at, in all and a face
+_UNEVEN = 4  # times its share that a part of the walk may take
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
@@ -121,33 +125,43 @@ def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, 
         return Crossings()
     tick()
     faces, slabs = _prepared(topology, ready, stars), ready.slabs
-    crossings = Crossings(faces, Contacts(topology.n_shells, every=every))
+    most = max(MOST_CONTACTS, 2 * len(ready.order))
+    crossings = Crossings(faces, Contacts(topology.n_shells, every, most))
     parts = _PARTS if len(ready.order) >= MANY else 1
     small = None
     if topology.n_shells >= LEAST_SHELLS and not every:
         from unitcad.check.geometry.small_shells import small_shells
 
-        crossings.meeting = meeting = box_pairs(topology.low, topology.high, tick)
-        small = small_shells(topology, meeting, faces.shell, faces.columns, faces.corners, faces.places, ready.steps)
+        with suppress(TooMany):
+            crossings.meeting = meeting = box_pairs(topology.low, topology.high, tick)
+            small = small_shells(
+                topology, meeting, faces.shell, faces.columns, faces.corners, faces.places, ready.steps
+            )
+    hubs = hub_walks(ready, stars.smooth, parts, tick) if small is None else []
     if small is None:
-        walks = meeting_parts(ready.steps, parts, tick)
+        walks = hubs or meeting_parts(ready.steps, parts, tick)
     else:
         walks = small.parts(parts, tick)
         crossings.contact.noted += small.sharing.noted
 
     def part(k: int) -> Crossings:
         # Each begins with nothing known: which process does it has no say in what is found.
-        return _met(faces, slabs, walks[k], Crossings(None, Contacts(topology.n_shells, every), parts=len(walks)), tick)
+        contact = Contacts(topology.n_shells, every, most // len(walks))
+        return _met(faces, slabs, walks[k], Crossings(None, contact, parts=len(walks)), tick)
 
     for met in map(part, range(len(walks))):
         crossings.crossing += met.crossing
         crossings.covering += met.covering
         crossings.leaning += met.leaning
         crossings.contact.noted += met.contact.noted
+        crossings.contact.full |= met.contact.full
         crossings.stopped = crossings.stopped or met.stopped
     if crossings.stopped is not None:
         crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
     _leaning(faces, crossings)
+    if hubs:  # whose walks give some pairs twice
+        for blocks in (crossings.crossing, crossings.covering):
+            blocks[:] = [np.unique(np.sort(joined(blocks), axis=1), axis=0)]
     return crossings
 
 
@@ -211,6 +225,9 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings
     j = np.concatenate([pair[1] for pair in waiting])
     state, shared = np.empty((2, len(i)), np.int8)
     crossings.looked_at += len(i)
+    most = max(_MOST_LOOKS, _LOOKS * faces.corners.shape[1])
+    if crossings.looked_at * crossings.parts > most * (1 if crossings.parts == 1 else _UNEVEN):
+        raise TooMany(most, "faces")
     if "sieve" not in vars(faces) and crossings.looked_at * crossings.parts * _SPARSE < faces.corners.shape[1]:
         some, at = np.unique(np.concatenate([i, j]), return_inverse=True)
         sieve, at = _sieve(faces, some), at.reshape(2, -1)
@@ -222,6 +239,12 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings
     if faces.several:
         some = np.flatnonzero((state == _FLUSH) | ((state == _APART) & (shared > 0)))
         _contacts(faces, i[some], j[some], crossings)
+    twice = np.flatnonzero(shared == 3)  # in one place: a face that the file lists twice, or another one
+    if faces.places is not faces.corners:
+        twice = twice[_common(*(faces.corners.take(f[twice], axis=1) for f in (i, j))) == 3]
+    state[twice] = _APART
+    if faces.several:
+        _note(faces, i, j, twice, crossings.contact)
     left = np.flatnonzero(state == _OPEN)
     _decide_exactly(faces, i[left], j[left], shared[left], crossings)
 
@@ -302,12 +325,10 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Cro
     meeting = triangles.meet(a[some], b[some])
     overlaps[some] = meeting.overlaps
     wide = np.flatnonzero(overlaps)
-    wide = wide[~_same_corners(faces, i[wide], j[wide])]
     crossings.covering.append(pair[wide[coverings.wide(a[wide], b[wide])]])
     if faces.several:
         meets[some] |= meeting.touches | meeting.crosses
-        meets &= faces.shell[i] != faces.shell[j]
-        crossings.contact.add(crossings.contact.keys(faces.shell[i[meets]], faces.shell[j[meets]]), pair[meets])
+        _note(faces, i, j, np.flatnonzero(meets), crossings.contact)
     crossing = some[meeting.crosses & (shared[some] < 2)]
     crossings.crossing.append(pair[crossing])
     crossings.kept += len(crossing) + len(wide)
@@ -322,15 +343,19 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Cro
         crossings.leaning.append(_edges_inside(faces, face, holder, one, other, sides))
 
 
+def _note(faces: Faces, i: Ints, j: Ints, some: Ints, contact: Contacts) -> None:
+    """Note the shells of `some` pairs of faces, which meet."""
+    if contact.full:
+        return
+    one, other = faces.shell.take(i[some]), faces.shell.take(j[some])
+    apart = np.flatnonzero(one != other)
+    some, keys = some[apart], contact.keys(one[apart], other[apart])
+    contact.add(keys, np.stack([i[some], j[some]], axis=1))
+
+
 def facing(faces: Faces, i: Ints, j: Ints) -> Floats:
     """Return the product of both faces' normals: positive where they look the same way."""
     return np.einsum("ij,ij->j", faces.normal.take(i, axis=1), faces.normal.take(j, axis=1))
-
-
-def _same_corners(faces: Faces, i: Ints, j: Ints) -> Bools:
-    """Return which pairs i, j are one face that is listed twice, with the same vertices."""
-    one, other = (np.sort(np.stack([corner[f] for corner in faces.corners]), axis=0) for f in (i, j))
-    return np.asarray((one == other).all(axis=0))
 
 
 def _edges_inside(faces: Faces, face: Ints, holder: Ints, one: Floats, other: Floats, sides: Ints) -> Ints:

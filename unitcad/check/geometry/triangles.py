@@ -194,3 +194,13 @@ def common_point(a: Floats, b: Floats) -> Floats | None:
         if all(np.abs(point - other).max() > 4 * near for other in apart):
             apart.append(point)
     return np.mean(apart, axis=0) * size + shift
+
+
+def without_area(corners: Floats) -> Bools:
+    """Return whether the corners of each face (n, 3, 3) lie on one line: seen along no axis do they have an area."""
+    flat = np.ones(len(corners), bool)
+    for axis in range(3):
+        left = np.flatnonzero(flat)
+        plan = np.delete(corners[left], axis, axis=2)
+        flat[left] = orient2d(plan[:, 0], plan[:, 1], plan[:, 2]) == 0
+    return flat

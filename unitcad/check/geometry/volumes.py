@@ -6,6 +6,7 @@ import numpy as np
 
 from unitcad.check.geometry.edges import Edges
 from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.ticks import Tick
 
 _BLOCK = 1 << 13  # faces whose corners stay in the processor's cache
 
@@ -56,11 +57,37 @@ def winding_number(vertices: Floats, faces: Ints, point: Floats) -> int:
     total = 0.0
     for start in range(0, len(faces), _BLOCK):
         block = faces[start : start + _BLOCK]
-        a, b, c = (np.ascontiguousarray((vertices.take(block[:, k], axis=0) - point).T) for k in range(3))
-        la, lb, lc = (np.sqrt(_dot(v, v)) for v in (a, b, c))
-        top = a[0] * (b[1] * c[2] - b[2] * c[1])
-        top += a[1] * (b[2] * c[0] - b[0] * c[2])
-        top += a[2] * (b[0] * c[1] - b[1] * c[0])
-        low = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
-        total += float(np.arctan2(top, low).sum())
+        total += float(_half_angles(vertices, block, np.broadcast_to(point, (len(block), 3))).sum())
     return round(total / (2 * np.pi))
+
+
+def winding_numbers(vertices: Floats, faces: Ints, first: Ints, count: Ints, points: Floats, tick: Tick) -> Ints:
+    """Return the same for points (n, 3), of each the surface of the `count` faces from `first` on."""
+    numbers, ends = np.zeros(len(points), np.int64), np.cumsum(count)
+    start = 0
+    while start < len(points):
+        tick()
+        stop = max(int(np.searchsorted(ends, ends[start] - count[start] + _BLOCK, "right")), start + 1)
+        if stop == start + 1:
+            surface = faces[first[start] : first[start] + count[start]]
+            numbers[start] = winding_number(vertices, surface, points[start])
+        else:
+            row = np.repeat(np.arange(start, stop), count[start:stop])
+            place = np.arange(len(row)) - np.repeat(
+                ends[start:stop] - count[start:stop] - ends[start] + count[start], count[start:stop]
+            )
+            angles = _half_angles(vertices, faces[first[row] + place], points[row])
+            numbers[start:stop] = np.round(np.bincount(row - start, angles, stop - start) / (2 * np.pi))
+        start = stop
+    return numbers
+
+
+def _half_angles(vertices: Floats, faces: Ints, points: Floats) -> Floats:
+    """Return half of the solid angle under which each face is seen from a point, (n,)."""
+    a, b, c = (np.ascontiguousarray((vertices.take(faces[:, k], axis=0) - points).T) for k in range(3))
+    la, lb, lc = (np.sqrt(_dot(v, v)) for v in (a, b, c))
+    top = a[0] * (b[1] * c[2] - b[2] * c[1])
+    top += a[1] * (b[2] * c[0] - b[0] * c[2])
+    top += a[2] * (b[0] * c[1] - b[1] * c[0])
+    low = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+    return np.asarray(np.arctan2(top, low))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from unitcad.check.findings import FileReport, with_places
+from unitcad.check.findings import FileReport, first_line, with_places
 from unitcad.check.output.as_text import line, summary
 from unitcad.check.rules.registry import rules
 from unitcad.text import printable
@@ -12,7 +12,7 @@ from unitcad.text import printable
 _GITHUB = {"error": "error", "warning": "warning", "info": "notice"}
 
 
-def github(reports: Sequence[FileReport]) -> str:
+def github(reports: Sequence[FileReport], fail_on: str) -> str:
     """Write workflow commands: an annotation a finding that is not known, then a line for the log that counts."""
     lines = []
     for report in reports:
@@ -21,11 +21,11 @@ def github(reports: Sequence[FileReport]) -> str:
                 lines.append(f"known: {line(report, finding)}")
                 continue
             title = f"{finding.code} {rules()[finding.code].title}"
-            first = next((place.line for place in finding.locations if place.line is not None), None)
+            first = first_line(finding)
             where = f"file={_property(report.path)}" + (f",line={first}" if first is not None else "")
             text = f"{with_places(finding, 3)}. Fix: {rules()[finding.code].fix}"
             lines.append(f"::{_GITHUB[finding.severity]} {where},title={_property(title)}::{_data(text)}")
-    return "\n".join([*lines, summary(reports)]) + "\n"
+    return "\n".join([*lines, summary(reports, fail_on)]) + "\n"
 
 
 def _data(text: str) -> str:

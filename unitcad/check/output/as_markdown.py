@@ -15,11 +15,11 @@ _MOST_CHARACTERS = 300
 _MARKS = str.maketrans({mark: f"\\{mark}" for mark in "\\`*_[]|~#$@!"} | {"<": "&lt;", ">": "&gt;", "&": "&amp;"})
 
 
-def markdown(reports: Sequence[FileReport]) -> str:
+def markdown(reports: Sequence[FileReport], fail_on: str) -> str:
     """Write how many files failed, a table of all findings, the worst first, and how to fix what was found."""
     found = [(report, finding) for report in reports for finding in report.findings]
     found.sort(key=lambda pair: (pair[1].known, -SEVERITIES.index(pair[1].severity)))
-    lines = ["## unitcad check", "", f"{summary(reports)}."]
+    lines = ["## unitcad check", "", f"{summary(reports, fail_on)}."]
     if found:
         lines += ["", "| | file | rule | finding |", "| --- | --- | --- | --- |"]
         lines += [_row(report, finding) for report, finding in found[:MOST_ROWS]]

@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import quote
 
 from unitcad import __version__
-from unitcad.check.findings import FileReport, Finding, with_places
+from unitcad.check.findings import FileReport, Finding, first_line, with_places
 from unitcad.check.rules.registry import rules
 from unitcad.check.rules.rule import Rule
 from unitcad.text import markdown
@@ -62,7 +62,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
 def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict[str, Any]:
     uri = _uri(report.path)
     physical: dict[str, Any] = {"artifactLocation": {"uri": uri}}
-    line = next((place.line for place in finding.locations if place.line is not None), None)
+    line = first_line(finding)
     if line is not None:
         physical["region"] = {"startLine": max(line, 1)}
     objects = dict.fromkeys(place.object for place in finding.locations if place.object)

@@ -10,7 +10,7 @@ from unitcad.check.rules.registry import rules
 from unitcad.text import printable
 
 
-def text(reports: Sequence[FileReport]) -> str:
+def text(reports: Sequence[FileReport], fail_on: str) -> str:
     """Return a line a finding, one with the size of each file that passed, how to fix what was found, then a count."""
     lines = []
     codes: set[str] = set()
@@ -24,7 +24,7 @@ def text(reports: Sequence[FileReport]) -> str:
     if codes:  # else the rules that no file needed are not loaded
         fixes = [f"  {code} {rule.title}: {rule.fix}" for code, rule in rules().items() if code in codes]
         lines += ["How to fix:", *fixes, _EXPLAIN]
-    return "\n".join([*lines, summary(reports)]) + "\n"
+    return "\n".join([*lines, summary(reports, fail_on)]) + "\n"
 
 
 def line(report: FileReport, finding: Finding) -> str:
@@ -51,12 +51,11 @@ def _size(facts: Facts) -> str:
     return ", ".join(parts)
 
 
-def summary(reports: Sequence[FileReport]) -> str:
-    """Return how many files failed, gave warnings and passed."""
+def summary(reports: Sequence[FileReport], fail_on: str) -> str:
+    """Return how many files failed, gave warnings and passed; with `fail_on` warning those with one failed too."""
     verdicts = Counter(report.verdict for report in reports)
-    parts = [
-        f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", "warned")) if verdicts[name]
-    ]
+    warned = "failed by a warning (--fail-on warning)" if fail_on == "warning" else "warned"
+    parts = [f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", warned)) if verdicts[name]]
     parts.append(f"{verdicts['pass']} passed")
     if known := sum(finding.known for report in reports for finding in report.findings):
         parts.append(counted(known, "known finding"))

@@ -39,7 +39,7 @@ def _written(
     if format_ == "github":
         from unitcad.check.output.as_github import github
 
-        return github(reports)
+        return github(reports, fail_on)
     if format_ == "sarif":
         from unitcad.check.output.as_sarif import sarif
 
@@ -51,10 +51,10 @@ def _written(
     if format_ == "markdown":
         from unitcad.check.output.as_markdown import markdown
 
-        return markdown(reports)
+        return markdown(reports, fail_on)
     from unitcad.check.output.as_text import text
 
-    return text(reports)
+    return text(reports, fail_on)
 
 
 _SURROGATE = re.compile("[\ud800-\udfff]")

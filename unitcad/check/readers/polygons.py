@@ -17,6 +17,7 @@ from unitcad.check.geometry.triangle_mesh import LARGEST, Mesh, weld_points
 from unitcad.check.rules.f_file import F001, F002, F008, F013
 from unitcad.check.rules.f_limits import F011, Deadline, Limits
 from unitcad.check.rules.p_package import P011
+from unitcad.check.rules.t_topology import unreferenced
 from unitcad.check.rules.v_values import faces_not_finite
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct_values
 
@@ -69,6 +70,8 @@ def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline, findings: li
         raise P011.unreadable(text, places=_places(source, np.searchsorted(np.cumsum(sizes), [wrong], "right")))
     used = np.zeros(len(vertices), bool)
     used[corners] = True
+    if unused := len(used) - int(np.count_nonzero(used)):
+        findings.append(unreferenced(unused))
     finite = ~used
     finite[used] = (np.abs(vertices[used]) <= LARGEST).all(axis=1)
     if not finite.all():

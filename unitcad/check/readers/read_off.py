@@ -36,7 +36,7 @@ def read_off(data: memoryview, limits: Limits, deadline: Deadline, findings: lis
 def _polygons(table: Rows, size: int, limits: Limits, findings: list[Finding]) -> Polygons:
     sizes = table.sizes
     head = table.values[: sizes[0]] if len(table) else table.values
-    if len(head) not in (2, 3) or (head != np.floor(head)).any() or (head < 0).any():
+    if len(head) not in (2, 3) or (head != np.floor(head)).any() or not ((head >= 0) & (head < 2**53)).all():
         raise F003.unreadable("the counts of vertices, faces and edges are missing")
     n, m = int(head[0]), int(head[1])
     check_promise(max(n, m), size, limits)

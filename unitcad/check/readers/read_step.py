@@ -1,18 +1,22 @@
-"""STEP, where a B-rep extra is installed: validity, solid count, volume. Without one, a finding says so."""
+"""STEP by OCCT, where a B-rep extra is installed. Without one, a finding says so."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib.util import find_spec
+from math import dist
 from pathlib import Path
 from typing import Any
 
-from unitcad.check.findings import Facts, Finding, number
-from unitcad.check.options import Options
+from unitcad.check.findings import Point
+from unitcad.check.readers.step_bodies import triangles_of
 from unitcad.check.rules.f_file import F003, F012
 from unitcad.check.rules.f_limits import F011
-from unitcad.check.rules.g_crossing import G001
-from unitcad.check.rules.g_shells import G007, T008, expected
+from unitcad.geometry.arrays import Floats, Ints
 from unitcad.workers import Pool, TimedOut, WorkerEnded
+
+_LEAST_MM, _PART = 0.01, 5e-5
+"""A mesh lies within the larger of _LEAST_MM and _PART of the diagonal from its surface."""
 
 NEEDS = "STEP needs the extra step: in a clone, pip install '.[step]'"
 
@@ -22,31 +26,35 @@ def installed() -> bool:
     return find_spec("OCP") is not None
 
 
-def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Finding], Facts]:
-    """Return findings about a STEP file's text and, with OCP there, about its solids."""
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A B-rep: validity, number of solids, volume (mm3), area (mm2) and box, as OCCT measures it.
+
+    `meshes` are its solids as vertices (n, 3), mm, and faces (m, 3), no farther than `tolerance` (mm) from the surface.
+    """
+
+    valid: bool
+    solids: int
+    volume: float
+    area: float
+    box: tuple[Point, Point] | None
+    tolerance: float
+    meshes: list[tuple[Floats, Ints]]
+
+
+def measured(path: Path, data: memoryview, seconds: float) -> Measured:
+    """Return what OCCT measures of a STEP file. Raises `Unreadable` for a damaged file, and without OCP."""
     if b"END-ISO-10303-21" not in bytes(data[-2000:]):  # OCCT must not be handed a fragment
         raise F003.unreadable("the text ends before END-ISO-10303-21")
     if not installed():
         raise F012.unreadable(NEEDS)
-    measured = _from_child(path, options.limits.seconds)
-    if not measured:
+    found = _from_child(path, seconds)
+    if found is None:
         raise F003.unreadable("the STEP file holds no shape that can be read")
-    solids, volume = measured["solids"], measured["volume"]
-    findings: list[Finding] = []
-    if not measured["valid"]:
-        findings.append(G001.finding("the B-rep is not valid by BRepCheck"))
-    facts = Facts(
-        shells=solids, volume_mm3=volume, area_mm2=measured["area"], bbox_mm=measured["box"], watertight=solids > 0
-    )
-    if not solids:
-        findings.append(G007.finding("no solid in the file"))
-    elif volume < 0:
-        findings.append(T008.finding(f"volume {number(volume)} mm3"))
-    findings += expected(solids, options.shells, "solid")
-    return findings, facts
+    return found
 
 
-def _from_child(path: Path, seconds: float) -> dict[str, Any]:
+def _from_child(path: Path, seconds: float) -> Measured | None:
     """Return what `measure` finds, in a worker: OCCT dies of some malformed files, and it prints."""
     try:
         with Pool() as pool:
@@ -59,8 +67,8 @@ def _from_child(path: Path, seconds: float) -> dict[str, Any]:
         raise F012.unreadable(f"{NEEDS} ({error})"[:200]) from error
 
 
-def measure(path: str) -> dict[str, Any]:
-    """Return validity, solids, volume (mm3), area (mm2) and box of a STEP file; {} if it holds no shape."""
+def measure(path: str) -> Measured | None:
+    """Measure a STEP file in this process; None if it holds no shape."""
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
@@ -69,23 +77,24 @@ def measure(path: str) -> dict[str, Any]:
     from OCP.TopAbs import TopAbs_SOLID
     from OCP.TopExp import TopExp_Explorer
 
-    measures: dict[str, Any] = {}
     reader = STEPControl_Reader()
-    if reader.ReadFile(path) == IFSelect_RetDone and reader.TransferRoots() >= 1:
-        shape = reader.OneShape()
-        explorer, solids = TopExp_Explorer(shape, TopAbs_SOLID), 0
-        while explorer.More():
-            solids += 1
-            explorer.Next()
-        volume, area = GProp_GProps(), GProp_GProps()
-        BRepGProp.VolumeProperties_s(shape, volume)
-        BRepGProp.SurfaceProperties_s(shape, area)
-        measures = {"valid": BRepCheck_Analyzer(shape).IsValid(), "solids": solids, "box": _box(shape)}
-        measures |= {"volume": float(volume.Mass()), "area": float(area.Mass())}
-    return measures
+    if reader.ReadFile(path) != IFSelect_RetDone or reader.TransferRoots() < 1:
+        return None
+    shape = reader.OneShape()
+    volume, area = GProp_GProps(), GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, volume)
+    BRepGProp.SurfaceProperties_s(shape, area)
+    valid, box = BRepCheck_Analyzer(shape).IsValid(), _box(shape)
+    tolerance = max(_LEAST_MM, _PART * dist(*box)) if box else _LEAST_MM
+    meshes: list[tuple[Floats, Ints]] = []
+    explorer = TopExp_Explorer(shape, TopAbs_SOLID)
+    while explorer.More():
+        meshes.append(triangles_of(explorer.Current(), tolerance))
+        explorer.Next()
+    return Measured(valid, len(meshes), float(volume.Mass()), float(area.Mass()), box, tolerance, meshes)
 
 
-def _box(shape: Any) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
+def _box(shape: Any) -> tuple[Point, Point] | None:
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
 

@@ -6,7 +6,6 @@ StereoLithography Interface Specification; keywords in either case.
 
 from __future__ import annotations
 
-import codecs
 import re
 from dataclasses import dataclass, field
 
@@ -28,7 +27,7 @@ _TOKENS = 21  # facet normal x y z outer loop (vertex x y z) x 3 endloop endface
 _WORDS = {0: b"facet", 1: b"normal", 5: b"outer", 6: b"loop", 7: b"vertex", 11: b"vertex", 15: b"vertex"}
 _WORDS |= {19: b"endloop", 20: b"endfacet"}
 _NUMBERS = [i for i in range(_TOKENS) if i not in _WORDS]
-_NAN_SPELLINGS = re.compile(rb"^[+-]?(nan(\(\w*\))?|inf(inity)?|1\.#(ind|inf|qnan|snan)\w*)$", re.IGNORECASE)
+_NOT_FINITE = re.compile(rows.NOT_FINITE.encode(), re.IGNORECASE)
 _PRINTABLE = bytes(b for b in range(256) if b in b"\t\n\v\f\r" or (b >= 32 and b != 127))
 _BLOCK = 8_000_000
 _FACES = 1 << 14  # faces whose corners stay in the processor's cache
@@ -96,7 +95,7 @@ def _not_single(corners: Floats) -> Ints:
 
 def _is_text(head: bytes, data: memoryview) -> bool:
     start = head.lstrip(b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n")[:5].lower()
-    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+    if head.startswith(rows.UTF16):
         return True
     if start != b"solid" and not head.lstrip().lower().startswith(b"facet"):
         return False
@@ -133,10 +132,7 @@ def _read_text(data: memoryview, limits: Limits, deadline: Deadline, findings: l
 
 def _decoded(raw: bytes, findings: list[Finding]) -> bytes:
     """Return the text as bytes with LF line ends, whatever it was stored as; oddities become findings."""
-    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        findings.append(F009.finding("UTF-16 text with a byte order mark"))
-        raw = raw.decode("utf-16", "replace").encode("utf-8")
-    elif not raw.isascii():
+    if not raw.isascii() and not raw.startswith(rows.UTF16):
         try:
             raw.decode("utf-8")
         except UnicodeDecodeError as error:
@@ -233,7 +229,7 @@ def _slow_numbers(texts: list[bytes], state: _Text) -> Floats:
     for i, text in enumerate(texts):
         if NUMBER.fullmatch(text):
             values[i] = float(text)
-        elif _NAN_SPELLINGS.match(text):
+        elif _NOT_FINITE.fullmatch(text):
             values[i] = np.nan
         else:
             state.findings.append(not_a_number(text, [Location(face=state.facets + i)]))
@@ -256,7 +252,7 @@ def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> Non
         elif (
             word != wanted[0]
             if wanted
-            else word in _KEYWORDS or not (NUMBER.fullmatch(word) or _NAN_SPELLINGS.match(word))
+            else word in _KEYWORDS or not (NUMBER.fullmatch(word) or _NOT_FINITE.fullmatch(word))
         ):
             fixed = wanted or word in _KEYWORDS
             if match.end() == len(raw) and (not fixed or any(whole.startswith(word) for whole in wanted)):

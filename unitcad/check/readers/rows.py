@@ -6,6 +6,7 @@ A text is taken in blocks of whole lines, so that what is made on the way has th
 from __future__ import annotations
 
 import codecs
+import math
 import re
 import warnings
 from collections.abc import Iterator
@@ -19,10 +20,16 @@ from unitcad.check.rules.f_limits import Deadline
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
-_NOT_FINITE = re.compile(rb"[+-]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
+_MICROSOFT = r"1\.#(?:(?:ind|inf|qnan|snan)\w*(?:[+-]\d+)?|(?:io|j|qo|r)\d*)"  # rounded, INF is J and QNAN is R
+NOT_FINITE = rf"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?|{_MICROSOFT})"
+"""How programs write a number that is not finite, in either case."""
+_NOT_FINITE = re.compile(NOT_FINITE.encode(), re.IGNORECASE)
+_WITH_HASH = re.compile(rf"(?<![^\s+-]){_MICROSOFT}(?!\S)".encode(), re.IGNORECASE)
 _INTEGER = re.compile(rb"[+-]?\d{1,18}")
 _WORD = re.compile(rb"\S+")
 BLOCK = 2_000_000
+UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+"""Byte order marks with which a text in UTF-16 begins."""
 NEWLINE, HASH, SLASH, SPACE = 10, 35, 47, 32
 JOINED = 11  # a vertical tab stands where a line was continued
 
@@ -57,14 +64,22 @@ class Rows:
 
 
 def plain(raw: bytes, findings: list[Finding]) -> bytes:
-    """Return a text with LF line ends and without a byte order mark; what had to be changed is a finding."""
-    if raw.startswith(codecs.BOM_UTF8):
+    """Return a text in UTF-8 with LF line ends and without a byte order mark; an odd encoding is a finding.
+
+    Numbers that Microsoft's programs write with a #, which are not finite, become nan: a # begins a comment.
+    """
+    if raw.startswith(UTF16):
+        findings.append(F009.finding("UTF-16 text with a byte order mark"))
+        raw = raw.decode("utf-16", "replace").encode()
+    elif raw.startswith(codecs.BOM_UTF8):
         findings.append(F009.finding("a UTF-8 byte order mark at the start"))
         raw = raw[3:]
     if b"\r" in raw:
         if b"\n" not in raw:
             findings.append(F009.finding("CR-only line ends"))
         raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if b".#" in raw:
+        raw = _WITH_HASH.sub(b"nan", raw)
     return raw.replace(b"\v", b" ")
 
 
@@ -211,12 +226,12 @@ def _slowly(block: Ints, line: int, integers: bool) -> Floats:
     values = []
     for match in _WORD.finditer(text):
         word = match.group()
-        good = _INTEGER.fullmatch(word) if integers else NUMBER.fullmatch(word) or _NOT_FINITE.fullmatch(word)
-        if not good:
+        finite = (_INTEGER if integers else NUMBER).fullmatch(word)
+        if not finite and (integers or not _NOT_FINITE.fullmatch(word)):
             place = [Location(line=line + sum(text.count(mark, 0, match.start()) for mark in (b"\n", b"\v")))]
             if integers:
                 shown = word[:30].decode("utf-8", "replace")
                 raise F004.unreadable(f"{shown!r} is not a vertex's index", places=place)
             raise Unreadable(not_a_number(word, place))
-        values.append(int(word) if integers else float(word))
+        values.append(math.nan if not finite else int(word) if integers else float(word))
     return np.array(values, np.int64 if integers else np.float64)

@@ -45,7 +45,7 @@ def read_bodies(path: str, tolerance: float) -> list[tuple[str, np.ndarray, np.n
     roots = TDF_LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
     return [
-        (name, *_triangles(solid, tolerance))
+        (name, *triangles_of(solid, tolerance))
         for root in range(1, roots.Length() + 1)
         for name, solid in _solids(roots.Value(root), "", TopLoc_Location())
     ]
@@ -77,7 +77,8 @@ def _solids(label: Any, called: str, place: Any) -> list[tuple[str, Any]]:
     return solids
 
 
-def _triangles(solid: Any, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+def triangles_of(solid: Any, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (n, 3), mm, and faces (m, 3) of OCCT's mesh of a solid, as `step_bodies` has them."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED

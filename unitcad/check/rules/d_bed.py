@@ -31,7 +31,8 @@ D004 = Rule("""
 
 D005 = Rule("""
     D005 warning: not on the bed
-    The lowest point is not at z = 0, or no flat of the part lies there to stand on.
+    The lowest point floats above z = 0, reaches below it, or no flat of the part lies there to stand on; the message
+    says which.
     Example: The underside of a part lies at z = 5 mm.
     Fix: Place the part with a flat on z = 0.
 """)
@@ -52,7 +53,8 @@ def _stands(topology: Topology) -> Iterator[Finding]:
     vertices, faces = topology.mesh.vertices, topology.mesh.faces
     low = float(vertices[distinct_values(faces), 2].min())
     if abs(low) > ON_BED:
-        yield D005.finding(f"lowest point at z = {number(low, 4)} mm")
+        what = "floats above the bed, which a slicer corrects" if low > 0 else "reaches below the bed"
+        yield D005.finding(f"{what}: lowest point at z = {number(low, 4)} mm")
         return
     lying = (vertices[faces, 2] < low + ON_BED).all(axis=1) & (topology.areas[:, 2] < 0)
     flat = float(np.abs(topology.areas[lying, 2]).sum()) / 2

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from unitcad.catalogue import Printer
 
 D003 = Rule("""
-    D003 warning: overhang
-    Faces lean out further than the printer can hold without support, and no bridge of its span reaches across.
+    D003 info: overhang
+    Faces lean out further than the printer can hold without support, and no bridge of its span reaches across. An error
+    if the printer prints without support (support = "none" in its table).
     Example: A level arm reaches 10 mm out of a wall.
     Fix: Turn the part, chamfer the overhang, or print with support.
 """)
@@ -76,7 +77,8 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     bad.sort(key=lambda item: -item[0])
     area = number(sum(area for area, _ in bad), 3)
     text = f"{area} mm2 lean out beyond {number(printer.overhang_deg)} degrees unsupported"
-    yield D003.finding(text, len(bad), [place for _, place in bad])
+    severity = "error" if printer.support is not None and printer.support.value == "none" else None
+    yield D003.finding(text, len(bad), [place for _, place in bad], severity)
 
 
 def _border(topology: Topology, beyond: Ints, bed: float) -> tuple[Floats, Floats]:

@@ -93,7 +93,8 @@ F010 = Rule("""
 F012 = Rule("""
     F012 error: no such file, or unreadable
     The path does not exist, is not a file, or may not be read; or it is STEP and no B-rep extra is installed (a warning
-    where a folder was named).
+    where a folder was named). A warning if a solid of a STEP file has no closed mesh: its overlap and print are not
+    judged.
     Example: `unitcad check prat.stl` where the file is part.stl.
     Fix: Check the path and its permissions; for STEP, in a clone, pip install '.[step]'.
 """)

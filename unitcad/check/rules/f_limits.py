@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from unitcad.check.findings import Facts, Finding, Unreadable, counted
 from unitcad.check.rules.rule import Rule
+from unitcad.geometry.ticks import TooMany
 
 F011 = Rule("""
     F011 error: resource limit reached
-    The file asks for more bytes, faces, time or memory than the limits allow, so it was not checked to its end. It
-    never passes.
+    The file asks for more bytes, faces, time or memory than the limits allow, or has too many pairs of faces that lie
+    at each other, so it was not checked to its end. It never passes. What was found by then is reported.
     Example: A mesh has 12 million faces, and --max-faces is 10 million.
     Fix: If the file is meant to be so large, raise the limit that the message names: --timeout, --max-faces or
-    --memory. Limits without an option, such as 4 GB a file and 100,000 instances of a 3MF, are fixed.
+    --memory, of which a file may take a quarter. Limits without an option, such as 4 GB a file and 100,000 instances of
+    a 3MF, are fixed.
 """)
+
+
+_FILE_SHARE = 0.25  # of the memory: what is made of a file on the way takes several times its size
 
 
 @dataclass(frozen=True)
@@ -37,10 +43,34 @@ class Limits:
     ratio: float = 1000.0
     seconds: float = 600.0
 
+    def check_bytes(self, n: int) -> None:
+        """Raise `Unreadable` (F011) for a file of more bytes than `max_bytes`, or than a part of the memory."""
+        memory = _memory()
+        if n > self.max_bytes:
+            raise F011.unreadable(f"{n} bytes, more than the limit of {self.max_bytes}")
+        if memory is not None and n > memory * _FILE_SHARE:
+            raise F011.unreadable(
+                f"{n} bytes, more than a quarter of the {memory // 1_000_000} MB of memory (--memory)"
+            )
+
     def check_faces(self, n: int) -> None:
         """Raise `Unreadable` (F011) for more faces than `max_faces`."""
         if n > self.max_faces:
             raise F011.unreadable(f"{counted(n, 'face')}, more than --max-faces {self.max_faces}")
+
+
+def _memory() -> int | None:
+    """Return the bytes of memory that this process may have, or None if that is not known (Windows)."""
+    try:
+        import resource
+
+        limit, there = (
+            resource.getrlimit(resource.RLIMIT_AS)[0],
+            os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"),
+        )
+    except (ImportError, ValueError, OSError):
+        return None
+    return there if limit < 0 else min(limit, there)
 
 
 class OutOfTime(Unreadable):
@@ -75,13 +105,15 @@ def keeping(
 ) -> Iterator[None]:
     """Put the findings by then, and the facts, beside what ends the check inside; `change` all of them.
 
-    Raises `Unreadable`, with F011 where memory runs out or calls nest too deeply.
+    Raises `Unreadable`, with F011 where memory runs out, pairs are too many or calls nest too deeply.
     """
     try:
         yield
-    except (Unreadable, MemoryError, RecursionError) as error:
+    except (Unreadable, TooMany, MemoryError, RecursionError) as error:
         if isinstance(error, Unreadable):
             stop = error
+        elif isinstance(error, TooMany):
+            stop = F011.unreadable(str(error))
         else:
             why = "out of memory (--memory)" if isinstance(error, MemoryError) else "nested too deeply"
             stop = F011.unreadable(why)

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 
 import numpy as np
 
 from unitcad.check.detail import detail
 from unitcad.check.findings import Finding, Location, counted, point
 from unitcad.check.geometry.coverings import folded_edges, kinds, through_edges
+from unitcad.check.geometry.depths import covering_depths, crossing_depths, folded
 from unitcad.check.geometry.edges import edges_of, turns_of
 from unitcad.check.geometry.self_crossing import Crossings, Faces, facing, joined
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import float32_step, same_place
 from unitcad.check.geometry.triangles import common_point
+from unitcad.check.rules.g_shells import SPECK
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_edges
 from unitcad.check.rules.rule import Rule
-from unitcad.geometry.arrays import Ints, among, distinct, distinct_values
+from unitcad.geometry.arrays import Floats, Ints, among, distinct, distinct_values
 
 G001 = Rule("""
     G001 error: self-crossing
-    Two faces pass through each other. Decided exactly: touching is not crossing. In a 3MF file a warning, since the
-    core specification (4.1) says what is solid.
+    Two faces pass through each other. Decided exactly: touching is not crossing. A warning, unless --strict is given,
+    if they do so by no more than 0.02 mm or four float32 steps, of which the message says the depth. In a 3MF file a
+    warning, since the core specification (4.1) says what is solid.
     Example: A bolt passes through a wall and is not united with it.
     Fix: Unite the bodies with a boolean, or move the surfaces apart.
 """)
@@ -46,8 +50,8 @@ G008 = Rule("""
     G008 error: shell overlaps itself
     A shell passes through itself along edges that four or more of its faces share, or two of its faces cover each other
     in one plane and look the same way: its winding number takes another value than 0 and 1, such as 2 in the middle of
-    a pentagram or -1 in one half of a bow tie. In a 3MF file a warning, since the core specification (4.1) says what is
-    solid.
+    a pentagram or -1 in one half of a bow tie. A warning, unless --strict is given, if two faces cover each other by
+    no more than 0.02 mm. In a 3MF file a warning, since the core specification (4.1) says what is solid.
     Example: A prism stands on a pentagram that is drawn in one stroke.
     Fix: Unite the body with itself by a boolean, or correct the outline that it was made from.
 """)
@@ -56,7 +60,8 @@ G009 = Rule("""
     G009 error: wall or gap without thickness
     Two faces cover each other in one plane and look opposite ways, and they do not belong to two solids that lie side
     by side: a fin, a fold, a crack, or a cavity that reaches the surface. Also where two neighbours fold onto each
-    other to within two float32 steps.
+    other to within two float32 steps. A warning, unless --strict is given, if they cover each other by no more than
+    0.02 mm.
     Example: A fin is drawn as one surface and exported with both of its sides.
     Fix: Give the wall or the gap a thickness, or remove both faces.
 """)
@@ -69,27 +74,54 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     """Apply the rules to all pairs of faces, then along the edges."""
     crossings = part.crossings
     if crossings.faces is not None:
-        yield from _pairs(part.topology, crossings, crossings.faces)
+        yield from _pairs(part, crossings, crossings.faces)
         yield from _touching(part.topology, crossings, crossings.faces)
     if crossings.stopped is not None:
         raise crossings.stopped
-    yield from _along_edges(part.topology)
+    yield from _along_edges(part)
 
 
-def _pairs(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
+def _pairs(part: Inspection, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
     """Return pairs of faces that cross or cover each other."""
+    topology, places = part.topology, partial(_places, part.topology, faces)
     crossing, covering = joined(crossings.crossing), joined(crossings.covering)
     opposite = facing(faces, covering[:, 0], covering[:, 1]) < 0
     twice, thin = kinds(topology, faces.shell[covering], opposite)
-    for rule, pairs, what in (
-        (G001, crossing, "that cross"),
-        (G004, covering[~twice & ~thin], "that overlap in one plane"),
-        (G008, covering[twice], "of one shell that overlap in one plane and look the same way"),
-        (G009, covering[thin], "in one plane with nothing between them"),
+    other, corners = ~twice & ~thin, faces.corners
+    if topology.mesh.indexed and (len(crossing) or len(covering)):
+        corners = same_place(faces.vertices)[corners]
+    deep = crossing_depths(faces.vertices, corners, crossing, SPECK)
+    covers = covering_depths(faces.vertices, corners, covering, SPECK)
+    yield from _by_depth(part, G001, "pair", "of faces that cross", deep, crossing, places)
+    if other.any():
+        text = f"{counted(int(other.sum()), 'pair')} of faces that overlap in one plane"
+        yield G004.finding(text, int(other.sum()), places(covering[other]))
+    for rule, which, what in (
+        (G008, twice, "of faces of one shell that overlap in one plane and look the same way"),
+        (G009, thin, "of faces in one plane with nothing between them"),
     ):
-        if len(pairs):
-            text = f"{counted(len(pairs), 'pair')} of faces {what}"
-            yield rule.finding(text, len(pairs), _places(topology, faces, pairs))
+        yield from _by_depth(part, rule, "pair", what, covers[which], covering[which], places)
+
+
+def _by_depth(
+    part: Inspection,
+    rule: Rule,
+    one: str,
+    what: str,
+    depth: Floats,
+    found: Ints,
+    places: Callable[[Ints], Iterable[Location]],
+) -> Iterator[Finding]:
+    """Yield a finding of the deep ones among those `found`, and one of the shallow ones, which `depth` (mm) tells."""
+    for shallow in (False, True):
+        which = np.isfinite(depth) == shallow
+        if not which.any():
+            continue
+        text, severity = f"{counted(int(which.sum()), one)} {what}", None
+        if shallow:
+            text += f", {depth[which].max():.2g} mm deep at most"
+            severity = None if part.strict else "warning"
+        yield rule.finding(text, int(which.sum()), places(found[which]), severity)
 
 
 def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
@@ -111,7 +143,8 @@ def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterato
         return faces.original[distinct_values(touching[begin:end])], (x / 2, y / 2, z / 2)
 
     places = _places(topology, faces, touching[first], region)
-    yield G003.finding(f"{counted(n, 'pair')} of shells that touch", n, places)
+    some = " among those compared" if contact.full else ""
+    yield G003.finding(f"{counted(n, 'pair')} of shells that touch{some}", n, places)
 
 
 def _places(
@@ -141,8 +174,9 @@ def _places(
     return sorted(by_place.values(), key=lambda place: place.face or 0)
 
 
-def _along_edges(topology: Topology) -> Iterator[Finding]:
+def _along_edges(part: Inspection) -> Iterator[Finding]:
     """Apply G008 and G009 along edges. Vertices in one place are one, whether or not the file lists them apart."""
+    topology = part.topology
     mesh, edges, faces = topology.mesh, topology.edges, topology.mesh.faces
     kept, shells, areas, turns = topology.kept, topology.shells, topology.areas, topology.turns
     if mesh.indexed:
@@ -153,10 +187,9 @@ def _along_edges(topology: Topology) -> Iterator[Finding]:
             faces, kept, shells, areas = faces[whole], kept[whole], shells[whole], areas[whole]
             edges = edges_of(faces, len(mesh.vertices))
             turns = turns_of(mesh.vertices, faces, edges)
-    for rule, which, text in (
-        (G008, through_edges(turns, shells), "at which a shell passes through itself"),
-        (G009, folded_edges(mesh.vertices, faces, edges, areas), "at which two faces fold onto each other"),
-    ):
-        if len(which):
-            places = at_edges(mesh.vertices, edges, kept, which)
-            yield rule.finding(f"{counted(len(which), 'edge')} {text}", len(which), places)
+    places = partial(at_edges, mesh.vertices, edges, kept)
+    through, (folds, low, high) = through_edges(turns, shells), folded_edges(mesh.vertices, faces, edges, areas)
+    if n := len(through):
+        yield G008.finding(f"{counted(n, 'edge')} at which a shell passes through itself", n, places(through))
+    depth = folded(low, high, SPECK)
+    yield from _by_depth(part, G009, "edge", "at which two faces fold onto each other", depth, folds, places)

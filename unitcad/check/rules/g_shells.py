@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
@@ -10,13 +11,14 @@ import numpy as np
 from unitcad.check.findings import Finding, Location, counted, number, point
 from unitcad.check.geometry.topology import Topology, diagonals
 from unitcad.check.geometry.triangle_mesh import solid_of
-from unitcad.check.geometry.volumes import winding_number
+from unitcad.check.geometry.triangles import without_area
+from unitcad.check.geometry.volumes import winding_numbers
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Bools, Floats, Ints, among, grouped
 from unitcad.geometry.boxes import box_pairs
-from unitcad.geometry.ticks import Interrupted, Tick
+from unitcad.geometry.ticks import Interrupted, Tick, TooMany
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -24,8 +26,9 @@ if TYPE_CHECKING:
 G002 = Rule("""
     G002 error: shells overlap
     Two shells share volume: one faces outwards inside the other, or where their faces meet, they share more than a
-    millionth of the smaller one. Fill rules decide what is solid, and they differ between slicers. In a 3MF file a
-    warning, since the core specification (4.1) says what is solid.
+    millionth of the smaller one. Fill rules decide what is solid, and they differ between slicers. A warning, unless
+    --strict is given, if the part that they share is less than 0.02 mm thick. In a 3MF file a warning, since the core
+    specification (4.1) says what is solid. The solids of a STEP file are compared by meshes of them.
     Example: A box lies inside a larger one, and both face outwards.
     Fix: Unite the bodies with a boolean.
 """)
@@ -49,7 +52,8 @@ G006 = Rule("""
 
 G007 = Rule("""
     G007 error: volume about zero
-    A shell encloses less than a millionth of its area times its diagonal: a sheet without thickness.
+    A shell encloses less than a millionth of its area times its diagonal: a sheet without thickness. Faces without an
+    area are T010 alone.
     Example: A sheet is drawn as two faces back to back.
     Fix: Give it thickness.
 """)
@@ -73,6 +77,7 @@ T008 = Rule("""
 FLAT = 1e-6  # G007: a shell's volume over its area times its diagonal
 SPECK = 0.02  # G010, mm; a tenth of the least feature of the finest printer in the catalogue
 BODY = 1.0  # G010, mm; the size of a body beside which a speck is one
+_BOOLEANS = 100_000  # pairs of shells
 _SHARE = 1e-6  # of the smaller shell's volume: shells that share no more only touch
 
 
@@ -87,23 +92,25 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
         return
     area = np.bincount(labels, np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)), n) / 2
     flat = np.abs(volumes) <= FLAT * area * diagonals(low, high)
-    which = np.flatnonzero(sound & flat)
+    which = np.flatnonzero(sound & flat & ~_without_area(topology, sound & flat))
     if len(which):
         worst = which[np.argmax(area[which])]
         text = f"volume {number(volumes[worst], 3)} mm3 over {number(area[worst], 3)} mm2 of surface"
         yield G007.finding(text, len(which), (_where(topology, i) for i in which.tolist()))
     sound = sound & ~flat
     yield from specks(low, high, sound & (volumes > 0))
-    depth, overlaps = np.zeros(n, int), list[tuple[int, int]]()
+    depth, overlaps = np.zeros(n, int), dict[tuple[int, int], float]()
     try:
+        if crossings.contact.full:
+            raise TooMany(crossings.contact.most, "shells")
         if n > 1:
             meeting = box_pairs(low, high, part.tick) if crossings.meeting is None else crossings.meeting
             _relate(topology, np.asarray(sound), meeting, crossings.touching(), depth, overlaps, part.tick)
     except Interrupted:
-        yield from _overlapping(topology, overlaps)
+        yield from _overlapping(part, overlaps)
         raise
-    overlaps += [(i, i) for i in np.flatnonzero(sound & (depth % 2 == 1) & (volumes > 0)).tolist()]
-    yield from _overlapping(topology, overlaps)
+    overlaps |= {(i, i): math.inf for i in np.flatnonzero(sound & (depth % 2 == 1) & (volumes > 0)).tolist()}
+    yield from _overlapping(part, overlaps)
     inwards = sound & (volumes < 0)
     for rule, which, one, many in (
         (T008, np.flatnonzero(inwards & (depth % 2 == 0)), "inverted shell", ""),
@@ -112,6 +119,15 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
         if len(which) and not (rule is T008 and n == 1 and crossings.crossed):
             places = (_where(topology, i) for i in which.tolist())
             yield rule.finding(counted(len(which), one, many), len(which), places)
+
+
+def _without_area(topology: Topology, asked: Bools) -> Bools:
+    """Return which shells of those `asked` have faces without area only (T010); none if no shell has any other."""
+    some = np.flatnonzero(asked.take(topology.shells))
+    shells = topology.shells[some]
+    flat = without_area(topology.mesh.vertices[topology.mesh.faces[some]])
+    found = asked & (np.bincount(shells[~flat], minlength=len(asked)) == 0)
+    return found & ~found.all()
 
 
 def expected(there: int | None, wanted: int | None, word: str = "shell") -> Iterator[Finding]:
@@ -131,11 +147,17 @@ def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
     return [G010.finding(text, len(tiny), places)]
 
 
-def _overlapping(topology: Topology, overlaps: list[tuple[int, int]]) -> list[Finding]:
-    if not overlaps:
-        return []
-    places = (_where(topology, *pair) for pair in overlaps)
-    return [G002.finding(f"{counted(len(overlaps), 'pair')} of shells that share volume", len(overlaps), places)]
+def _overlapping(part: Inspection, overlaps: dict[tuple[int, int], float]) -> Iterator[Finding]:
+    """Apply G002 to pairs of shells by the mean thickness of what they share, mm; infinity if that is not shallow."""
+    for shallow in (False, True):
+        pairs = {pair: depth for pair, depth in overlaps.items() if math.isfinite(depth) == shallow}
+        if not pairs:
+            continue
+        text, severity = f"{counted(len(pairs), 'pair')} of shells that share volume", None
+        if shallow:
+            text += f", {max(pairs.values()):.2g} mm deep at most"
+            severity = None if part.strict else "warning"
+        yield G002.finding(text, len(pairs), (_where(part.topology, *pair) for pair in pairs), severity)
 
 
 def _relate(
@@ -144,7 +166,7 @@ def _relate(
     pairs: Ints,
     touching: Ints,
     depth: Ints,
-    overlaps: list[tuple[int, int]],
+    overlaps: dict[tuple[int, int], float],
     tick: Tick,
 ) -> None:
     """Add to `depth` how many sound shells each one lies in, and to `overlaps` the pairs that touch and share volume.
@@ -163,6 +185,8 @@ def _relate(
     size = np.abs(volumes)
     least = np.minimum(size.take(one), size.take(other))
     close = np.flatnonzero(touch & (room > _SHARE * least))
+    if len(close) > _BOOLEANS:
+        raise TooMany(_BOOLEANS, "shells")
     solids: dict[int, Manifold] = {}
     before = -1
     for at in close.tolist():
@@ -170,16 +194,20 @@ def _relate(
         a, b = pairs[at].tolist()
         if a != before:  # pairs are sorted: what comes before it comes no more
             before, solids = a, {i: solid for i, solid in solids.items() if i >= a}
-        common = _shared(topology, faces_of, a, b, solids)
+        common, thickness = _shared(topology, faces_of, a, b, solids)
         if volumes[a] * volumes[b] > 0 and common > _SHARE * least[at]:
-            overlaps.append((a, b))
+            overlaps[(a, b)] = thickness if thickness < SPECK and common < least[at] / 2 else math.inf
         elif common > (1 - _SHARE) * least[at]:  # a cavity that touches the wall
             depth[a if abs(volumes[a]) < abs(volumes[b]) else b] += 1
+    order, first, count = grouped(topology.shells, n)
+    by_shell = faces[order]
     for inner, outer, within in ((one, other, inside), (other, one, outside)):
-        for at in np.flatnonzero(within & ~touch).tolist():
-            tick()
-            point = vertices[faces[faces_of(inner[at])[0], 0]]
-            depth[inner[at]] += winding_number(vertices, faces[faces_of(outer[at])], point) != 0
+        some = np.flatnonzero(within & ~touch)
+        shell, around = inner[some], outer[some]
+        points = vertices[by_shell[first[shell], 0]]
+        depth += np.bincount(
+            shell[winding_numbers(vertices, by_shell, first[around], count[around], points, tick) != 0], minlength=n
+        )
 
 
 def _common_room(topology: Topology, one: Ints, other: Ints) -> tuple[Floats, Bools, Bools]:
@@ -210,8 +238,10 @@ def _faces_by_shell(labels: Ints, n: int) -> Callable[[int], Ints]:
     return lambda shell: order[first[shell] : first[shell] + count[shell]]
 
 
-def _shared(topology: Topology, faces_of: Callable[[int], Ints], a: int, b: int, solids: dict[int, Manifold]) -> float:
-    """Return the volume that two shells share, mm3, by manifold3d's boolean; `solids` keeps what it has made.
+def _shared(
+    topology: Topology, faces_of: Callable[[int], Ints], a: int, b: int, solids: dict[int, Manifold]
+) -> tuple[float, float]:
+    """Return the volume that two shells share, mm3, and its mean thickness, mm, by manifold3d; `solids` keeps its solids.
 
     Shells that face inwards are turned first; one that manifold3d refuses gives 0 (its own faults are reported).
     """
@@ -220,4 +250,6 @@ def _shared(topology: Topology, faces_of: Callable[[int], Ints], a: int, b: int,
             used, local = np.unique(topology.mesh.faces[faces_of(i)], return_inverse=True)
             local = local.reshape(-1, 3)
             solids[i] = solid_of(topology.mesh.vertices[used], local[:, ::-1] if topology.volumes[i] < 0 else local)
-    return (solids[a] ^ solids[b]).volume()
+    common = solids[a] ^ solids[b]
+    volume = common.volume()
+    return volume, 2 * volume / max(common.surface_area(), 1e-300)

@@ -24,7 +24,7 @@ class Inspection:
     """A mesh with finite vertices, as the file has it, with its topology.
 
     `tick` is called now and then by what takes long; `cross`: whether faces are compared with each other; `ready`: what
-    that needs, where it is known already.
+    that needs, where it is known already. `strict`: whether crossings too shallow for a printer are errors.
     """
 
     mesh: Mesh
@@ -33,6 +33,7 @@ class Inspection:
     cross: bool = True
     printer: Printer | None = None
     ready: tuple[Arranged, Stars] | None = None
+    strict: bool = False
 
     @property
     def solid(self) -> bool:

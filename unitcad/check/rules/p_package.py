@@ -93,7 +93,8 @@ P011 = Rule("""
 P012 = Rule("""
     P012 error: dangling, forward or recursive object reference
     A build item or component names an object that is not there, is defined later, may not be used so (type other), or
-    contains itself, as may a node of a GLB.
+    contains itself, as may a node of a GLB. A component of type other is a warning, unless --3mf-strict is given, since
+    slicers keep modifiers so; it is not part of what is built.
     Example: An item has `objectid="3"`, and the only object of the model has the id 1.
     Fix: Define each object before its use, and leave none out.
 """)
@@ -107,7 +108,7 @@ P013 = Rule("""
 
 P014 = Rule("""
     P014 warning: nothing to build
-    The build has no item, so a printer makes nothing.
+    The build has no item, or no object of type model, so a printer makes nothing.
     Example: The model has `<build/>`.
     Fix: Add an item for each object to be printed.
 """)

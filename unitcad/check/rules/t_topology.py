@@ -8,13 +8,13 @@ from itertools import chain
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, point
-from unitcad.check.geometry.predicates import orient2d
 from unitcad.check.geometry.topology import Topology, diagonals, max_side_squared
 from unitcad.check.geometry.triangle_mesh import Mesh, float32_step, float32_steps
+from unitcad.check.geometry.triangles import without_area
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_edges, at_faces
 from unitcad.check.rules.rule import Rule
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Floats, Ints
 
 T001 = Rule("""
     T001 error: boundary edge
@@ -33,7 +33,7 @@ T002 = Rule("""
 T003 = Rule("""
     T003 warning: edge with more than two faces, an even number
     Two shells meet along an edge. Slicers pair the faces in different ways; shells are counted here with the solid
-    between the faces of a pair.
+    between the faces of a pair. An error in a 3MF with --3mf-strict, since the core specification (4.1) forbids it.
     Example: Two boxes share one edge: four faces meet there.
     Fix: Move the shells apart, or unite them with some overlap.
 """)
@@ -57,7 +57,8 @@ T006 = Rule("""
     Edges match only once vertices are joined that are listed apart. Two are joined where they are in one place, or
     where they are nearer than 1e-5 of their own shell's diagonal (or two float32 steps there) and than a tenth of the
     shortest edge at either. So a gap wider than that stays a boundary (T001), no face collapses, and other shells of
-    the file have no influence. Crossings, stored normals and slivers are checked on the faces as stored.
+    the file have no influence. Crossings, stored normals and slivers are checked on the faces as stored. An error in a
+    3MF with --3mf-strict, since the core specification (4.1) asks for common vertices.
     Example: Two halves of a ball were exported apart, and their rims differ by 0.000001 mm.
     Fix: Weld vertices at export.
 """)
@@ -71,8 +72,8 @@ T007 = Rule("""
 
 T009 = Rule("""
     T009 error: duplicate face
-    Two faces have the same three vertices. Where two closed shells stand side by side there, they touch instead (G003,
-    T003).
+    Two faces with an area have the same three vertices. Where two closed shells stand side by side there, they touch
+    instead (G003, T003).
     Example: The lid of a box is in the file twice.
     Fix: Remove one, or both if they face each other.
 """)
@@ -117,8 +118,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     topology = part.topology
     mesh, edges, kept = topology.mesh, topology.edges, topology.kept
     if topology.unused:
-        text = f"{counted(topology.unused, 'vertex', 'vertices')} that no face uses"
-        yield T012.finding(text, topology.unused)
+        yield unreferenced(topology.unused)
     yield from _open_edges(topology)
     if part.mesh.normals is not None:
         yield from _stored_normals(part.mesh, part.mesh.normals, kept, topology.stored_areas)
@@ -127,11 +127,17 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     if n := len(topology.pinched):
         text = counted(n, "pinch vertex", "pinch vertices")
         yield T004.finding(text, n, (Location(xyz=point(xyz)) for xyz in mesh.vertices[topology.pinched]))
-    if n := len(topology.twice):
-        yield T009.finding(counted(n, "duplicate face"), n, at_faces(mesh.vertices, mesh.faces, kept, topology.twice))
+    twice = topology.twice[~without_area(mesh.vertices[mesh.faces[topology.twice]])]  # the others are T010
+    if n := len(twice):
+        yield T009.finding(counted(n, "duplicate face"), n, at_faces(mesh.vertices, mesh.faces, kept, twice))
     if n := len(topology.unbalanced):
         text = f"{counted(n, 'edge')} along which more faces run one way than the other"
         yield T007.finding(text, n, at_edges(mesh.vertices, edges, kept, topology.unbalanced))
+
+
+def unreferenced(n: int) -> Finding:
+    """Make the finding T012 about n vertices, for a reader too, which leaves them out."""
+    return T012.finding(f"{counted(n, 'vertex', 'vertices')} that no face uses", n)
 
 
 def _open_edges(topology: Topology) -> Iterator[Finding]:
@@ -175,7 +181,7 @@ def _thin(topology: Topology) -> Iterator[Finding]:
     suspect = np.flatnonzero(double < 8 * max(step, 1e-7 * whole) * whole)
     corners = vertices[faces[suspect]]
     longest = np.sqrt(max_side_squared(corners))
-    flat = _exactly_flat(corners)
+    flat = without_area(corners)
     lines = suspect[flat]
     n = len(repeated) + len(lines)
     if n:
@@ -186,16 +192,6 @@ def _thin(topology: Topology) -> Iterator[Finding]:
     thin = suspect[~flat & (height < float32_steps(corners)) & (longest > SLIVER * size[suspect])]
     if len(thin):
         yield T011.finding(counted(len(thin), "sliver"), len(thin), at_faces(vertices, faces, kept, thin))
-
-
-def _exactly_flat(corners: Floats) -> Bools:
-    """Return whether the corners of each face (n, 3, 3) lie on one line: seen along no axis do they have an area."""
-    flat = np.ones(len(corners), bool)
-    for axis in range(3):
-        left = np.flatnonzero(flat)
-        plan = np.delete(corners[left], axis, axis=2)
-        flat[left] = orient2d(plan[:, 0], plan[:, 1], plan[:, 2]) == 0
-    return flat
 
 
 def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats) -> Iterator[Finding]:

@@ -127,7 +127,7 @@ class _Reader:
         if rules is None:
             if space in _SHAPES and isinstance(self.resource, Object):
                 self.resource.other_shape = True
-            if self.stack[-1].name == "resources" and attributes.get("id", "").isdecimal():
+            if self.stack[-1].name == "resources" and elements.resource_id(attributes.get("id", "")):
                 self._once(int(attributes["id"]))
                 self.model.foreign.add(int(attributes["id"]))
             for attribute in attributes:
@@ -203,18 +203,19 @@ class _Reader:
             self.model.add(P017, f"<{local}> inside <{parent.name}>")
 
     def _attributes(self, local: str, rules: elements.ElementSchema, attributes: dict[str, str]) -> bool:
-        """Check them; return whether all required ones are there and well typed."""
+        """Check them; return whether all required ones are there and well typed. Others of a wrong type are dropped."""
         good = True
         for name in rules.required:
             if name not in attributes:
                 self.model.add(P017, f"<{local}> lacks {name}")
                 good = False
-        for name, value in attributes.items():
+        for name, value in list(attributes.items()):
             test = rules.required.get(name) or rules.optional.get(name)
             if test is not None:
                 if not test(value):
                     self.model.add(P017, f'{name}="{value[:40]}" of <{local}> is not of its type')
                     good = good and name not in rules.required
+                    del attributes[name]
             elif why := forbidden(name):
                 self.model.add(P017, f"{why} in <{local}>")
             elif name.startswith("http://www.w3.org/XML/1998/namespace ") and local != "model":

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 
 from unitcad.check.geometry.triangle_mesh import LARGEST
+from unitcad.check.readers.rows import NOT_FINITE
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import Model
 from unitcad.check.rules.f_file import F004, not_a_number
 from unitcad.check.rules.p_package import P013, P015, P017
 from unitcad.geometry.arrays import Floats
 
-NOT_FINITE = {"nan", "inf", "infinity", "-nan", "+nan", "-inf", "+inf", "-infinity", "+infinity"}
-"""What programs write for a number that is none, in lower case."""
+_NOT_FINITE = re.compile(NOT_FINITE, re.ASCII | re.IGNORECASE)
 
 
 def coordinate(text: str, model: Model, line: int) -> float:
@@ -22,7 +23,7 @@ def coordinate(text: str, model: Model, line: int) -> float:
     text = text.strip(" \t\r\n")
     if elements.number(text):
         return float(text)
-    if text.lower() in NOT_FINITE:
+    if _NOT_FINITE.fullmatch(text):
         return math.nan
     model.add(F004, not_a_number(text).message, line=line)
     return 0.0
@@ -52,6 +53,6 @@ def transform(text: str | None, model: Model, regular: set[tuple[str, ...]]) -> 
             else:
                 regular.add(linear)
         return matrix
-    rule = P013 if len(parts) == 12 and any(part.lower() in NOT_FINITE for part in parts) else P017
+    rule = P013 if len(parts) == 12 and any(_NOT_FINITE.fullmatch(part) for part in parts) else P017
     model.add(rule, f'transform="{text[:60]}" is not twelve numbers')
     return identity

@@ -173,7 +173,7 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
     for info in entries:
         if why := _unsafe(info.filename):
             package.add(P005, f"{info.filename!r} {why}", info.filename)
-        if info.is_dir():
+        if not info.filename or info.is_dir():
             continue
         key = unquote(info.filename).lower().lstrip("/")
         if key in package.parts:

@@ -12,7 +12,7 @@ from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Triangles, Use
 from unitcad.check.rules.f_limits import F011, Limits
-from unitcad.check.rules.p_package import P009, P012
+from unitcad.check.rules.p_package import P009, P012, P014
 from unitcad.check.units import UNITS_MM
 from unitcad.geometry.arrays import Floats
 
@@ -88,24 +88,30 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
     if nodes > limits.max_instances:
         raise F011.unreadable(f"{_large(nodes)} instances, more than the limit of {limits.max_instances}")
     instances: list[Instance] = []
+    made: set[str] = set()
 
-    def place(key: Key, matrix: Floats) -> None:
+    def place(key: Key, matrix: Floats, severity: str | None = None) -> None:
         model_object = objects.get(key)
         if model_object is None:
             return
+        if not model_object.components:
+            made.add(model_object.type)
         if model_object.type == "other" and not model_object.components:
-            findings.append(P012.finding(f"the build uses object {key[1]} of type other"))
-        if model_object.mesh is not None:
+            findings.append(P012.finding(f"the build uses object {key[1]} of type other", severity=severity))
+        elif model_object.mesh is not None:
             unit_mm = UNITS_MM.get(models[key[0]].unit, 1.0)
             instances.append(Instance(key, model_object, model_object.mesh, matrix, unit_mm))
         for use in model_object.components:
-            place(key_of(key[0], use), _times(use.matrix, matrix))
+            place(key_of(key[0], use), _times(use.matrix, matrix), None if root.strict else "warning")
 
     for item in root.items:
         key = key_of(root.part, item)
         if item.path and key not in objects and key[0] in models:
             findings.append(P012.finding(f"a build item names object {key[1]} of {item.path}, which is not there"))
         place(key, item.matrix)
+    if made and "model" not in made:
+        types = ", ".join(sorted(made))
+        findings.append(P014.finding(f"the build has no object of type model, only of type {types}"))
     return instances
 
 

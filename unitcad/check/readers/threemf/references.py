@@ -188,7 +188,7 @@ def _multi(model: Model, resource: Resource) -> None:
         model.add(P019, f"{who} names multiproperties")
     if len(resource.attributes.get("blendmethods", "").split()) > len(ids) - 1:
         model.add(P019, f"{who} has more blend methods than layers less one")
-    for member in resource.members if not textures else ():
+    for member in () if textures else [one for one in resource.members if one[""] == "multi"]:
         indices = [int(text) for text in member["pindices"].split()]
         if len(indices) > len(ids):
             model.add(P019, f"{who} has more indices than groups")

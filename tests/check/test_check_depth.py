@@ -1,0 +1,134 @@
+"""Crossings, overlaps and folds too shallow for a printer are warnings; what is deep is an error, however it is cut."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import Judge
+from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, box, in_format, stl, turned
+
+Points = np.ndarray
+
+
+def severities(report) -> dict[str, str]:
+    return {found.code: found.severity for found in report.findings if found.code in ("G001", "G002", "G008", "G009")}
+
+
+def pieces(triangles: Points, times: int) -> Points:
+    """The same surface with each triangle cut into four, again and again."""
+    for _ in range(times):
+        a, b, c = triangles.transpose(1, 0, 2)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        triangles = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    return triangles
+
+
+def strips(n: int, at: float, up: bool) -> Points:
+    """A square of 20 mm as n strips, each two long triangles, at the height `at`."""
+    x = np.linspace(0, 20, n + 1)
+    a, b = (np.stack([x, np.full(n + 1, y), np.full(n + 1, at)], axis=1) for y in (0.0, 20.0))
+    found = np.concatenate([np.stack([a[:-1], a[1:], b[1:]], axis=1), np.stack([a[:-1], b[1:], b[:-1]], axis=1)])
+    return found if up else found[:, ::-1]
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize(("depth", "right"), [(1e-5, "warning"), (0.0056, "warning"), (0.05, "error"), (3.0, "error")])
+def test_two_boxes_by_the_depth_of_their_overlap(depth: float, right: str, name: str, judge: Judge) -> None:
+    """3MF's fill rule settles what crosses, whatever its depth."""
+    content = in_format(np.concatenate([box(), box((6, 6, 10), (2, 2, 10 - depth))]), name)
+    found = severities(judge(content, name))
+    assert found["G001"] == ("warning" if name.endswith("3mf") else right)
+    assert found.get("G002", right) == found["G001"]
+    strict = severities(judge(content, name, strict=True))
+    assert set(strict.values()) == ({"warning"} if name.endswith("3mf") else {"error"})
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_turned_boxes_overlap_as_those_that_stand(seed: int, judge: Judge) -> None:
+    both = {depth: np.concatenate([box(), box((6, 6, 10), (2, 2, 10 - depth))]) for depth in (0.001, 0.5)}
+    found = [severities(judge(stl(turned(body, seed, shift=20)))) for body in both.values()]
+    assert [set(codes.values()) for codes in found] == [{"warning"}, {"error"}]
+
+
+def test_the_message_says_the_depth(judge: Judge) -> None:
+    (crossing,) = [
+        found
+        for found in judge(stl(np.concatenate([box(), box((6, 6, 10), (2, 2, 9.995))]))).findings
+        if found.code == "G001"
+    ]
+    assert crossing.message.endswith("that cross, 0.005 mm deep at most")
+
+
+@pytest.mark.parametrize("times", [0, 3, 5])
+@pytest.mark.parametrize("offset", [0.0, 1e-9, 1e-6, 0.3])
+def test_a_deep_crossing_is_an_error_however_fine_or_aligned_its_faces_are(
+    times: int, offset: float, judge: Judge
+) -> None:
+    """One shell that crosses itself: a bar of 8 mm through a plate, both open, so that no volume tells.
+
+    With small offsets the edges of one nearly lie on the faces of the other.
+    """
+    size = 8.0 / 2**times
+    plate, bar = (
+        np.array([[[-4, -4, 0], [4, -4, 0], [0, 4, 0]]], float),
+        np.array([[[offset, -4, -4], [offset, 4, -4], [offset, 0, 4]]], float),
+    )
+    found = severities(judge(stl(pieces(np.concatenate([plate, bar]), times))))
+    assert found == {"G001": "error"}, size
+
+
+@pytest.mark.parametrize("times", [0, 2, 4])
+def test_a_small_deep_crossing_of_fine_faces_is_an_error(times: int, judge: Judge) -> None:
+    """Faces far smaller than what is called shallow: 0.5 mm in pieces of 0.03 mm and less."""
+    scale = 0.1
+    both = np.concatenate([box(), box((6, 6, 10), (2.1, 2.2, 5.03))]) * scale
+    assert severities(judge(stl(pieces(both, times)), select=("G001",))) == {"G001": "error"}
+
+
+@pytest.mark.parametrize(("n", "m"), [(1, 5), (1, 1999), (7, 5), (2000, 1), (2000, 1999)])
+def test_a_fin_without_thickness_is_an_error_however_its_sides_are_cut(n: int, m: int, judge: Judge) -> None:
+    """Both sides of a square in one plane, one cut into n strips, the other into m: strips of 0.01 mm and wider."""
+    found = severities(judge(stl(np.concatenate([strips(n, 0, True), strips(m, 0, False)]))))
+    assert found["G009"] == "error"
+
+
+@pytest.mark.parametrize(("width", "right"), [(1e-4, "warning"), (3e-4, "warning"), (0.009, "warning"), (0.1, "error")])
+@pytest.mark.parametrize("name", ["binary.stl", "part.ply", "part.obj"])
+def test_a_vertex_across_its_neighbours_edge_folds_the_top(width: float, right: str, name: str, judge: Judge) -> None:
+    """The top of a cube of 20 mm has a vertex in its middle, `width` across the diagonal that it should lie on."""
+    corners = np.concatenate([CUBE_CORNERS * 20, [[10 + width / np.sqrt(2), 10 - width / np.sqrt(2), 20]]])
+    rest = np.array([face for face in CUBE_FACES if not {*face.tolist()} <= {1, 3, 5, 7}])
+    fan = [[1, 5, 8], [5, 7, 8], [7, 3, 8], [3, 1, 8]]
+    good = np.concatenate([rest, fan])
+    assert severities(judge(in_format(corners[good], name), name)) == {}
+    # The same vertex joined to one triangle of the two only.
+    cut = np.concatenate([rest, [[1, 5, 7], [7, 3, 8], [3, 1, 8], [1, 7, 8]]])
+    found = severities(judge(in_format(corners[cut], name), name))
+    assert set(found.values()) == {right}
+    assert "G009" in found
+
+
+def test_a_foil_that_lies_in_a_box_is_an_error(judge: Judge) -> None:
+    """All of it is shared, though it is thinner than what is called shallow."""
+    found = severities(judge(stl(np.concatenate([box(), box((6, 6, 0.01), (2, 2, 5))]))))
+    assert found == {"G002": "error"}
+
+
+@pytest.mark.parametrize("more", [0, 1, 3])
+@pytest.mark.parametrize("seed", [None, 0, 1])
+def test_faces_without_area_back_to_back_are_that_alone(more: int, seed: int | None, judge: Judge) -> None:
+    """Beside a cube and apart from it, some pairs of faces whose corners lie on a line."""
+    lines = [np.array([[20, 0, z], [22, 0, z], [24, 0, z]], float) for z in range(more + 1)]
+    pairs = np.array([face for line in lines for face in (line, line[::-1])])
+    body = np.concatenate([box(), pairs])
+    if seed is not None:  # by right angles, so that the corners stay on a line exactly
+        body = np.roll(body, seed + 1, axis=2)
+    report = judge(stl(body))
+    assert {found.code: found.severity for found in report.findings} == {"T010": "warning"}
+
+
+def test_a_file_of_faces_without_area_only_has_no_volume(judge: Judge) -> None:
+    line = np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0]], float)
+    report = judge(stl(np.array([line, line[::-1]])))
+    assert report.has("G007")
+    assert report.verdict == "error"
