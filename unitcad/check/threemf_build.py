@@ -32,7 +32,6 @@ from unitcad.check.rules.v_values import V001
 from unitcad.geometry.arrays import Floats, cross, distinct_values, extent
 
 if TYPE_CHECKING:
-
     from unitcad.catalogue import Printer
 
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
