@@ -218,7 +218,7 @@ def test_a_program_s_lines_arrive_cut_to_a_length_and_end_nothing(pool: Pool) ->
 
 @posix
 def test_a_program_that_is_stopped_with_grace_may_end_by_itself(pool: Pool) -> None:
-    code = "import time\nprint('up', flush=True)\ntry: time.sleep(60)\nexcept KeyboardInterrupt: print('bye')"
+    code = "import time\ntry:\n print('up', flush=True); time.sleep(60)\nexcept KeyboardInterrupt: print('bye')"
     lines, up = list[str](), threading.Event()
 
     def listener(line: tuple[str, str]) -> None:
