@@ -10,12 +10,12 @@ from conftest import Judge
 from shapes import CUBE_CORNERS
 
 # A cube of two strips; a third one turns at -1, and a fourth leads on by vertices named twice.
-AROUND = [1, 0, 3, 2, 7, 6, 5, 4, 1, 0]
-SIDES = [[0, 4, 2, 6], [1, 3, 5, 7]]
+AROUND = [0, 1, 2, 3, 6, 7, 4, 5, 0, 1]
+SIDES = [[0, 2, 4, 6], [1, 5, 3, 7]]
 WAYS = {
     "three strips": [AROUND, *SIDES],
     "one strip with breaks": [[*AROUND, -1, *SIDES[0], -1, *SIDES[1]]],
-    "one strip that leads on": [[*AROUND, 0, *SIDES[0], 6, 1, *SIDES[1]]],
+    "one strip that leads on": [[*AROUND, 1, 0, *SIDES[0], 6, 1, *SIDES[1]]],
 }
 
 

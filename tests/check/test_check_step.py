@@ -58,7 +58,7 @@ def test_solids_volume_and_box(tmp_path: Path) -> None:
     path = tmp_path / "two.step"
     writer.Write(str(path))
     report = check_file(path)
-    assert report.findings == ()
+    assert [found.code for found in report.findings] == ["G002"]  # a quarter of the cylinder lies in the box
     assert report.facts.shells == 2
     assert report.facts.volume_mm3 == pytest.approx(6000 + 785.3981633974483, rel=1e-9)
     assert report.facts.bbox_mm is not None

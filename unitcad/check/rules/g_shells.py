@@ -241,7 +241,7 @@ def _faces_by_shell(labels: Ints, n: int) -> Callable[[int], Ints]:
 def _shared(
     topology: Topology, faces_of: Callable[[int], Ints], a: int, b: int, solids: dict[int, Manifold]
 ) -> tuple[float, float]:
-    """Return the volume that two shells share, mm3, and its mean thickness, mm, by manifold3d; `solids` keeps its solids.
+    """Return the volume that two shells share, mm3, and its mean thickness, mm; `solids` caches the solids.
 
     Shells that face inwards are turned first; one that manifold3d refuses gives 0 (its own faults are reported).
     """
