@@ -81,5 +81,6 @@ def _virtual_display() -> Iterator[str]:
     command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
     lines: SimpleQueue[tuple[str, str]] = SimpleQueue()
     with Pool() as pool:
-        pool.submit(run_here, command, lines=True, heard=lambda line: lines.put(line) if line[0] == "out" else None)
+        call = pool.submit(run_here, command, lines=True, heard=lambda line: lines.put(line) if line[0] == "out" else 0)
+        call.add_done_callback(lambda _: lines.put(("out", "")))  # it ended before it printed a number
         yield f":{lines.get()[1]}"

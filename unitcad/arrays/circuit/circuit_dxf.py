@@ -37,6 +37,8 @@ def circuit_dxf(laid: Wiring, outline: Profile) -> bytes:
             space.add_circle(at, round(pad.radius, _DIGITS), dxfattribs={"layer": "PADS"})
             name = space.add_text(pad.name, height=_TEXT_MM, dxfattribs={"layer": "NAMES"})
             name.set_placement(at, align=ezdxf.enums.TextEntityAlignment.MIDDLE_CENTER)
+        for kind in sorted(document.entitydb.dxf_types_in_use()):  # ezdxf adds their classes in the order of a set
+            document.classes.add_class(kind)
         stream = io.StringIO()
         document.write(stream)
     return stream.getvalue().encode("utf-8")

@@ -13,7 +13,7 @@ from unitcad.check.readers.step_bodies import triangles_of
 from unitcad.check.rules.f_file import F003, F012
 from unitcad.check.rules.f_limits import F011
 from unitcad.geometry.arrays import Floats, Ints
-from unitcad.workers import Pool, TimedOut, WorkerEnded
+from unitcad.workers import NoWorker, Pool, TimedOut, WorkerEnded
 
 _LEAST_MM, _PART = 0.01, 5e-5
 """A mesh lies within the larger of _LEAST_MM and _PART of the diagonal from its surface."""
@@ -61,7 +61,9 @@ def _from_child(path: Path, seconds: float) -> Measured | None:
             return pool.submit(measure, str(path), seconds=seconds).result()
     except TimedOut as error:
         raise F011.unreadable(f"not finished within --timeout {seconds:g} s") from error
-    except WorkerEnded as error:
+    except (NoWorker, WorkerEnded) as error:
+        if isinstance(error, NoWorker) or "SIGKILL" in str(error):  # the system's, when memory is short
+            raise F011.unreadable(str(error)) from error
         raise F003.unreadable(f"the STEP reader died of the file ({error})") from error
     except ImportError as error:
         raise F012.unreadable(f"{NEEDS} ({error})"[:200]) from error

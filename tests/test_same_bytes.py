@@ -1,0 +1,38 @@
+"""The same input gives the same bytes, whatever order Python's sets have in a process."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from unitcad.arrays.array_names import array_templates
+from unitcad.validation import templates
+
+QUICK = ("encapsulating", "forearm-patch")
+ALL = sorted({*templates(), *array_templates()})
+
+
+def built(name: str, seed: int, folder: Path) -> dict[str, str]:
+    """Build everything of a template in a process; return the hash of each file."""
+    command = [sys.executable, "-m", "unitcad", "build", name, "-o", str(folder), "--formats", "step,stl,3mf,svg,glb"]
+    environment = {**os.environ, "PYTHONHASHSEED": str(seed), "SOURCE_DATE_EPOCH": "1700000000"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != "timings.json"
+    }
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.long]) for name in ALL]
+)
+def test_two_processes_write_the_same_bytes(name: str, tmp_path: Path) -> None:
+    first, second = (built(name, seed, tmp_path / str(seed)) for seed in (1, 4))
+    assert first == second
