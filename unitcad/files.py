@@ -118,8 +118,9 @@ def regular(links: bool = True) -> Callable[[str, int], int]:
 
 def in_the_way(folder: Path) -> UnitcadError:
     """Return the error for a folder that can't be made since it, or one above it, is a file."""
-    file = next(path for path in (*reversed(folder.parents), folder) if path.exists() and not path.is_dir())
-    return UnitcadError(f"{file}: is a file, not a folder; choose another with -o")
+    file = next(path for path in (*reversed(folder.parents), folder) if os.path.lexists(path) and not path.is_dir())
+    what = "a file, not a folder" if file.exists() else "a link to a folder that is missing"
+    return UnitcadError(f"{file}: is {what}; choose another with -o")
 
 
 def write(path: Path, content: bytes, *, sync: bool = False) -> None:

@@ -62,3 +62,19 @@ def test_a_batch_needs_no_writable_temporary_folder(tmp_path: Path) -> None:
     words = ("batch", sweep, "-o", tmp_path / "out", "-j", 2, "--cache", tmp_path / "cache")
     done = unitcad(*words, env={**environment(), **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), "/proc")})
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("words", [("build", "embedded"), ("batch", "s/sweep-unit.toml")], ids=lambda words: words[0])
+@pytest.mark.parametrize("below", ["", "results"])
+def test_results_under_a_link_to_nothing_are_refused(words: tuple[str, str], below: str, tmp_path: Path) -> None:
+    ring_sweep(tmp_path / "s")
+    (tmp_path / "disk").symlink_to(tmp_path / "unmounted")
+    done = unitcad(*words, "-o", Path("disk") / below, "--only", "unit", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == "error: disk: is a link to a folder that is missing; choose another with -o\n"
+
+
+def test_python_without_docstrings_works(tmp_path: Path) -> None:
+    command = [sys.executable, "-OO", "-m", "unitcad", "estimate", "encapsulating"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr

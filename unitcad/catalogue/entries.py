@@ -214,7 +214,7 @@ def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
         f"{entry.__name__}Entry",
         fields,
         module=__name__,
-        namespace={"__doc__": (entry.__doc__ or "").splitlines()[0]},
+        namespace={"__doc__": (entry.__doc__ or "").partition("\n")[0]},
         frozen=True,
         kw_only=True,
         omit_defaults=True,

@@ -99,8 +99,8 @@ def build(
     """
     wanted = subject(of)
     outputs = wanted.outputs(checked_outputs(only))
-    if out.exists() and not out.is_dir():
-        raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o")
+    if any(os.path.lexists(path) and not path.is_dir() for path in (out, *out.parents)):
+        raise files.in_the_way(out)
     folder, store = out / wanted.folder_name, store or MemoryStore()
     clear_leftovers(out)
     while True:

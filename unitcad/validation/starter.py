@@ -62,7 +62,7 @@ def _further_tables(there: dict[str, Any], model: type[Struct]) -> str:
         if name in there or name in _NOT_OFFERED:
             continue
         table = table_in(field.type) or table_in(entry_in(field.type))
-        about = f"  # {(table.__doc__ or '').splitlines()[0]}" if table else _note(field)
+        about = f"  # {(table.__doc__ or '').partition(chr(10))[0]}" if table else _note(field)
         head = f"[[{name}]]" if table_in(entry_in(field.type)) else f"[{name}]"
         lines += ["", f"# {head}{about}", *(_keys(table, set()) if table else ())]
     return "\n".join(lines) + "\n"
