@@ -7,12 +7,14 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.check import Limits, Options
+from unitcad.errors import Refusal, Unfinished, UnitcadError
 from unitcad.estimating import estimate_spec
 from unitcad.export import stl
 from unitcad.geometry.arrays import unique_rows
@@ -23,6 +25,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build
 from unitcad.shape import Extrude, Polyhedron, Shape, content_hash, cut, cylinder, polygon
 from unitcad.shape.body import Body
+from unitcad.spec import body_file
 from unitcad.spec.body_file import bodies_in
 from unitcad.validation import load
 
@@ -257,3 +260,14 @@ def test_distinct_rows_are_those_of_numpy() -> None:
         known, index = np.unique(rows, axis=0, return_inverse=True)
         assert np.array_equal(distinct, known)
         assert np.array_equal(place, index.reshape(-1))
+
+
+def test_a_body_whose_check_lacks_time_is_not_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A refusal would stay in a batch's journal; what was not finished may be tried again."""
+    (tmp_path / "body.stl").write_bytes(stl_of(INNER))
+    spec = spec_of(tmp_path, "body.stl", layers=1)
+    monkeypatch.setattr(body_file, "Options", partial(Options, limits=Limits(seconds=1e-9)))
+    with pytest.raises(Unfinished, match=r"body\.stl: its check was not finished"):
+        load(spec)
+    monkeypatch.undo()
+    assert load(spec).design.startswith("body.stl")

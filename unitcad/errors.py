@@ -68,6 +68,12 @@ def install_command(extras: str) -> str:
     return f"in a clone, {shlex.join([*command, f'.[{extras}]'])}"
 
 
+class Unfinished(UnitcadError):
+    """A check that ran out of memory or time. It is no verdict: nothing of it is kept, and another try may succeed."""
+
+    exit_code = 1
+
+
 class Refusal(UnitcadError):
     """A value that is refused: its field, the value, the limit that it breaks and the nearest accepted value.
 

@@ -13,8 +13,8 @@ from batching import command, environment, rows, unitcad
 
 from unitcad.cache import DiskStore
 from unitcad.check import Limits, Options
+from unitcad.errors import Unfinished
 from unitcad.pipeline import make
-from unitcad.pipeline.make import Unfinished
 from unitcad.pipeline.write import build
 from unitcad.validation import load
 
@@ -50,7 +50,21 @@ def test_a_variant_whose_check_is_unfinished_fails_and_is_made_by_the_next_run(t
         "    return whole(data, name, replace(options, limits=check.Limits(seconds=1e-9)))\n"
         "check.check_bytes = hurried\n"
     )
-    words = ("batch", sweep, "-o", out, "-j", 1, "--cache", tmp_path / "cache", "--formats", "stl", "--only", "unit")
+    words = (
+        "batch",
+        sweep,
+        "-o",
+        out,
+        "-j",
+        1,
+        "--cache",
+        tmp_path / "cache",
+        "--formats",
+        "stl",
+        "--only",
+        "unit",
+        "--keep-going",
+    )
     paths = os.pathsep.join([str(hurry), str(Path(__file__).parents[2])])
     first = subprocess.run(
         command(*words), capture_output=True, text=True, check=False, timeout=120,

@@ -167,3 +167,13 @@ def test_all_locations_are_listed_on_request(tmp_path: Path) -> None:
     assert (len(places(*KNOWN)), len(places(*KNOWN, "--all-locations"))) == (5, 160)
     (entry,) = json.loads((tmp_path / "known.json").read_text())["files"]["a.stl"][:1]
     assert len(entry["places"]) == 160
+
+
+def test_an_unfinished_check_keeps_what_was_known(tmp_path: Path) -> None:
+    (tmp_path / "part.stl").write_bytes(stl(CROSSED))
+    write = ("part.stl", *KNOWN, "--write-baseline")
+    run(*write, cwd=tmp_path)
+    known = (tmp_path / "known.json").read_bytes()
+    assert "G001" in known.decode()
+    assert "F011" in run(*write, "--max-faces", "3", cwd=tmp_path).stdout
+    assert (tmp_path / "known.json").read_bytes() == known

@@ -18,6 +18,7 @@ import numpy as np
 
 from unitcad import files
 from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, Location, Point, rounded
+from unitcad.check.rules.f_limits import F011
 from unitcad.check.rules.registry import rules
 from unitcad.errors import UnitcadError, misfit
 from unitcad.geometry.arrays import Bools, Floats
@@ -65,10 +66,12 @@ def read(path: Path) -> Baseline:
 def write(path: Path, old: Baseline, reports: Sequence[FileReport]) -> Baseline:
     """Write the findings of the reports as known, and return them.
 
-    Entries of `old` for files that were not checked stay as long as the file exists.
+    Entries of `old` for files that were not checked, or not to the end, stay as long as the file exists.
     """
     checked = {
-        _key(path, report.path): [_entry(item) for item in report.findings if _may_be(item)] for report in reports
+        _key(path, report.path): [_entry(item) for item in report.findings if _may_be(item)]
+        for report in reports
+        if not report.has(F011.code)
     }
     stay = {key: known for key, known in old.files.items() if os.path.exists(os.path.join(path.parent, key))}
     entries = {key: known for key, known in sorted((stay | checked).items()) if known}

@@ -22,7 +22,7 @@ from unitcad.cache import Store, digest
 from unitcad.casting.procedure import procedure
 from unitcad.casting.written import files as written
 from unitcad.check import Options, check_bytes
-from unitcad.errors import UnitcadError
+from unitcad.errors import Unfinished
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.export.picture import NoPicture
 from unitcad.json_text import json_bytes
@@ -62,12 +62,6 @@ from unitcad.validation import from_data
 
 MESH_FORMATS = ("stl", "3mf")
 """The formats whose files the mesh rules look at."""
-
-
-class Unfinished(UnitcadError):
-    """A check that ran out of memory or time. It is no verdict: nothing of it is kept, and another try may succeed."""
-
-    exit_code = 1
 
 
 @dataclass

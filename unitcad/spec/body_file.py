@@ -18,8 +18,8 @@ from unitcad.check.one_file import check_file
 from unitcad.check.options import Options
 from unitcad.check.readers import sniff
 from unitcad.check.rules import s_scale
-from unitcad.check.rules.f_limits import Deadline, Limits, Unreadable
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.check.rules.f_limits import F011, Deadline, Limits, Unreadable
+from unitcad.errors import Refusal, Unfinished, UnitcadError
 from unitcad.files import LARGEST, read
 from unitcad.shape import Polyhedron
 from unitcad.shape.profile import GRID_PER_MM
@@ -38,19 +38,25 @@ def body_text(design: str, path: Path) -> str:
     """Return the text of a file's bodies.
 
     The bodies are checked as `unitcad check` does. Raises Refusal, with the finding's code, for what has an error, or a
-    size that suggests another unit; and for a file that can't be read or has too many triangles.
+    size that suggests another unit; and for a file that can't be read or has too many triangles. Raises Unfinished if
+    the check lacks time or memory.
     """
     try:
         read(path, largest=LARGEST)
     except UnitcadError as error:
         raise Refusal("design", design, str(error)) from None
-    report = check_file(path, Options())
+    # The solids of an assembly may share volume: a layer is what the ones inside it leave.
+    report = check_file(path, Options(ignore=("G002",)) if _is_step(path) else Options())
     scale = s_scale.likely_unit(report.facts, None) if sniff.kind_of(path.name) == "step" else ()
     for finding in (*report.findings, *scale):
+        if finding.code == F011.code:
+            raise Unfinished(f"{path}: its check was not finished: {finding.message}")
         if finding.severity == "error" or finding.code == s_scale.S001.code:
             raise Refusal("design", design, _sentence(finding))
     try:
         bodies = _bodies(path)
+    except Unfinished:
+        raise
     except (UnitcadError, Unreadable) as error:
         raise Refusal("design", design, str(error)) from None
     count = sum(len(faces) for _, _, faces in bodies)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.errors import UnitcadError
-from unitcad.workers import Pool, TimedOut
+from unitcad.errors import Unfinished, UnitcadError
+from unitcad.workers import NoWorker, Pool, TimedOut
 
 _ANGLE = 0.35
 """Largest angle between neighbouring facets of a curved face, radians."""
@@ -18,14 +18,20 @@ def step_bodies(path: Path, tolerance: float, seconds: float) -> list[tuple[str,
     """Return the name, vertices (n, 3) in mm and faces (m, 3) of every solid, in the order of the file.
 
     No facet lies farther than `tolerance` (mm) from its surface. Vertices of neighbouring B-rep faces are not joined.
-    Raises UnitcadError where OCCT fails, or takes longer than `seconds`: it runs in a process of its own.
+    OCCT runs in a worker. Raises UnitcadError if it fails, Unfinished if it lacks memory or time (`seconds`).
     """
     try:
         with Pool() as pool:
             return pool.submit(read_bodies, str(path), tolerance, seconds=seconds).result()
     except TimedOut:
-        raise UnitcadError(f"OCCT needs more than {seconds:g} s for it") from None
+        raise Unfinished(f"{path}: OCCT needs more than {seconds:g} s for it") from None
+    except MemoryError:
+        raise Unfinished(f"{path}: OCCT needs more memory for it") from None
+    except NoWorker:
+        raise
     except Exception as error:
+        if "SIGKILL" in str(error):  # the system's, when memory is short
+            raise Unfinished(f"{path}: {error}") from None
         raise UnitcadError(f"OCCT can't turn it into a mesh: {str(error)[:200]}") from error
 
 

@@ -217,7 +217,7 @@ def _refusing(path: Path) -> Iterator[None]:
         name = _EXTRA.get(missing.name or "", missing.name)
         raise missing_extra("lab", f"{path}: needs {name}") from None
     except TimedOut:
-        raise Unreadable(str(path), None, f"is damaged: its library did not return in {LONGEST_S:g} s") from None
+        raise Unreadable(str(path), None, f"was not read in {LONGEST_S:g} s: it is damaged or too large") from None
     except MemoryError:
         limit = f"is damaged, or takes more than {MEMORY >> 30} GiB to read"
         raise Unreadable(str(path), None, limit) from None
