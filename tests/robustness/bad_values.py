@@ -45,7 +45,8 @@ def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
         changed[table] = {"ours": {"like": ENTRY[table]}}
         if len(rest) > 2 and rest[1] != "value":
             shipped = [getattr(entry, rest[0]) for entry in getattr(catalogue, table)().values()]
-            changed[table]["ours"][rest[0]] = {"value": next((value.value for value in shipped if value), 1.0)}
+            unshipped = "none" if rest[0] == "support" else 1.0
+            changed[table]["ours"][rest[0]] = {"value": next((value.value for value in shipped if value), unshipped)}
     put(changed, path, value)
     return changed
 
