@@ -147,6 +147,17 @@ def test_copies_of_a_body_are_in_the_file_once(tmp_path):
         assert read.measures.volume == pytest.approx(occt.measure(occt.solids([body.shape])[0]).volume, rel=1e-9)
 
 
+@pytest.mark.parametrize("origin", range(3))
+def test_a_copy_at_the_origin_keeps_its_name(origin, tmp_path):
+    places = [(-20, 0, 0), (20, 0, 0)]
+    places.insert(origin, (0, 0, 0))
+    motors = [Body(f"m{i}", "unit", "motor", moved(cylinder(3, 0, 2), *at), (1, 0, 0)) for i, at in enumerate(places)]
+    step.write(tmp_path / "a.step", motors, "a")
+    back = step_reader.read(tmp_path / "a.step")
+    assert [body.name for body in back] == ["m0", "m1", "m2"]
+    assert [body.measures.box[0] + 3 for body in back] == pytest.approx([x for x, _, _ in places], abs=1e-9)
+
+
 def test_a_body_of_several_solids_keeps_them_all(tmp_path):
     three = Union((cylinder(1, 0, 1), moved(cylinder(1, 0, 1), 5, 0, 0), moved(cylinder(1, 0, 2), 9, 0, 0)))
     pair = [

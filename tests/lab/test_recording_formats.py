@@ -158,7 +158,7 @@ def test_a_library_that_never_returns_is_a_refusal(tmp_path: Path, monkeypatch: 
     FORMATS["plain.h5"](tmp_path / "plain.h5")
     monkeypatch.setattr(readers, "LONGEST_S", 0.5)
     monkeypatch.setattr(readers, "_read_in", hangs)
-    with pytest.raises(Unreadable, match="was not read in 0.5 s"):
+    with pytest.raises(Unreadable, match=r"was not read in 0\.5 s"):
         open_recording(tmp_path / "plain.h5")
 
 

@@ -75,7 +75,7 @@ def content(bodies: Sequence[Body], name: str) -> bytes:
         done = writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs)
         if not done or writer.WriteStream(stream) != IFSelect_ReturnStatus.IFSelect_RetDone:
             raise UnitcadError(f"OCCT could not write {name} as STEP")
-    text = _settled(_with_header(stream.getvalue().decode("ascii"), name))
+    text = _settled(_with_header(stream.getvalue().decode("ascii"), name), [body.name for body in bodies])
     counts = [len(occt.solids_in(solids[part[0]])) for part in parts]
     return _with_styles(text, [bodies[part[0]].colour for part in parts], counts).encode("ascii")
 
@@ -114,8 +114,8 @@ def _document(
         label = shapes.AddShape(solid, False)
         _name(label, of_part)
         labels.update(dict.fromkeys(part, label))
-    for i, (body, solid) in enumerate(zip(bodies, solids, strict=True)):
-        _name(shapes.AddComponent(assembly, labels[i], solid.Location()), body.name)
+    for i, solid in enumerate(solids):
+        shapes.AddComponent(assembly, labels[i], solid.Location())
     shapes.UpdateAssemblies()
     return document
 
@@ -127,24 +127,33 @@ def _name(label: TDF_Label, name: str) -> None:
 def _with_header(text: str, name: str) -> str:
     """Return the file with a header of ours: OCCT's holds the time of writing."""
     when = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", "315532800")), UTC)
-    shown = name.replace("\\", "\\\\").replace("'", "''").encode("ascii", "replace").decode()
-    header = f"FILE_NAME('{shown}.step','{when:%Y-%m-%dT%H:%M:%S}',('unitcad'),(''),'Open CASCADE','unitcad','');"
+    file = f"'{_escaped(name)}.step','{when:%Y-%m-%dT%H:%M:%S}'"
+    header = f"FILE_NAME({file},('unitcad'),(''),'Open CASCADE','unitcad','');"
     text, count = re.subn(r"FILE_NAME\(.*?\);", lambda _: header, text, count=1, flags=re.DOTALL)
     if count != 1:
         raise UnitcadError(f"OCCT wrote {name} without a header")
     return text
 
 
-def _settled(text: str) -> str:
-    """Return the file with one record a line, reals to 1e-11, and its assembly's occurrences counted from 1.
+def _escaped(name: str) -> str:
+    return name.replace("\\", "\\\\").replace("'", "''").encode("ascii", "replace").decode()
 
-    OCCT merges vertices in the order of their addresses, which leaves 1e-17 here or there; it wraps lines by what that
-    takes to print; and it counts occurrences on from the file before.
+
+def _settled(text: str, names: Sequence[str]) -> str:
+    """Return the file with one record a line, reals to 1e-11, and its assembly's occurrences counted and named.
+
+    OCCT merges vertices in the order of their addresses, which leaves 1e-17 in some coordinates, and wraps lines by
+    the length of these numbers. It continues the count of occurrences from the file before. It gives the name of a
+    copy at the origin to the first copy, so the names are written here: occurrences have the order of the bodies.
+    Raises UnitcadError if their number differs.
     """
     text = re.sub(r"\n +", "", text)
     text = re.sub(r"-0\.(?=[,)])|-?\d+\.\d*E-\d+|-?\d+\.\d{11,}", lambda real: _real(float(real[0])), text)
-    number = itertools.count(1)
-    return re.sub(r"(?<=NEXT_ASSEMBLY_USAGE_OCCURRENCE\(')\d+", lambda _: str(next(number)), text)
+    parts = re.split(r"(?<=NEXT_ASSEMBLY_USAGE_OCCURRENCE\()'\d+','[^']*'", text)
+    if len(parts) != len(names) + 1:
+        raise UnitcadError(f"OCCT wrote {len(parts) - 1} of {len(names)} bodies as STEP")
+    labels = [f"'{i}','{_escaped(name)}'" for i, name in enumerate(names, 1)]
+    return "".join(part + label for part, label in zip(parts, [*labels, ""], strict=True))
 
 
 def _with_styles(text: str, colours: Sequence[tuple[float, float, float]], counts: Sequence[int]) -> str:
