@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from unitcad.arrays.array_file import load_array
@@ -11,7 +13,7 @@ from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.catalogue import materials
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.validation import load
+from unitcad.validation import load, warnings
 
 LOOSE = ("no-fpcb", "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]", "motor.fill=false")
 
@@ -87,3 +89,40 @@ def test_a_pour_s_faults_are_data_and_its_words_agree(change: tuple[str, ...], s
         assert (pour.over_pot_life_min > 0) == ("after the pot life" in pour.verdict)
     assert any(pour.bubbles_stay for pour in pours) >= stays
     assert any(pour.over_pot_life_min > 0 for pour in pours) >= late
+
+
+@pytest.mark.parametrize(
+    ("motor", "item", "note"),
+    [
+        ({}, "LCM0720A3463F", "7 x 2 mm, assumed: motor.thickness_mm = 2 (2 to 2.65)"),
+        ({"thickness_mm": 2.3}, "LCM0720A3463F", "7 x 2.3 mm"),
+        ({"thickness_mm": 3.0}, "own motor", "7 x 3 mm"),
+        ({"diameter_mm": 8.0}, "own motor", "8 x 2 mm"),
+        ({"part": "VC0720B001F", "diameter_mm": 6.0}, "own motor", "6 x 2 mm"),
+    ],
+)
+def test_a_motor_of_other_sizes_has_no_part_number(motor: dict[str, str | float], item: str, note: str) -> None:
+    bill = {line.item: line.note for line in casting("embedded", *(f"motor.{k}={v}" for k, v in motor.items())).bill}
+    assert bill[item] == note
+    assert len({"own motor", "LCM0720A3463F", "VC0720B001F"} & bill.keys()) == 1
+
+
+def test_the_sheet_begins_with_what_to_measure() -> None:
+    spec = load("encapsulating")
+    assert spec.fpcb
+    sizes = [spec.motor.diameter_mm, spec.motor.thickness_mm, spec.fpcb.thickness_mm, spec.moulds.filament_mm]
+    first = casting("encapsulating").printing[0]
+    assert first.startswith("Measure first, with calipers (mm): ")
+    assert [float(number) for number in re.findall(r"_mm = ([0-9.]*[0-9])", first)[:4]] == sizes
+    assert "Nobody has measured motor.thickness_mm = 2 (2 to 2.65)." in first
+    (change,) = re.findall(r"--set (motor[^ ]*)", first)
+    assert "Nobody has measured" not in casting("encapsulating", change).printing[0]
+
+
+def test_a_cavity_without_a_way_out_for_leads_is_a_warning() -> None:
+    leads = ["no way out for the motor's leads: they lie between unit and skin; add a table [wires] or [fpcb]"]
+    assert warnings(load("no-fpcb")) == leads
+    assert warnings(load("no-fpcb", ["wires={ diameter_mm = 0.6 }"])) == []
+    assert warnings(load("encapsulating")) == []
+    open_ring = load(LOOSE[0], LOOSE[1:])  # leads leave upwards
+    assert leads[0] not in warnings(open_ring)

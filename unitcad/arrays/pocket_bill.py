@@ -10,7 +10,7 @@ from dataclasses import replace
 from unitcad.arrays.array import Array
 from unitcad.arrays.hidden_tails import hidden_tails
 from unitcad.arrays.patch_moulds import PatchMoulds
-from unitcad.casting.bill import Item, consumed
+from unitcad.casting.bill import Item, consumed, motor_name
 from unitcad.casting.figures import Batch
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import NEEDS, BenchStep
@@ -67,7 +67,7 @@ def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
     """Yield the lines of the units' bills for all units: their pieces once, what is used up as often as it is."""
     for spec, count, (folder, unit) in zip(array.units, counts(array), units.items(), strict=True):
         times = castings(count, unit)
-        inside = {spec.motor.part or "motor", "flexible circuit", "wire"}
+        inside = {motor_name(spec), "flexible circuit", "wire"}
         for item in unit.bill:
             if item.made.startswith(("printed", "cut")):
                 yield replace(item, note=f"for {folder}{f': {item.note}' if item.note else ''}")

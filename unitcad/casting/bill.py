@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 from unitcad.casting.drawings import grip_of, side_places, tape_places, tongue_prop
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch
 from unitcad.casting.steps import NEEDS, BenchStep
-from unitcad.catalogue import motors
 from unitcad.export.threemf import layout
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
 from unitcad.shape.column import extent
-from unitcad.text import cell, number
+from unitcad.spec import Spec, assumed_lengths, motor_of
+from unitcad.text import cell, listed, number
 
 
 @dataclass(frozen=True)
@@ -92,15 +92,21 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
         yield Item(item, count, "piece", made, note)
 
 
+def motor_name(spec: Spec) -> str:
+    """Return the motor's name on the bill: its part number, or "own motor" if the sizes are not that part's."""
+    return motor.name if (motor := motor_of(spec)) else "own motor"
+
+
 def _inside(moulds: MouldSet) -> Iterator[Item]:
     cells, spec = len(moulds.plan.layout.cells), moulds.spec
     note = f"{number(spec.motor.diameter_mm, 3)} x {number(spec.motor.thickness_mm, 3)} mm"
-    if spec.motor.part:
-        motor = motors(spec.motors)[spec.motor.part]
+    if assumed := assumed_lengths(spec):
+        note += f", assumed: {listed(assumed)}"
+    if motor := motor_of(spec):
         ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}
         note += "".join(f", {number(value, 3)} {unit}" for unit, value in ratings.items() if value)
         note += f", mass {number(motor.mass_g, 3)} g" if motor.mass_g else ""
-    yield Item(spec.motor.part or "motor", cells, "piece", "bought", note)
+    yield Item(motor_name(spec), cells, "piece", "bought", note)
     if any(body.kind == "circuit" for body in moulds.laid_later):
         yield Item("flexible circuit", 1, "piece", "bought", "for all motors, as circuit.dxf and circuit-pads.csv say")
     if fpcb := spec.fpcb:

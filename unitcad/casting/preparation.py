@@ -28,7 +28,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.ribs import ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
 from unitcad.shape.lettering import seen
-from unitcad.spec import printer_of
+from unitcad.spec import MOTOR_SIZES, assumed_lengths, printer_of
 from unitcad.text import listed, number, spaced
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> tup
     time = print_min(spec, solid_mm3, max(standing, BLADE_HEIGHT if plan.of_kind("blade") else 0.0, tallest_mm))
     takes = f"Takes about {duration(5 * max(round(time / 5), 1))}"
     lines = [
+        _measuring(moulds),
         f"{plates} ({count}; moulds/ has them singly as STL too). They lie in it as they are printed: {attitude}. "
         "Turn none of them.",
         f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm, no supports.",
@@ -106,6 +107,26 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> tup
             "spec where they do not."
         )
     return tuple(lines)
+
+
+def _measuring(moulds: MouldSet) -> str:
+    """Say what to measure before printing, and how to build again with other sizes."""
+    spec = moulds.spec
+    sizes = {f"motor.{size}": getattr(spec.motor, size) for size in MOTOR_SIZES}
+    if spec.fpcb:
+        sizes["fpcb.thickness_mm"] = spec.fpcb.thickness_mm
+    if moulds.plan.of_kind("stub"):
+        sizes["moulds.filament_mm"] = spec.moulds.filament_mm
+    drawn = ", ".join(f"{key} = {number(value, 3)}" for key, value in sizes.items())
+    assumed = assumed_lengths(spec)
+    unsure = f" Nobody has measured {listed(assumed)}." if assumed else ""
+    again = "run unitcad build spec.toml --set motor.thickness_mm=2.3 in this folder (one --set for each size)"
+    if moulds.makes != "unit":
+        again = f"change it in {moulds.source}, and run unitcad build {moulds.source} in this folder"
+    return (
+        f"Measure first, with calipers (mm): {drawn}.{unsure} If a size differs by more than 0.05 mm, build again with "
+        f"yours before you print: {again}."
+    )
 
 
 def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:

@@ -10,8 +10,8 @@ from unitcad.casting.steps import in_short
 from unitcad.check.findings import counted
 from unitcad.pipeline.manifest import row
 from unitcad.pipeline.write import PAGE, Built
-from unitcad.spec import Spec
-from unitcad.text import number
+from unitcad.spec import Spec, assumed_lengths
+from unitcad.text import listed, number
 
 
 def summary(spec: Spec, built: Built) -> Iterator[str]:
@@ -26,6 +26,8 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         cells = json.loads((built.folder / "casting.json").read_bytes())["cells"] if manifest["casting"] else 1
         each = f"{cells} units, each " if cells > 1 else ""
         yield f"{each}{number(spec.diameter_mm, 3)} mm across, {number(height, 3)} mm high{silicone}"
+    if assumed := assumed_lengths(spec):
+        yield f"assumed: {listed(assumed)}; measure the motor before you print"
     if manifest["casting"]:
         yield from in_short(json.loads((built.folder / "casting.json").read_bytes()))
     checks, check = manifest["laws"], manifest["check"]

@@ -12,8 +12,8 @@ CIRCUIT_STOCK = (0.05, 0.5)
 
 
 def warnings(spec: Spec) -> list[str]:
-    """Return the warnings of a spec: layers thinner than their silicone's casting floor, play, the design's own."""
-    return [*_thin_layers(spec), *_circuit_stock(spec), *_play(spec), *_design(spec)]
+    """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's."""
+    return [*_thin_layers(spec), *_leads(spec), *_circuit_stock(spec), *_play(spec), *_design(spec)]
 
 
 def _thin_layers(spec: Spec) -> list[str]:
@@ -27,6 +27,12 @@ def _thin_layers(spec: Spec) -> list[str]:
             if 0 < value < floor - EPS
         ]
     return sentences
+
+
+def _leads(spec: Spec) -> list[str]:
+    if spec.fpcb or spec.wires or not design_of(spec).caps:
+        return []
+    return ["no way out for the motor's leads: they lie between unit and skin; add a table [wires] or [fpcb]"]
 
 
 def _circuit_stock(spec: Spec) -> list[str]:

@@ -7,6 +7,7 @@ import io
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.circuit.wiring import Wiring
+from unitcad.spec import motor_of
 
 
 def pad_table(array: Array, laid: Wiring) -> bytes:
@@ -19,7 +20,7 @@ def pad_table(array: Array, laid: Wiring) -> bytes:
     rows.writerow(("name", "what", "x_mm", "y_mm", "z_mm", "diameter_mm", "unit", "motor"))
     for pad, place in zip(laid.pads, array.places, strict=True):
         at = (_mm(pad.x), _mm(pad.y), _mm(laid.low), _mm(2 * pad.radius))
-        rows.writerow((pad.name, "pad", *at, place.unit.name, place.unit.motor.part or ""))
+        rows.writerow((pad.name, "pad", *at, place.unit.name, motor.name if (motor := motor_of(place.unit)) else ""))
     width = _mm(2 * laid.spine[-1].half)
     rows.writerow(("tail", "end of the tail", _mm(laid.end[0]), _mm(laid.end[1]), _mm(laid.low), width, "", ""))
     return text.getvalue().encode()

@@ -1,0 +1,52 @@
+"""The printer and the motor that a spec chooses from the catalogue."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from msgspec import structs
+
+from unitcad import catalogue
+from unitcad.spec.effective import Moulds, Spec
+from unitcad.text import number
+
+MOTOR_SIZES = ("diameter_mm", "thickness_mm")
+
+
+def printer_of(spec: Spec) -> catalogue.Printer:
+    """Return the catalogue's printer with what the spec's moulds override."""
+    return _overridden(catalogue.printers(spec.printers)[spec.moulds.printer], spec.moulds)
+
+
+@lru_cache(maxsize=16)
+def _overridden(printer: catalogue.Printer, moulds: Moulds) -> catalogue.Printer:
+    overridden = {
+        name: catalogue.Value(value, "spec", "moulds")
+        for name, value in structs.asdict(moulds).items()
+        if hasattr(printer, name) and float(getattr(printer, name) or 0.0) != value
+    }
+    return structs.replace(printer, **overridden)
+
+
+def motor_of(spec: Spec) -> catalogue.Motor | None:
+    """Return the catalogue's motor, or None if the spec names none or overrides a size beyond the entry's range."""
+    motor = catalogue.motors(spec.motors)[spec.motor.part] if spec.motor.part else None
+    if motor and all(_within(getattr(spec.motor, size), getattr(motor, size)) for size in MOTOR_SIZES):
+        return motor
+    return None
+
+
+def assumed_lengths(spec: Spec) -> list[str]:
+    """Return the motor's lengths that nobody has measured, with the range of each."""
+    motor = motor_of(spec)
+    sizes = [(size, getattr(motor, size)) for size in MOTOR_SIZES] if motor else []
+    return [
+        f"motor.{size} = {number(value.value, 3)} ({number(value.low, 3)} to {number(value.high, 3)})"
+        for size, value in sizes
+        if value.status == "assumed" and value.value == getattr(spec.motor, size)
+    ]
+
+
+def _within(size: float, entry: catalogue.Value[float]) -> bool:
+    low, high = (entry.value if end is None else end for end in (entry.low, entry.high))
+    return low <= size <= high
