@@ -178,7 +178,8 @@ def test_a_start_removes_the_leftovers_of_a_killed_server_and_none_of_a_live_one
     out.mkdir()
     with scratch(out) as live:
         killed = (
-            "import os, pathlib, signal, sys; from unitcad.files import scratch; kept = scratch(pathlib.Path(sys.argv[1]))"
+            "import os, pathlib, signal, sys; from unitcad.files import scratch"
+            "; kept = scratch(pathlib.Path(sys.argv[1]))"
             "; kept.__enter__(); os.kill(os.getpid(), signal.SIGKILL)"
         )
         subprocess.run([sys.executable, "-P", "-c", killed, str(out)], check=False)

@@ -35,8 +35,9 @@ HEADERS = [
     "X-Unitcad-Token: \xff", "Accept: \xff\xfe", "Content-Type: \xff",
 ]  # fmt: skip
 VALUES: list[Any] = [None, [None], {"a": {"b": None}}, DEEP, [[]], {}, [{}], "", "\0", "\u202e", 10**30, 1e308, True]
+PLACES = ["name", "layers", "layers.0", "motor", "motor.x"]
 EDITS = [
-    *({"path": path, "value": value} for path in ("name", "layers", "layers.0", "motor", "motor.x") for value in VALUES),
+    *({"path": path, "value": value} for path in PLACES for value in VALUES),
     *({"path": path, "value": 1} for path in (".", "..", "a.", "a.b.c", ".".join("a" * 150), "\n", "layers.9", '"')),
     *({"path": path, "remove": True} for path in (".", "layers", "layers.0", "layers.x", "name.x", "motor.part.x")),
     *({"path": "name", "value": value, "toml": True} for value in ("", "[" * 400, "1979-05-27", "{a=1", "'''", 5)),
