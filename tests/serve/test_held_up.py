@@ -41,7 +41,9 @@ def behind_a_gate(app: Any, client: Any) -> None:
     async def both() -> None:
         listening = socket.create_server(("127.0.0.1", 0))
         gate = Gate(app, TOKEN, frozenset({"x:1"}), "cookie", Keys(TOKEN), Limits(requests=1))
-        config = uvicorn.Config(gate, http=Quick, ws="none", lifespan="off", log_level="critical")
+        config = uvicorn.Config(
+            gate, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_graceful_shutdown=1
+        )
         server = uvicorn.Server(config)
         running = asyncio.create_task(server.serve(sockets=[listening]))
         try:
