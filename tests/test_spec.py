@@ -263,3 +263,11 @@ def test_the_docs_name_every_key() -> None:
     for table, entry in fields_of(Spec).items():
         for field in fields_of(table_in(entry.type)) if table_in(entry.type) else {table: None}:
             assert f"{field}`" in page or f"[{field}." in page, f"{table}.{field} is not in docs/spec.md"
+
+
+def test_a_name_has_at_most_120_characters() -> None:
+    data = tomllib.loads(templates()["single-embedded"].read_text("utf-8"))
+    longest = "x" * 120
+    assert longest in from_data({**data, "materials": {longest: {"like": "ecoflex-00-30"}}}).materials
+    with pytest.raises(Refusal, match=r"^materials\.x{20}\.\.\. = 121: a name has at most 120 characters$"):
+        from_data({**data, "materials": {longest + "x": {"like": "ecoflex-00-30"}}})

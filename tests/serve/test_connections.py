@@ -129,7 +129,7 @@ def test_at_all_addresses_a_host_is_an_address_or_an_own_name(wildcard: str) -> 
 
 
 def test_a_server_at_all_addresses_answers_at_those_of_the_machine(tmp_path: Path) -> None:
-    with serving(tmp_path, "embedded", "--host", "0.0.0.0", "--token", "a-token-of-the-lab") as own:
+    with serving(tmp_path, "embedded", "--host", "0.0.0.0", environment={"UNITCAD_TOKEN": "a-token-of-the-lab"}) as own:
         assert "0.0.0.0" not in own.base
         assert own.send("/")[0] == 200
         for host, status in (("127.0.0.1", 200), ("evil.example", 421)):

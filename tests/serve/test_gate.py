@@ -119,7 +119,7 @@ def test_a_folder_s_key_opens_its_files_alone(tmp_path: Path, text: str) -> None
     for file in ("one/report.html", "one/deep/base.stl", "other/spec.toml", "at-root.json"):
         (tmp_path / "out" / file).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "out" / file).write_text("{}")
-    with serving(tmp_path, "embedded", "--token", "a-token-of-the-lab") as own:
+    with serving(tmp_path, "embedded", environment={"UNITCAD_TOKEN": "a-token-of-the-lab"}) as own:
         address = Keys("a-token-of-the-lab").address("one/report.html")
         key = address.partition("/")[0]
         for file in ("one/report.html", "one/deep/base.stl"):

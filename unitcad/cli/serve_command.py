@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -18,16 +19,17 @@ def serve(
     out: Annotated[Path, typer.Option("-o", "--out", help="Where builds and sweeps from the page go.")] = Path("out"),
     port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = 0,
     host: Annotated[
-        str, typer.Option(help="The address that it binds to; another one than the loopback needs --token.")
+        str, typer.Option(help="The address that it binds to; another one than the loopback needs UNITCAD_TOKEN.")
     ] = "127.0.0.1",
-    token: Annotated[str | None, typer.Option(help="The token in the address; left out, a random one.")] = None,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
     code: AllowCode = False,
 ) -> None:
     """Open a live page of a spec in the browser.
 
     A change of a number shows unit, moulds, refusals and estimate at once. Ctrl-C ends it.
+    The environment variable UNITCAD_TOKEN is the token in the address; left out, a random one.
     """
+    from unitcad.serve.addresses import TOKEN
     from unitcad.serve.server import serve as run
 
     def ready(address: str) -> None:
@@ -39,4 +41,5 @@ def serve(
             # open() waits for the end of a browser in the terminal, or of one that $BROWSER names.
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
+    token = os.environ.pop(TOKEN, None)  # not for the programs that it starts
     run(source, host=host, port=port, token=token, out=out, code=code, ready=ready)

@@ -9,6 +9,8 @@ import socket
 from unitcad.errors import WrongArgument
 
 LOOPBACK = "127.0.0.1"
+TOKEN = "UNITCAD_TOKEN"
+"""Environment variable with the token; other users of a machine can read a command's arguments."""
 _OWN = ("localhost", "127.0.0.1", "[::1]")
 ANY_ADDRESS = "*"
 """Stands for every Host that is an address itself, not a name: no other site's name can be made to mean one."""
@@ -23,10 +25,10 @@ def check_address(host: str, token: str | None) -> None:
     except ValueError:
         loopback = host == "localhost"
     if not loopback and not token:
-        limit = "is not this machine's loopback address; another one needs a token of yours too (--token)"
+        limit = f"is not this machine's loopback address; another one needs a token of yours, in the variable {TOKEN}"
         raise WrongArgument("host", host, limit, LOOPBACK)
     if token is not None and (len(token) < 16 or not token.isascii() or not token.isprintable() or " " in token):
-        raise WrongArgument("token", "(not shown)", "needs at least 16 printable ASCII characters without spaces")
+        raise WrongArgument(TOKEN, "(not shown)", "needs at least 16 printable ASCII characters without spaces")
 
 
 def hosts(host: str, port: int) -> frozenset[str]:

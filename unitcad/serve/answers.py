@@ -33,6 +33,13 @@ def respond(message: bytes, trusted: bytes) -> bytes:
 def answered(ask: Ask, trusted: Trusted) -> Answer:
     """Return the answer to a question. A fault of the text or of a value is in it; nothing is raised for one."""
     try:
+        return _answered(ask, trusted)
+    except RecursionError:
+        return Answer(text=ask.text, faults=[Fault("the text: nests too deeply")])
+
+
+def _answered(ask: Ask, trusted: Trusted) -> Answer:
+    try:
         text = edited(ask.text, ask.edits)
     except UnitcadError as error:
         return Answer(text=ask.text, faults=[_fault(error)])

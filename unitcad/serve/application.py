@@ -5,24 +5,24 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hashlib
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+import os
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path, PurePosixPath
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 import msgspec
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.responses import PlainTextResponse, RedirectResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
-from unitcad.files import read_text, write
+from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.report.page import page_data
 from unitcad.serve.campaign_page import refused
 from unitcad.serve.gate import Gate, Limits
-from unitcad.serve.jobs import Jobs
+from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
 from unitcad.serve.keys import Keys
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
@@ -93,6 +93,7 @@ class Live:
         self.keys = Keys(setting.token)
         self.questions = Questions(setting.text, setting.trusted)
         self.jobs = Jobs(setting.out, self.keys)
+        self._saving = asyncio.Lock()
 
     @contextlib.asynccontextmanager
     async def lifespan(self, app: Starlette) -> AsyncIterator[None]:
@@ -116,7 +117,12 @@ class Live:
             return self._keeping(RedirectResponse("/", 303))
         if setting.campaign:
             return await self._campaign(setting.campaign)
-        batch = page_data(setting.batch, modelled=None)[0] if setting.batch else None
+        batch = None
+        if setting.batch:
+            try:
+                batch = (await asyncio.to_thread(page_data, setting.batch, modelled=None))[0]
+            except (UnitcadError, OSError, RuntimeError) as error:  # RuntimeError: a loop of links
+                return PlainTextResponse(f"{error}\n", 422)
         html = live_page(setting.text, setting.name, str(setting.folder), setting.starts, batch)
         return self._html(html)
 
@@ -155,12 +161,10 @@ class Live:
     async def _save(self, save: Save) -> bytes:
         path = self.setting.folder / save.name
         content = save.text.encode("utf-8")
-        there = path.exists() or path.is_symlink()
-        if there and not save.replace:
-            same = path.is_file() and not path.is_symlink() and path.read_bytes() == content
-            if not same:
-                raise Refusal("name", save.name, "is there already; replace it, or choose another name")
-        write(path, content)
+        if names_device(save.name):
+            raise Refusal("name", save.name, "is the name of a device on Windows", f"my-{save.name}")
+        async with self._saving:
+            await asyncio.to_thread(_write, path, content, save.replace)
         # Work in progress is saved too, and the page says that it is refused.
         refused = None
         try:
@@ -177,8 +181,9 @@ class Live:
 
     async def _build(self, build: Build) -> bytes:
         given, code = await self._effective(build.text)
-        arguments = ["build", "{spec}", "-o", _plain(self.setting.out), *code]
-        state = await self.jobs.start("the build", arguments, {"spec.toml": given["text"]})
+        out = self.setting.out
+        arguments = ["build", "{spec}", "-o", _plain(out), *code]
+        state = self.jobs.start("the build", arguments, {"spec.toml": given["text"]}, build_folder(out))
         return msgspec.json.encode(state)
 
     async def sweep(self, request: Request) -> Response:
@@ -195,16 +200,11 @@ class Live:
             values = [int(value) for value in values]  # a count of units takes no 3.0
         asked = f'base = "spec.toml"\n\n[sweep]\nmode = "product"\n{toml(sweep.key)} = {toml(values)}\n'
         # A folder of its own, in which the sweep file stays beside the results.
-        folder = self._free_folder("sweep")
-        arguments = ["batch", "{sweep}", "-o", _plain(folder / "results"), "--report", *code]
+        arguments = ["batch", "{sweep}", "-o", f"{{folder}}/{RESULTS}", "--report", *code]
         # The base leaves out what the text leaves out: defaults follow the key's values as they do on the page.
         files, first = {"spec.toml": given["asked"], "sweep.toml": asked}, f"0 of {len(values)} variants"
-        state = await self.jobs.start("the sweep", arguments, files, folder, first)
+        state = self.jobs.start("the sweep", arguments, files, sweep_folder(self.setting.out), first)
         return msgspec.json.encode(state)
-
-    def _free_folder(self, name: str) -> Path:
-        """Return the first of NAME-1, NAME-2, ... that is not there."""
-        return next(path for i in count(1) if not (path := self.setting.out / f"{name}-{i}").exists())
 
     async def _effective(self, text: str) -> tuple[dict[str, Any], list[str]]:
         """Return the effective spec of a text as `text`, the text without files as `asked`, the option its code needs.
@@ -233,7 +233,7 @@ class Live:
             elif path is None:
                 return PlainTextResponse("no such variant\n", 404)
             else:
-                text = read_text(path)
+                text = await asyncio.to_thread(read_text, path)
             return _json(msgspec.json.encode({"text": text}))
         except WrongArgument as error:
             return PlainTextResponse(f"no such variant: {error}\n", 404)
@@ -260,10 +260,14 @@ class Live:
         """Answer with a file of a result, which runs apart from this server; its path begins with a folder's key."""
         asked = self.keys.file(request.path_params["path"])
         path = _within(self.setting.out, asked) if asked else None
-        if path is None:
+        try:
+            file = open(path, "rb", opener=regular(links=False)) if path else None  # noqa: SIM115  # by _pieces
+        except (UnitcadError, OSError):  # it has gone meanwhile, or may not be read
+            file = None
+        if path is None or file is None:
             return PlainTextResponse("no such file\n", 404)
         headers = {"content-security-policy": _SANDBOX}
-        return FileResponse(path, media_type=FILE_TYPES[path.suffix], headers=headers)
+        return StreamingResponse(_pieces(file), media_type=FILE_TYPES[path.suffix], headers=headers)
 
 
 async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaitable[bytes]]) -> Response:
@@ -285,6 +289,23 @@ async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaita
         return _json(msgspec.json.encode({"faults": [Fault(str(error), error.field, error.as_dict()["nearest"])]}), 422)
     except (UnitcadError, OSError) as error:
         return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 422)
+
+
+def _write(path: Path, content: bytes, replace: bool) -> None:
+    """Write a spec; without `replace`, only if nothing else than the same is there. Raises Refusal, OSError."""
+    if os.path.lexists(path) and not replace:
+        same = False
+        with contextlib.suppress(UnitcadError):  # a link, no regular file, or larger
+            same = read(path, largest=len(content), links=False) == content
+        if not same:
+            raise Refusal("name", path.name, "is there already; replace it, or choose another name")
+    write(path, content)
+
+
+def _pieces(file: IO[bytes]) -> Iterator[bytes]:
+    with file:
+        while piece := file.read(1 << 18):
+            yield piece
 
 
 def _json(content: bytes, status: int = 200) -> Response:
@@ -312,6 +333,6 @@ def _within(root: Path, asked: str) -> Path | None:
     try:
         real = path.resolve(strict=True)
         inside = real.is_relative_to(root.resolve(strict=True))
-    except (OSError, ValueError):
+    except (OSError, RuntimeError, ValueError):  # RuntimeError: a loop of links
         return None
     return real if inside and real.is_file() else None

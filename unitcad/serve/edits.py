@@ -7,7 +7,7 @@ from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import InlineTable
+from tomlkit.items import AoT, InlineTable
 
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.serve.messages import Edit
@@ -55,6 +55,8 @@ def _apply(document: Any, edit: Edit) -> None:
     if isinstance(node, list):
         if edit.remove:
             del node[_index(node, last, edit)]
+        elif isinstance(node, AoT) and not isinstance(edit.value, dict):
+            raise Refusal(edit.path, edit.value, "the entries of this list are tables")
         elif last == str(len(node)):
             node.append(_item(_value(edit)))
         else:

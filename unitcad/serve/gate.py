@@ -22,6 +22,8 @@ TOKEN_HEADER = b"x-unitcad-token"
 FILES = "/files/"
 LARGEST_BODY = 4 << 20
 """Bytes of a request's body."""
+LONGEST_TARGET = 4000
+"""Bytes of a request's path and query: each of a path's folders costs a check of its key."""
 BODY_S = 10.0
 """Seconds that a request's body may take."""
 MOST_REQUESTS = 32
@@ -78,7 +80,7 @@ class Gate:
             if isinstance(body, tuple):
                 await self._answer(*body, scope, receive, send)
             else:
-                await self.app(scope, _at_once(body, receive), _with_headers(send))
+                await self._answered(body, scope, receive, _with_headers(send))
         finally:
             self._under_way -= 1
 
@@ -91,6 +93,8 @@ class Gate:
         origins = [value.decode("latin-1").lower() for name, value in headers if name == b"origin"]
         if any(origin != f"http://{hosts[0]}" for origin in origins):
             return 403, "a request from another site"
+        if len(scope["raw_path"]) + len(scope["query_string"]) > LONGEST_TARGET:
+            return 414, f"an address has at most {LONGEST_TARGET} bytes"
         keyed = self._has_folder_key(scope)
         if not (keyed and _is_opened(headers)) and any(
             name == b"sec-fetch-site" and value in (b"cross-site", b"same-site") for name, value in headers
@@ -114,7 +118,7 @@ class Gate:
     def _has_token(self, scope: Scope, headers: list[tuple[bytes, bytes]]) -> bool:
         given = [value for name, value in headers if name == TOKEN_HEADER]
         if scope["method"] == "GET":
-            query = parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=10)
+            query = parse_qs(scope["query_string"].decode("latin-1"))
             given += [value.encode("latin-1", "replace") for value in query.get("token", [])]
             if scope["path"] == "/" and self._has_cookie(headers):
                 return True
@@ -127,6 +131,19 @@ class Gate:
         return any(
             key == self.cookie and hmac.compare_digest(text, self.keys.cookie.encode()) for key, _, text in parts
         )
+
+    async def _answered(self, body: bytes, scope: Scope, receive: Receive, send: Send) -> None:
+        """Have the app answer, as long as somebody waits for it."""
+        gone = asyncio.create_task(_gone(receive))
+        answering = asyncio.ensure_future(self.app(scope, _at_once(body, gone), send))
+        try:
+            await asyncio.wait([answering, gone], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (answering, gone):
+                task.cancel()
+            await asyncio.wait([answering, gone])
+        if not answering.cancelled():
+            answering.result()
 
     async def _body(self, receive: Receive) -> bytes | tuple[int, str]:
         """Return a request's body, or the status and the reason for which it is refused."""
@@ -159,12 +176,19 @@ def _is_opened(headers: list[tuple[bytes, bytes]]) -> bool:
     return (said.get(b"sec-fetch-mode"), said.get(b"sec-fetch-dest")) == (b"navigate", b"document")
 
 
-def _at_once(body: bytes, receive: Receive) -> Receive:
-    """Return a `receive` that gives a body that is there already, then what comes after it."""
+async def _gone(receive: Receive) -> Message:
+    """Wait until the asker has left or has the whole answer."""
+    while (message := await receive())["type"] != "http.disconnect":
+        pass
+    return message
+
+
+def _at_once(body: bytes, gone: asyncio.Task[Message]) -> Receive:
+    """Return a `receive` that gives a body that is there already, then that the asker is gone."""
     left: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def whole() -> Message:
-        return left.pop() if left else await receive()
+        return left.pop() if left else await asyncio.shield(gone)
 
     return whole
 

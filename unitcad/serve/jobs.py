@@ -7,11 +7,13 @@ import os
 import secrets
 import shutil
 import sys
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from itertools import count
 from pathlib import Path
 
 from unitcad.errors import UnitcadError
+from unitcad.files import scratch
 from unitcad.serve.keys import Keys
 from unitcad.serve.messages import JobState
 from unitcad.workers import STAGES, Call, Pool, run_here
@@ -24,14 +26,16 @@ GRACE_S = 10.0
 """Seconds that a cancelled job may take to write what it has."""
 MOST_LINES = 200
 """Lines of a job that are kept."""
+RESULTS = "results"
+"""Folder of a sweep's results in its folder."""
 
 
 class Job:
     """A command under way or ended: `state` is what the page is told."""
 
-    def __init__(self, title: str, stage: str, scratch: Path | None) -> None:
+    def __init__(self, title: str, stage: str) -> None:
         self.state = JobState(job=secrets.token_hex(8), title=title, stage=stage, lines=[])
-        self.scratch = scratch
+        self.ends = ExitStack()
         self.printed = ""
         self.call: Call | None = None
         self.watching: asyncio.Task[None] | None = None
@@ -55,34 +59,36 @@ class Jobs:
         self.known: dict[str, Job] = {}
         self.pool: Pool | None = None
 
-    async def start(
-        self, title: str, arguments: Sequence[str], files: dict[str, str], folder: Path | None = None, stage: str = ""
+    def start(
+        self,
+        title: str,
+        arguments: Sequence[str],
+        files: dict[str, str],
+        place: AbstractContextManager[Path],
+        stage: str = "",
     ) -> JobState:
-        """Run `unitcad` with arguments in which {NAME} stands for the path of a file of `files`.
+        """Run `unitcad` with arguments in which {folder} is `place`, and {NAME} the path of a file of `files` in it.
 
-        The files stay in `folder`, or go with the job without one.
-        `stage` is the first one's name. Raises UnitcadError while another job runs, OSError.
+        `place` ends with the job. `stage` is the first one's name. No `await` stands between the look for another job
+        and the start. Raises UnitcadError while another job runs, OSError.
         """
         running = next((job for job in self.known.values() if not job.state.ended), None)
         if running:
             raise UnitcadError(f"{running.state.title} is under way; wait for it or cancel it")
-        job = Job(title, stage, None if folder else Path(tempfile.mkdtemp(prefix="unitcad-serve-")))
-        self.known[job.state.job] = job
-        try:
-            there = folder or job.scratch
-            assert there
-            there.mkdir(parents=True, exist_ok=True)
+        job = Job(title, stage)
+        with ExitStack() as ends:
+            folder = ends.enter_context(place)
             for name, text in files.items():
-                (there / name).write_text(text, encoding="utf-8")
-            given = [word.format(**{Path(name).stem: str(there / name) for name in files}) for word in arguments]
+                (folder / name).write_text(text, encoding="utf-8")
+            paths = {Path(name).stem: folder / name for name in files}
+            given = [word.format(folder=folder, **paths) for word in arguments]
             # PYTHONUNBUFFERED: progress comes as it is made.
             environment = {**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "120", STAGES: STAGE}
             command = [sys.executable, "-P", "-m", "unitcad", *given]
             self.pool = self.pool or Pool()
             job.call = self.pool.submit(run_here, command, b"", environment, lines=True, heard=job.hear)
-        except BaseException:
-            del self.known[job.state.job]
-            raise
+            job.ends = ends.pop_all()
+        self.known[job.state.job] = job
         for old in list(self.known)[:-MOST_KEPT]:
             del self.known[old]
         job.watching = asyncio.create_task(self._watch(job, job.call))
@@ -124,5 +130,44 @@ class Jobs:
             job.hear(("err", str(error)))
         finally:
             job.state.ended = True
-            if job.scratch:
-                shutil.rmtree(job.scratch, ignore_errors=True)
+            job.ends.close()
+
+
+@contextmanager
+def build_folder(out: Path) -> Iterator[Path]:
+    """Make a folder for a build's files, which goes with the block; of a killed server the next start removes it."""
+    with _made(out), scratch(out) as folder:
+        yield folder
+
+
+@contextmanager
+def sweep_folder(out: Path) -> Iterator[Path]:
+    """Make the first of sweep-1, sweep-2, ... that is not there; it goes with the block unless `results` are in it."""
+    with _made(out):
+        folder = next(path for i in count(1) if _is_new(path := out / f"sweep-{i}"))
+        try:
+            yield folder
+        finally:
+            if not (folder / RESULTS).is_dir():
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def _made(out: Path) -> Iterator[None]:
+    """Make a folder, and remove it with the block if it was not there and has nothing in it."""
+    before = out.is_dir()
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        yield
+    finally:
+        if not before:
+            with suppress(OSError):  # it holds something
+                out.rmdir()
+
+
+def _is_new(folder: Path) -> bool:
+    """Make a folder; tell whether it was not there."""
+    with suppress(FileExistsError):
+        folder.mkdir()
+        return True
+    return False

@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct
 
+from unitcad.spec.convert import DEEPEST
+
 LARGEST_TEXT = 1_000_000
 """Characters of a spec that the page may send."""
 Text = Annotated[str, Meta(max_length=LARGEST_TEXT)]
@@ -29,6 +31,16 @@ class Edit(Message, frozen=True, kw_only=True):
     value: bool | int | float | str | list[Any] | dict[str, Any] | None = None
     remove: bool = False
     toml: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what TOML can't hold, which msgspec tells as a fault of the message."""
+        if not (self.remove and self.value is None) and not _is_toml(self.value, DEEPEST):
+            raise ValueError(f"an edit's value has no null and nests at most {DEEPEST} deep")
+
+
+def _is_toml(value: Any, deepest: int) -> bool:
+    inside = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return value is not None and deepest >= 0 and all(_is_toml(each, deepest - 1) for each in inside)
 
 
 class Ask(Message, frozen=True, kw_only=True):

@@ -14,11 +14,12 @@ from unitcad.arrays.array_names import array_templates, is_array
 from unitcad.arrays.array_units import expanded
 from unitcad.errors import Refusal, UnitcadError, WrongArgument, missing_extra
 from unitcad.files import read_text
-from unitcad.pipeline.write import ARRAY
+from unitcad.pipeline.write import ARRAY, clear_leftovers
 from unitcad.report.page import page_data
 from unitcad.report.read_results import is_array_folder, is_variant
 from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown
 from unitcad.serve.array_answers import array_files
+from unitcad.serve.jobs import RESULTS
 from unitcad.serve.messages import Source, Trusted
 from unitcad.spec import parse_toml, read_toml
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
@@ -55,6 +56,9 @@ def serve(
     source, batch = _source(source)
     if batch and out == DEFAULT_OUT:
         out = batch.resolve().with_name(f"{batch.resolve().name}-live")
+    for folder in (out, *out.glob(f"sweep-*/{RESULTS}")):
+        with contextlib.suppress(OSError):  # it is not there, or not to be changed
+            clear_leftovers(folder)
     known = templates() | custom_templates() | array_templates()
     path = named_file(source or default_template(), known, "spec", WrongArgument)
     text = read_text(path)

@@ -32,6 +32,8 @@ _MOST_KEYS = 5
 _LARGEST_INT = 2**63 - 1
 SOURCES = frozenset({"design_source", "fit_source"})
 """The fields whose text has lines."""
+LONGEST_NAME = 120
+"""Characters that the name of a key or of a table may have."""
 DEEPEST = 20
 """Tables in tables that data may have: more than any spec or sweep needs."""
 
@@ -66,6 +68,9 @@ def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
             raise Refusal(".".join(field.split(".")[:3]), "...", f"nests more than {DEEPEST} tables deep")
         for key, below in node.items() if isinstance(node, Mapping) else enumerate(node):
             if isinstance(key, str):
+                if len(key) > LONGEST_NAME:
+                    name = f"{printable(key[:20])}..."
+                    raise Refusal(_below(field, name), len(key), f"a name has at most {LONGEST_NAME} characters")
                 _check_text(key, printable(_below(field, key)))
             check_plain(below, _below(field, key), depth + 1)
 
