@@ -10,7 +10,7 @@ import tomli_w
 from msgspec import structs
 
 from unitcad.errors import Refusal, UnitcadError, unknown_name
-from unitcad.spec import Spec, from_json, to_data, to_json, to_toml
+from unitcad.spec import Spec, from_json, parse_toml, to_data, to_json, to_toml
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.spec.fields import fields_of, table_in
 from unitcad.validation import from_data, load, override, read, templates, warnings
@@ -117,9 +117,13 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("diameter_mm='14'", "number"),
         ("diameter_mm=true", "number"),
         ("layers=[]", r"^layers = .*must not be empty"),
-        ("layers=3", r"^layers = 3: takes a list"),
+        ("diameter_mm=-14", r"must be at least 1, and the motor .* need 12\.2 mm; nearest accepted: 12\.2$"),
+        ("layers=3", r"^layers = 3: takes a list: one \[\[layers\]\] table or more"),
+        ("output.formats=stl", r"takes a list such as \[\"stl\"\]; nearest accepted: \[\"stl\"\]$"),
+        ("output.formats=3", r"takes a list such as \[\"stl\"\]$"),
+        ("moulds.cavities=3", r"takes a text or a list such as \[1, 1\]; nearest accepted: \[3, 3\]$"),
         ("layers.0=3", r"^layers\.0 = 3: takes a table"),
-        ("layers.7.wall_mm=1.0", "index"),
+        ("layers.7.wall_mm=1.0", r"^layers\.7\.wall_mm = 1: no entry 7: the list has the entries 0 to 1$"),
         ("name=''", "must not be empty"),
         (f"name='{'x' * 121}'", "at most 120 characters"),
         ("name=2026-01-01", "date or time"),
@@ -271,3 +275,18 @@ def test_a_name_has_at_most_120_characters() -> None:
     assert longest in from_data({**data, "materials": {longest: {"like": "ecoflex-00-30"}}}).materials
     with pytest.raises(Refusal, match=r"^materials\.x{20}\.\.\. = 121: a name has at most 120 characters$"):
         from_data({**data, "materials": {longest + "x": {"like": "ecoflex-00-30"}}})
+
+
+@pytest.mark.parametrize(
+    ("line", "advice"),
+    [
+        ("design = encapsulating", '; put quotes round a text: "encapsulating"'),
+        ("layers = [{ material = ecoflex-00-30 }]", '; put quotes round a text: "ecoflex-00-30"'),
+        ("motor.fill = True", "; write true in small letters"),
+        ("name = ", ""),
+    ],
+)
+def test_a_word_without_quotes_is_told_of_them(line: str, advice: str) -> None:
+    with pytest.raises(UnitcadError) as refused:
+        parse_toml(f"diameter_mm = 14.0\n{line}\n", "mine.toml")
+    assert str(refused.value).partition(")")[2] == advice

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 
 import pytest
 from faulty_sets import broken, of_spec, set_of
 from manifold3d import CrossSection
+from msgspec import structs
 
 from unitcad.accuracy.outcomes import put_in, refusal_of
 from unitcad.accuracy.random_specs import DOCUMENTED, Seeded, random_spec
+from unitcad.catalogue import printers
+from unitcad.designs import dimensions
 from unitcad.errors import Refusal
 from unitcad.mould_checks import air, check_moulds
 from unitcad.moulds import lid
+from unitcad.moulds.layout import layout
 from unitcad.moulds.plan import plan
+from unitcad.spec import Spec
 from unitcad.validation import from_data, load, read
 
 WIRES = {"diameter_mm": 0.3, "count": 2}
@@ -36,6 +42,38 @@ def test_fill_takes_what_the_bed_takes_and_no_more(name: str, size: int, cells: 
         set_of(name, f"moulds.cavities=[{len(columns)},{cells // len(columns) + 1}]", *bed)
     assert refused.value.nearest == [len(columns), cells // len(columns)]
     assert "exceeds the bed by" in str(refused.value)
+
+
+def accepted(spec: Spec, columns: int, rows: int) -> bool:
+    one = structs.replace(spec, moulds=structs.replace(spec.moulds, cavities=(columns, rows)))
+    try:
+        return len(layout(one, dimensions(one)).cells) == columns * rows
+    except Refusal:
+        return False
+
+
+@pytest.mark.parametrize("printer", sorted(printers()))
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("no-fpcb", ["diameter_mm=14.0"]),
+        ("no-fpcb", ["diameter_mm=14.0", "moulds.bed_x_mm=70"]),
+        ("no-fpcb", ["diameter_mm=15.1", "moulds.bed_x_mm=400", "moulds.bed_y_mm=95"]),
+        ("no-fpcb", ["diameter_mm=30.0"]),
+        ("embedded", ["diameter_mm=14.0"]),
+        ("embedded", ["diameter_mm=20.3", "moulds.bed_y_mm=333"]),
+        ("encapsulating", []),
+        ("chain", []),
+    ],
+)
+def test_fill_has_the_most_cells_of_all_splits(name: str, settings: list[str], printer: str) -> None:
+    table = {"moulds.printer": printer, "moulds.cavities": "fill"}
+    spec = load(load(name, settings), table)
+    most = [int(bed // spec.diameter_mm) + 1 for bed in (spec.moulds.bed_x_mm, spec.moulds.bed_y_mm)]
+    splits = itertools.product(*(range(1, count + 1) for count in most))
+    cells = len(layout(spec, dimensions(spec)).cells)
+    larger = [split for split in splits if math.prod(split) >= cells and accepted(spec, *split)]
+    assert cells == max(map(math.prod, larger))
 
 
 def test_a_unit_larger_than_the_bed_fills_nothing() -> None:

@@ -76,11 +76,14 @@ def _check_circuit(spec: Spec, dims: Dimensions, fpcb: Circuit, exit: Exit) -> N
     tail, pad, end = fpcb.tail_width_mm, fpcb.pad_diameter_mm, fpcb.tail_end_width_mm
     widest = limits.widest_exit(spec, dims)
     clearance = spec.moulds.window_clearance_mm
-    if widest < LEAST_TAIL and clearance > LEAST_TAIL:
-        # No tail fits because of the clearance: the refusal names the clearance, not the tail.
+    if widest < LEAST_TAIL:
+        # No tail fits: the refusal names the clearance where that is the cause, else the core, not the tail.
         most = limits.down(clearance - (tail - widest) / 2)
-        limit = f"the ledge leaves room for a tail of {tail:g} mm up to a clearance of {most:g} mm"
-        raise Refusal("moulds.window_clearance_mm", clearance, limit, most if most > 0 else None)
+        if clearance > LEAST_TAIL and most > 0:
+            limit = f"the ledge leaves room for a tail of {tail:g} mm up to a clearance of {most:g} mm"
+            raise Refusal("moulds.window_clearance_mm", clearance, limit, most)
+        limit = f"the core must hold the ledge beside a tail, whose least width is {LEAST_TAIL:g} mm"
+        raise limits.wider_core(spec, limits.core_for(spec, LEAST_TAIL) - dims.cavity_radius, limit)
     limits.at_most(
         "fpcb.tail_width_mm",
         tail,

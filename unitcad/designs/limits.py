@@ -13,7 +13,7 @@ from unitcad.designs.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, Ex
 from unitcad.designs.rib_leaves import farthest_push, leaf_mm, least_skirt
 from unitcad.errors import Refusal
 from unitcad.spec import Spec, printer_of
-from unitcad.spec.asked import FpcbTable, WiresTable
+from unitcad.spec.asked import LEAST_LEDGE, FpcbTable, WiresTable
 from unitcad.spec.effective import Circuit
 
 TAIL_SHARE = 0.7
@@ -39,8 +39,17 @@ def check_motor(spec: Spec, dims: Dimensions) -> None:
 
 def widest_exit(spec: Spec, dims: Dimensions) -> float:
     """Return the widest tail, or bundle of wires, whose ledge keeps its shoulders, mm."""
-    beside = spec.moulds.slot_width_clearance_mm + 2 * spec.moulds.window_clearance_mm
-    return min(2 * TAIL_SHARE * dims.cavity_radius, 2 * LEDGE_SHARE * dims.ledge_radius - beside)
+    return min(2 * TAIL_SHARE * dims.cavity_radius, 2 * LEDGE_SHARE * dims.ledge_radius - _beside(spec))
+
+
+def core_for(spec: Spec, width: float) -> float:
+    """Return the least radius of a core whose ledge keeps its shoulders beside a tail of this width, mm."""
+    return max(width / (2 * TAIL_SHARE), (width + _beside(spec)) / (2 * LEDGE_SHARE) + spec.moulds.ledge_mm)
+
+
+def _beside(spec: Spec) -> float:
+    """Return how much wider than the tail its notch is, mm."""
+    return spec.moulds.slot_width_clearance_mm + 2 * spec.moulds.window_clearance_mm
 
 
 def check_wires(spec: Spec, dims: Dimensions) -> None:
@@ -162,13 +171,18 @@ def check_filament(spec: Spec, dims: Dimensions) -> None:
     )
     inside = dims.ledge_radius if dims.sides else dims.cavity_radius
     if inside < hole / 2 + wall - EPS:
-        more = 2 * (hole / 2 + wall - inside)
-        raise Refusal(
-            "diameter_mm",
-            spec.diameter_mm,
-            "the core must hold the filament's hole with a wall round it, and the ledge",
-            up(spec.diameter_mm + more) if not spec.motor.fill else None,
-        )
+        limit = "the core must hold the filament's hole with a wall round it, and the ledge"
+        ledge = down(dims.cavity_radius - hole / 2 - wall)
+        if dims.sides and ledge >= LEAST_LEDGE:
+            limit += f"; moulds.ledge_mm = {ledge:g} would do too"
+        raise wider_core(spec, hole / 2 + wall - inside, limit)
+
+
+def wider_core(spec: Spec, more: float, limit: str) -> Refusal:
+    """Return the refusal of a core whose radius needs `more` mm: a filled one is as wide as the motor."""
+    if spec.motor.fill:
+        return Refusal("motor.diameter_mm", spec.motor.diameter_mm, limit, up(spec.motor.diameter_mm + 2 * more))
+    return Refusal("diameter_mm", spec.diameter_mm, limit, up(spec.diameter_mm + 2 * more))
 
 
 def filament_groove(spec: Spec) -> float:

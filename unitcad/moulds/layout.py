@@ -57,15 +57,25 @@ def most_columns(dims: Dimensions) -> int:
     return {0: MOST_CELLS, 1: 2, 2: 1}[len(dims.exits)]
 
 
-def _fill(spec: Spec, dims: Dimensions, most: int, most_rows: int) -> tuple[int, int]:
-    """Return as many columns and rows as the bed takes and as can be numbered, by trial: the pitch depends on them."""
-    columns = rows = 1
-    while columns < most and _excess(spec, _layout(spec, dims, columns + 1, 1))[0] <= 1e-9:
-        columns += 1
-    most_rows = min(most_rows, MOST_CELLS // columns)
-    while rows < most_rows and max(_excess(spec, _layout(spec, dims, columns, rows + 1))) <= 1e-9:
-        rows += 1
-    return columns, rows
+def _fill(spec: Spec, dims: Dimensions, most_columns: int, most_rows: int) -> tuple[int, int]:
+    """Return the columns and rows of the most cells that the bed takes and that can be numbered; (1, 1) if none fits.
+
+    Each is tried, since the pitch depends on their number; of two with as many cells, the one with more columns.
+    """
+    rows = max(1, min(most_rows, math.floor(spec.moulds.bed_y_mm / (2 * dims.outer_radius))))
+    best = 1, 1
+    for columns in range(1, most_columns + 1):
+        # One more column leaves room for no more rows.
+        while rows and not _fits(spec, dims, columns, rows):
+            rows -= 1
+        if not rows:
+            break
+        best = max(best, (columns, rows), key=lambda split: (math.prod(split), split))
+    return best
+
+
+def _fits(spec: Spec, dims: Dimensions, columns: int, rows: int) -> bool:
+    return columns * rows <= MOST_CELLS and max(_excess(spec, _layout(spec, dims, columns, rows))) <= 1e-9
 
 
 def _excess(spec: Spec, lay: Layout) -> list[float]:
@@ -151,27 +161,20 @@ def _too_tall(spec: Spec, tallest: float) -> Refusal:
 
 def _too_large(spec: Spec, dims: Dimensions, lay: Layout, columns: int, rows: int, over: list[float]) -> Refusal:
     """Refuse a plate larger than the bed; name fewer cavities if that helps, else a smaller unit or a larger bed."""
-    fits = [
-        max(1, count - math.ceil(max(excess, 0) / lay.pitch - 1e-9))
-        for count, excess in zip((columns, rows), over, strict=True)
-    ]
-    still = max(
-        2 * (size - (count - fit) / 2 * lay.pitch) - room
-        for size, count, fit, room in zip(
-            lay.plate, (columns, rows), fits, (spec.moulds.bed_x_mm, spec.moulds.bed_y_mm), strict=True
-        )
-    )
     size = f"the plate of {2 * lay.plate[0]:.1f} x {2 * lay.plate[1]:.1f} mm exceeds the bed"
     by = f"by {max(over):.1f} mm"
     moulds, (x, y) = spec.moulds, lay.plate
     if 2 * x <= moulds.bed_y_mm and 2 * y <= moulds.bed_x_mm:
         by += f"; turned by a quarter it fits: moulds.bed_x_mm = {moulds.bed_y_mm:g}, bed_y_mm = {moulds.bed_x_mm:g}"
+    fits = _fill(spec, dims, columns, rows)
+    alone = _layout(spec, dims, *fits)
+    still = max(_excess(spec, alone))
     if still <= 1e-9:
-        return Refusal("moulds.cavities", [columns, rows], f"{size} {by}", fits)
+        return Refusal("moulds.cavities", [columns, rows], f"{size} {by}", list(fits))
     nearest = math.floor((spec.diameter_mm - still - 1) * 100) / 100
     if nearest < spec.diameter_mm - 2 * dims.air_ring:
         axis = over.index(max(over))
         field, bed = [("bed_x_mm", spec.moulds.bed_x_mm), ("bed_y_mm", spec.moulds.bed_y_mm)][axis]
-        needed = math.ceil(20 * lay.plate[axis]) / 10
+        needed = math.ceil(20 * alone.plate[axis]) / 10
         return Refusal(f"moulds.{field}", bed, f"{size} {by} with one cavity", needed)
     return Refusal("diameter_mm", spec.diameter_mm, f"{size} {by} with one cavity", nearest)

@@ -13,6 +13,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.serve.messages import Edit
 from unitcad.spec import parse_toml
 from unitcad.spec.fields import index_in
+from unitcad.validation.dotted import no_entry
 
 
 def edited(text: str, edits: Sequence[Edit]) -> str:
@@ -73,7 +74,7 @@ def _apply(document: Any, edit: Edit) -> None:
 def _index(node: Sequence[Any], step: str, edit: Edit) -> int:
     index = index_in(step, len(node))
     if index is None:
-        raise Refusal(edit.path, edit.value, f"the list has entries 0 to {len(node) - 1}")
+        raise no_entry(edit.path, edit.value, step, len(node))
     return index
 
 

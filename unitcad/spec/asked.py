@@ -19,6 +19,8 @@ LEAST_LAYER = 0.5
 """Least wall and cap of a layer, mm: thinner ones tear on demoulding and hide a printer's play."""
 LEAST_TAIL = 0.4
 """No circuit's tail is narrower (two traces), mm."""
+LEAST_LEDGE = 0.1
+"""No ledge in the core is narrower, mm."""
 Length = Annotated[float, Meta(ge=0.1, le=kinds.LONGEST_MM)]
 Thickness = Annotated[float, Meta(ge=LEAST_LAYER, le=kinds.LONGEST_MM)]
 CircuitThickness = Annotated[float, Meta(ge=0.01, le=5)]
@@ -115,7 +117,7 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     plate_mm: Annotated[
         Annotated[float, Meta(ge=0.5, le=100)] | None, Meta(description="left out, 4 mm in whole layers")
     ] = None
-    ledge_mm: Annotated[float, Meta(ge=0.1, le=100)] = 0.6
+    ledge_mm: Annotated[float, Meta(ge=LEAST_LEDGE, le=100)] = 0.6
 
 
 class CastingTable(Table, frozen=True, kw_only=True):

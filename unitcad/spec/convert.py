@@ -121,8 +121,9 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     if isinstance(value, str) and words:
         return unknown_name(field, value, words)
     if not (given in known or (given is int and float in known)):
-        names = [_name(plain, table) for plain in _NAMES if plain in known]
-        return Refusal(field, value, f"takes {', or '.join(names) if table else ' or '.join(names)}")
+        names = [_name(plain, kind) for plain in _NAMES if plain in known]
+        limit = f"takes {', or '.join(names) if table else ' or '.join(names)}"
+        return Refusal(field, value, limit, _in_list(value, kind) if list in known else None)
     if isinstance(value, int | float):
         return next(_out_of_range(value, kind, field))
     tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
@@ -167,8 +168,11 @@ def _plain_kinds(kind: Any) -> set[type]:
     return kinds
 
 
-def _name(plain: type, table: type[msgspec.Struct] | None) -> str:
-    """Name a kind of plain data, with a table's keys: those it requires, else the first ones."""
+def _name(plain: type, kind: Any) -> str:
+    """Name a kind of plain data, with a list's entries and a table's keys: those it requires, else the first ones."""
+    table = table_in(kind)
+    if plain is list:
+        return f"a list{_list_of(kind)}"
     if plain is not dict or not table:
         return _NAMES[plain]
     fields = fields_of(table)
@@ -177,6 +181,30 @@ def _name(plain: type, table: type[msgspec.Struct] | None) -> str:
     if not required:
         return f"a table, with keys such as {', '.join(optional)}"
     return f"a table with {', '.join(required)}{' and, where wanted, ' if optional else ''}{', '.join(optional)}"
+
+
+def _list_of(kind: Any) -> str:
+    """Say what a list holds, by an example where its entries are short."""
+    entry = entry_in(kind)
+    if meaning(kind) and not _words(entry):
+        return f": {meaning(kind)}"
+    if table_in(entry):
+        return f", each entry {_name(dict, entry)}"
+    examples = {str: '"a"', int: "1", float: "1.5", bool: "true", dict: "{}", list: "[]"}
+    one = f'"{_words(entry)[0]}"' if _words(entry) else next(examples[k] for k in examples if k in _plain_kinds(entry))
+    return f" such as [{', '.join([one] * _length(kind))}]"
+
+
+def _length(kind: Any) -> int:
+    """Return how many entries a list has: as many as are fixed, else one."""
+    tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
+    return next((len(entries) for entries in tuples if Ellipsis not in entries), 1)
+
+
+def _in_list(value: Any, kind: Any) -> list[Any] | None:
+    """Return a single value as the list that was meant; None where it is no entry."""
+    listed = [value] * _length(kind)
+    return listed if _fits(listed, kind) else None
 
 
 def _needs(kind: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -31,11 +32,23 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise UnitcadError(f"{name}: not TOML: {error}") from None
+        raise UnitcadError(f"{name}: not TOML: {error}{_unquoted(text, str(error))}") from None
     except RecursionError:
         raise UnitcadError(f"{name}: nests too deeply") from None
     except ValueError:
         raise UnitcadError(f"{name}: holds a number of thousands of digits") from None
+
+
+def _unquoted(text: str, error: str) -> str:
+    """Return the advice for a word without quotes at the place of a parser's error; "" for another cause."""
+    place = re.search(r"Invalid value \(at line (\d+), column (\d+)\)", error)
+    line = text.split("\n")[int(place[1]) - 1] if place else ""
+    word = re.match(r"[^\W\d][\w./-]*", line[int(place[2]) - 1 :]) if place else None
+    if not word:
+        return ""
+    if word[0].lower() in ("true", "false"):
+        return f"; write {word[0].lower()} in small letters"
+    return f'; put quotes round a text: "{word[0]}"'
 
 
 def to_data(spec: Spec) -> dict[str, Any]:

@@ -14,13 +14,13 @@ def put(data: dict[str, Any], path: str, value: Any) -> None:
     node: Any = data
     for step in way:
         if isinstance(node, list):
-            node = node[_index(node, step, path)]
+            node = node[_index(node, step, path, value)]
         elif isinstance(node, dict):
             node = node.setdefault(step, {})
         else:
             break
     if isinstance(node, list):
-        node[_index(node, last, path)] = value
+        node[_index(node, last, path, value)] = value
     elif isinstance(node, dict):
         node[last] = value
         node.pop(f"{last}_source", None)  # the text of the file that stood there before
@@ -51,8 +51,14 @@ def drop(data: dict[str, Any], path: str) -> bool:
     return isinstance(node, dict) and node.pop(key, ABSENT) is not ABSENT
 
 
-def _index(node: list[Any], step: str, path: str) -> int:
+def _index(node: list[Any], step: str, path: str, value: Any) -> int:
     index = index_in(step, len(node))
     if index is None:
-        raise Refusal(path, step, f"needs an index from 0 to {len(node) - 1} here", len(node) - 1 if node else None)
+        raise no_entry(path, value, step, len(node))
     return index
+
+
+def no_entry(path: str, value: Any, step: str, count: int) -> Refusal:
+    """Return the refusal of a path with a step that names no entry of a list of `count` entries."""
+    has = f"has the entries 0 to {count - 1}" if count > 1 else "has the entry 0 alone" if count else "is empty"
+    return Refusal(path, value, f"no entry {step}: the list {has}")

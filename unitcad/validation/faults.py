@@ -1,7 +1,7 @@
 """Every fault of a spec, each with its line in the file, and a value to offer that is then accepted.
 
-Validation stops at the first fault. To find the next one a value that surely fits is put in its place: that of the
-shipped template of the same design, else the nearest accepted one. What is refused then stands in the data as it was
+Validation stops at the first fault. To find the next one another value is put in its place: the nearest accepted one,
+else that of the shipped template of the same design. What is refused then stands in the data as it was
 typed, so it is no consequence of the change.
 """
 
@@ -28,7 +28,7 @@ def settled(refusal: Refusal, data: dict[str, Any], judge: Judge, sound: dict[st
 
     A fault of another field that is met first is passed over as in `faults`.
     """
-    nearest = refusal.nearest
+    nearest, limit = refusal.nearest, refusal.limit
     for _ in range(_MOST_LIMITS):
         if nearest is None:
             break
@@ -36,11 +36,11 @@ def settled(refusal: Refusal, data: dict[str, Any], judge: Judge, sound: dict[st
             tried = copy.deepcopy(data)
             put(tried, refusal.field, nearest)
         except Refusal:
-            return Refusal(refusal.field, refusal.value, refusal.limit, nearest)
+            return Refusal(refusal.field, refusal.value, limit, nearest)
         other = next((each for each in _found(tried, judge, sound) if each.field == refusal.field), None)
         if other is None:
-            return Refusal(refusal.field, refusal.value, refusal.limit, nearest)
-        nearest = other.nearest
+            return Refusal(refusal.field, refusal.value, limit, nearest)
+        nearest, limit = other.nearest, f"{refusal.limit}, and {other.limit}"
     return Refusal(refusal.field, refusal.value, refusal.limit)
 
 
@@ -98,7 +98,7 @@ def _first(data: dict[str, Any], judge: Judge) -> Refusal | None:
 
 def _changes(data: dict[str, Any], refusal: Refusal, sound: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield copies of the data with another value in the refused one's place, or without it."""
-    values = [at(sound, refusal.field), ABSENT if refusal.nearest is None else refusal.nearest]
+    values = [ABSENT if refusal.nearest is None else refusal.nearest, at(sound, refusal.field)]
     for value in () if isinstance(refusal, UnknownKey) else values:
         changed = copy.deepcopy(data)
         if value is not ABSENT:
