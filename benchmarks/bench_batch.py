@@ -27,12 +27,12 @@ from typing import Any
 import psutil
 
 from unitcad.attenuation.edge.level import model_block
-from unitcad.batch import BatchOptions, estimate_table, run
-from unitcad.batch.executors import ProcessExecutor, SerialExecutor
-from unitcad.batch.sweep import Sweep, from_file
-from unitcad.batch.task import VariantOutcome
 from unitcad.cache import usage
 from unitcad.estimating import estimate_input
+from unitcad.sweeps import BatchOptions, estimate_table, run
+from unitcad.sweeps.executors import ProcessExecutor, SerialExecutor
+from unitcad.sweeps.sweep import Sweep, from_file
+from unitcad.sweeps.task import VariantOutcome
 
 SILICONES = ["ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30"]
 GEOMETRIES = 20

@@ -48,7 +48,7 @@ for line in sys.stdin:
 """
 MEMORY = """
 import sys
-from unitcad.check import check_file
+from unitcad.meshcheck import check_file
 def peak():  # of this process alone: a child's ru_maxrss begins at its parent's
     with open("/proc/self/status") as status:
         return int(next(line.split()[1] for line in status if line.startswith("VmHWM"))) // 1024
@@ -85,12 +85,12 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     """Processor seconds of the crossing test alone, and of ours over those of pymeshlab and MeshLib, interleaved."""
     import meshes
 
-    from unitcad.check.geometry import self_crossing
-    from unitcad.check.geometry.arranged import arranged
-    from unitcad.check.geometry.stars import stars_of
-    from unitcad.check.geometry.topology import topology_of
-    from unitcad.check.geometry.triangle_mesh import Mesh
-    from unitcad.check.rules.f_limits import Deadline
+    from unitcad.meshcheck.geometry import self_crossing
+    from unitcad.meshcheck.geometry.arranged import arranged
+    from unitcad.meshcheck.geometry.stars import stars_of
+    from unitcad.meshcheck.geometry.topology import topology_of
+    from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+    from unitcad.meshcheck.rules.f_limits import Deadline
 
     vertices, faces = getattr(meshes, shape)(size)
     found = topology_of(Mesh(vertices, faces), Deadline(600).tick)
@@ -163,10 +163,10 @@ def measure(size: int, peer: str | None, rounds: int, folder: Path) -> list[str]
     """The lines to print on a torus of about `size` faces."""
     import trimesh
 
-    from unitcad.check import check_file, check_mesh
-    from unitcad.check.geometry.topology import topology_of
-    from unitcad.check.geometry.triangle_mesh import Mesh
-    from unitcad.check.rules.f_limits import Deadline
+    from unitcad.meshcheck import check_file, check_mesh
+    from unitcad.meshcheck.geometry.topology import topology_of
+    from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+    from unitcad.meshcheck.rules.f_limits import Deadline
 
     vertices, faces = torus(size)
     path = folder / f"torus-{size}.stl"

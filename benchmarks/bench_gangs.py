@@ -13,7 +13,7 @@ import os
 import statistics
 import time
 
-from unitcad.mould_checks import mould_checks
+from unitcad.checks import mould_checks
 from unitcad.moulds import mould_set
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import Spec

@@ -274,10 +274,10 @@ def judge(
 
 def compare(asked: argparse.Namespace, net: Net, parent: Node, sweep: Path, out: Path) -> None:
     """Export a sample from the store, and compare each file with that which this process makes."""
-    from unitcad.batch import load_sweep
     from unitcad.cache import MemoryStore
     from unitcad.pipeline.make import Progress
     from unitcad.pipeline.write import subject
+    from unitcad.sweeps import load_sweep
 
     wanted, chosen = load_sweep(sweep), {}
     for index in {asked.variants * i // SAMPLE for i in range(SAMPLE)}:

@@ -21,13 +21,13 @@ from typing import Any
 import psutil
 from bench_nodes import sweep_text
 
-from unitcad.batch import BatchOptions, load_sweep
-from unitcad.batch.executors import SerialExecutor
-from unitcad.batch.merging import merge
-from unitcad.batch.run import run
-from unitcad.batch.shards import Shard, shard_folders
-from unitcad.batch.task import outcomes
 from unitcad.cache import shared_store
+from unitcad.sweeps import BatchOptions, load_sweep
+from unitcad.sweeps.executors import SerialExecutor
+from unitcad.sweeps.merging import merge
+from unitcad.sweeps.run import run
+from unitcad.sweeps.shards import Shard, shard_folders
+from unitcad.sweeps.task import outcomes
 
 
 class Counted:

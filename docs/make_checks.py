@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from unitcad.check.rules.registry import FAMILIES, rules
+from unitcad.meshcheck.rules.registry import FAMILIES, rules
 
 
 def markdown() -> str:
@@ -10,7 +10,7 @@ def markdown() -> str:
     lines = [
         "# Rules of `unitcad check`",
         "",
-        "Made from the files of `unitcad/check/rules/` by `python docs/make_checks.py`; a test compares the two.",
+        "Made from the files of `unitcad/meshcheck/rules/` by `python docs/make_checks.py`; a test compares the two.",
         "Severity: an error fails a run, a warning does with `--fail-on warning`, an info never does.",
         "How to run it in CI: [checks-in-ci.md](checks-in-ci.md).",
         "",

@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from unitcad.check import Limits, Options
+from unitcad.checks import check_moulds
 from unitcad.errors import Refusal, Unfinished, UnitcadError
 from unitcad.estimating import estimate_spec
 from unitcad.export import stl
 from unitcad.geometry.arrays import unique_rows
 from unitcad.kernels import mesh
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.mould_checks import check_moulds
+from unitcad.meshcheck import Limits, Options
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build
 from unitcad.shape import Extrude, Polyhedron, Shape, content_hash, cut, cylinder, polygon
@@ -241,14 +241,14 @@ def test_what_goes_with_no_body_is_refused(tmp_path: Path) -> None:
 
 def test_step_without_the_extra_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     name = step_design(tmp_path)
-    monkeypatch.setattr("unitcad.check.readers.read_step.installed", lambda: False)
+    monkeypatch.setattr("unitcad.meshcheck.readers.read_step.installed", lambda: False)
     with pytest.raises(Refusal, match=r"F012: STEP needs the extra"):
         load(spec_of(tmp_path, name))
 
 
 def test_a_shipped_design_loads_no_mesh_rules() -> None:
     code = "import sys\nfrom unitcad.validation import load\nload('embedded')\n"
-    code += "print('unitcad.check.one_file' in sys.modules)"
+    code += "print('unitcad.meshcheck.one_file' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 

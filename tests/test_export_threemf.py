@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sample_bodies import all_bodies
 
-from unitcad.check import check_file
 from unitcad.export import printing, threemf
 from unitcad.kernels.mesh import arrays, realise
+from unitcad.meshcheck import check_file
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import is_printed, threemf_content
 from unitcad.validation import load

@@ -18,11 +18,11 @@ PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
     {"cli"},
     {"api", "accuracy", "serve"},
-    {"batch", "inverse"},
+    {"sweeps", "search"},
     {"report"},
     {"pipeline"},
     {"lab", "arrays"},
-    {"casting", "mould_checks"},
+    {"casting", "checks"},
     {"experiments"},
     {"moulds", "estimating"},
     {"validation"},
@@ -32,7 +32,7 @@ FLOORS = [
     {"designs"},
     {"spec"},
     {"shape"},
-    {"check"},
+    {"meshcheck"},
     {"catalogue"},
     {"files", "arguments"},
     {"workers"},
@@ -47,10 +47,10 @@ NEEDLESS = ("unitcad.arrays.array_file",)
 OF_OTHERS = {
     "check": (
         "numpy.ma",
-        "unitcad.check.rules.d_walls",
-        "unitcad.check.rules.m_manifest",
-        "unitcad.check.geometry.rays",
-        "unitcad.check.geometry.small_shells",
+        "unitcad.meshcheck.rules.d_walls",
+        "unitcad.meshcheck.rules.m_manifest",
+        "unitcad.meshcheck.geometry.rays",
+        "unitcad.meshcheck.geometry.small_shells",
         "tomllib",
     ),
     "build": ("unitcad.moulds.dovetails",),
@@ -89,7 +89,7 @@ def test_imports_run_downward_only() -> None:
 
 def test_attenuation_and_check_know_nothing_of_cad() -> None:
     for room, below, file in _edges():
-        if room in ("attenuation", "check"):
+        if room in ("attenuation", "meshcheck"):
             assert below in (
                 "arguments",
                 "catalogue",
@@ -158,7 +158,7 @@ def test_the_rooms_of_check_import_one_way() -> None:
         {"geometry"},
     ]
     level = {room: level for level, rooms in enumerate(floors) for room in rooms}
-    for file, below in _file_imports(PACKAGE / "check").items():
+    for file, below in _file_imports(PACKAGE / "meshcheck").items():
         room = file.split("/")[1].removesuffix(".py")
         for other in {name.split("/")[1].removesuffix(".py") for name in below} - {room, "__init__"}:
             assert room == "__init__" or level[room] < level[other], f"{file} imports {other}"

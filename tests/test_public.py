@@ -98,17 +98,6 @@ def test_signatures_are_those_of_a_file() -> None:
     assert list(inspect.signature(unitcad.batch).parameters)[:2] == ["sweep", "out"]
 
 
-@pytest.mark.parametrize("first", ["import unitcad.check", "from unitcad.check import Options", "unitcad.check"])
-def test_check_is_a_package_and_a_function(first: str) -> None:
-    code = (
-        f"import unitcad\n{first}\nimport unitcad.check as package\nfrom unitcad import check\n"
-        "from unitcad.check import Options, check_file\n"
-        "assert unitcad.check is check is package and package.Options is Options\n"
-        "print(unitcad.check('missing.stl').findings[0].code)"
-    )
-    assert _run(code) == "F012"
-
-
 def test_the_typed_material_is_the_one_that_a_spec_takes() -> None:
     text = inspect.getsource(entries).partition("class MaterialEntry")[2].partition("class MotorEntry")[0]
     typed = [line.split(":")[0].strip() for line in text.splitlines() if "= None" in line]

@@ -78,7 +78,7 @@ def test_other_names_are_no_devices(name: str) -> None:
 
 
 def test_a_batch_s_folder_is_no_device() -> None:
-    from unitcad.batch.sweep import from_file
+    from unitcad.sweeps.sweep import from_file
 
     data = {"base": "encapsulating", "name": "Con", "sweep": {"diameter_mm": [14.0, 15.0]}}
     assert from_file(data, Path(), "x").slug == "con-batch"

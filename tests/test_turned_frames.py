@@ -16,10 +16,10 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
 
+from unitcad.checks import balance, draw, overlap
+from unitcad.checks.draw import blocked
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
-from unitcad.mould_checks import balance, draw, overlap
-from unitcad.mould_checks.draw import blocked
 from unitcad.moulds.congruence import cropped
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import base_piece

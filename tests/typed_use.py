@@ -4,7 +4,7 @@
 from pathlib import Path
 
 import unitcad
-from unitcad.check import FileReport, Options, check_file
+from unitcad.meshcheck import FileReport, Options, check_file
 
 
 def silicones() -> dict[str, float]:

@@ -9,7 +9,7 @@
     estimated = unitcad.estimate(spec)
 
 Everything listed in `__all__` is loaded when it is first used: importing this package reads no file and loads neither
-numpy nor a CAD library. `unitcad.check` and `unitcad.batch` are packages that may be called.
+numpy nor a CAD library.
 """
 
 # pyright: strict
@@ -27,17 +27,15 @@ if TYPE_CHECKING:
     from unitcad.api.estimate_call import estimate as estimate
     from unitcad.arrays.array import Array as Array
     from unitcad.arrays.array_file import load_array as load_array
-    from unitcad.batch.batch_call import BatchResult as BatchResult
-    from unitcad.batch.batch_call import batch as batch
     from unitcad.catalogue import MaterialEntry as Material
     from unitcad.catalogue import materials as materials
     from unitcad.catalogue import motors as motors
     from unitcad.catalogue import printers as printers
     from unitcad.catalogue import tissue as tissue
-    from unitcad.check.check_call import CheckResult as CheckResult
-    from unitcad.check.check_call import check as check
     from unitcad.errors import Refusal as Refusal
     from unitcad.errors import UnitcadError as UnitcadError
+    from unitcad.meshcheck.check_call import CheckResult as CheckResult
+    from unitcad.meshcheck.check_call import check as check
     from unitcad.pipeline.variant import Variant as Variant
     from unitcad.spec import Spec as Spec
     from unitcad.spec.asked import CastingTable as Casting
@@ -48,6 +46,8 @@ if TYPE_CHECKING:
     from unitcad.spec.asked import MouldsTable as Moulds
     from unitcad.spec.asked import OutputTable as Output
     from unitcad.spec.asked import WiresTable as Wires
+    from unitcad.sweeps.batch_call import BatchResult as BatchResult
+    from unitcad.sweeps.batch_call import batch as batch
     from unitcad.validation import load as load
     from unitcad.validation import templates as templates
 
@@ -90,10 +90,10 @@ __all__ = [
 
 _PLACES = {
     "Array": "arrays.array:Array",
-    "BatchResult": "batch.batch_call:BatchResult",
+    "BatchResult": "sweeps.batch_call:BatchResult",
     "BuildResult": "api.build_call:BuildResult",
     "Casting": "spec.asked:CastingTable",
-    "CheckResult": "check.check_call:CheckResult",
+    "CheckResult": "meshcheck.check_call:CheckResult",
     "EdgeEstimate": "api.estimate_call:EdgeEstimate",
     "Estimate": "spec.asked:EstimateTable",
     "Fpcb": "spec.asked:FpcbTable",
@@ -108,10 +108,10 @@ _PLACES = {
     "Variant": "pipeline.variant:Variant",
     "Wires": "spec.asked:WiresTable",
     "attenuation": "attenuation",
-    "batch": "batch",
+    "batch": "sweeps:batch",
     "build": "api.build_call:build",
     "catalogue": "catalogue",
-    "check": "check",
+    "check": "meshcheck:check",
     "estimate": "api.estimate_call:estimate",
     "load": "validation:load",
     "load_array": "arrays.array_file:load_array",

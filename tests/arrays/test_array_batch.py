@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.batch import batch
-from unitcad.batch.sweep import load_sweep
 from unitcad.errors import Refusal
+from unitcad.sweeps import batch
+from unitcad.sweeps.sweep import load_sweep
 
 ARRAY = """
 name = "pair"

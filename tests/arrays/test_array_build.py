@@ -27,11 +27,11 @@ from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.steps import duration, in_short
 from unitcad.casting.views import picture_path, views
 from unitcad.casting.written import files as written
-from unitcad.check import Options, check_bytes
+from unitcad.checks import mould_checks
 from unitcad.cli.array_summary import array_summary
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
-from unitcad.mould_checks import mould_checks
+from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.arrays import unit_folders
 from unitcad.pipeline.write import Built

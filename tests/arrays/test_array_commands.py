@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_names import array_templates
-from unitcad.batch.sweep import load_sweep
 from unitcad.cli import app
 from unitcad.errors import Refusal
+from unitcad.sweeps.sweep import load_sweep
 
 run = CliRunner()
 

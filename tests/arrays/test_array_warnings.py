@@ -13,7 +13,7 @@ from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.circuit.circuit_files import has_circuit
 from unitcad.arrays.circuit.tracks import GAP_MM, TRACK_MM, crowded_tracks, width_needed
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.mould_checks.gap import play_missing
+from unitcad.checks.gap import play_missing
 from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet

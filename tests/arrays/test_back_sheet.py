@@ -11,13 +11,13 @@ import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
-from unitcad.check import Options, check_bytes
+from unitcad.checks import check_moulds, mould_checks
+from unitcad.checks.draw import blocked
 from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
-from unitcad.mould_checks import check_moulds, mould_checks
-from unitcad.mould_checks.draw import blocked
+from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.cavities import united
 from unitcad.moulds.removal import Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, union

@@ -18,12 +18,12 @@ from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.casting.figures import RESIN_LAYER_S
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.views import views
-from unitcad.check import Options, check_bytes
+from unitcad.checks import air, balance, check_moulds, mould_checks
 from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.mould_checks import air, balance, check_moulds, mould_checks
+from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.report.array_view import patch_model
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union

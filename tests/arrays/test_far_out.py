@@ -14,8 +14,8 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.outlines import slot_profile
 from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.checks import check_moulds
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.mould_checks import check_moulds
 
 
 @pytest.mark.parametrize("height", [2.0, 3 - 1 / 1024, 3.0, 3 + 1 / 1024, 4.0])

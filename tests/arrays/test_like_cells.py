@@ -9,8 +9,8 @@ import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
-from unitcad.mould_checks import check_moulds, overlap
-from unitcad.mould_checks.finding import MouldFinding
+from unitcad.checks import check_moulds, overlap
+from unitcad.checks.finding import MouldFinding
 from unitcad.shape import Shape, box, cut, cylinder, moved, union
 
 Change = Callable[[Shape], Shape]

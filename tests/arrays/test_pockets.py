@@ -10,12 +10,12 @@ import pytest
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.construction import constructions
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.check import Options, check_bytes
+from unitcad.checks import check_moulds, overlap
 from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
-from unitcad.mould_checks import check_moulds, overlap
+from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.cavities import BALANCE
 from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, union
 from unitcad.shape.tree import Revolve

@@ -13,12 +13,12 @@ from unitcad.arrays.back_sheet_drawing import drawing_of
 from unitcad.arrays.back_sheet_tools import _base_letters
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.arrays.pry_slots import pieces
-from unitcad.check import Options, check_bytes
+from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
-from unitcad.mould_checks import check_moulds
+from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.shape import box, union
 from unitcad.spec import printer_of

@@ -11,8 +11,8 @@ import pytest
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.construction import constructions
 from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
-from unitcad.mould_checks import check_moulds
 from unitcad.validation import default_template, put, templates
 
 QUICK, ALL = 24, 200

@@ -16,13 +16,13 @@ from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.arrays.patch_pictures import taken_apart
 from unitcad.arrays.seam_weep import weep
-from unitcad.check import Options, check_bytes
+from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.geometry.segments import between_convex, to_segment
 from unitcad.kernels.mesh import arrays, bounds, realise
-from unitcad.mould_checks import check_moulds, mould_checks
+from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.cuts import BESIDE
 from unitcad.moulds.dovetails import Split, split, straight
 from unitcad.moulds.pieces import base_piece

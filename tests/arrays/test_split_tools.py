@@ -13,12 +13,12 @@ import pytest
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
-from unitcad.check import Options, check_bytes
+from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.mould_checks import check_moulds, mould_checks
+from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.cuts import Feature, Sized, in_gaps, seams
 from unitcad.moulds.dovetails import FLANK_DEG, LARGE, ROUND, Seam, split, straight
 from unitcad.moulds.pieces import base_piece

@@ -11,9 +11,9 @@ from unitcad.attenuation.edge.closed_form import Section, Units, divider
 from unitcad.attenuation.edge.fitted_models import bush_forms
 from unitcad.attenuation.edge.level import nominal
 from unitcad.attenuation.edge.measured_levels import measured_table
-from unitcad.batch import estimate_table
-from unitcad.batch.sweep import load_sweep
 from unitcad.estimating import estimate_input
+from unitcad.sweeps import estimate_table
+from unitcad.sweeps.sweep import load_sweep
 from unitcad.validation import load
 
 RNG = np.random.default_rng(8)

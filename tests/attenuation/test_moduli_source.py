@@ -12,14 +12,14 @@ from typer.testing import CliRunner
 
 from unitcad.attenuation.edge.bush import bush
 from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
-from unitcad.batch.estimate_table import evaluate
-from unitcad.batch.sweep import from_file
-from unitcad.batch.unread_keys import swept_estimate
 from unitcad.cli import app
 from unitcad.estimating import estimate_spec
-from unitcad.inverse.candidates import candidates
-from unitcad.inverse.proposals import models_block
-from unitcad.inverse.target_file import target_of
+from unitcad.search.candidates import candidates
+from unitcad.search.proposals import models_block
+from unitcad.search.target_file import target_of
+from unitcad.sweeps.estimate_table import evaluate
+from unitcad.sweeps.sweep import from_file
+from unitcad.sweeps.unread_keys import swept_estimate
 from unitcad.validation import load
 
 SLOW = ["layers.0.wall_mm=1.3", "estimate.moduli=quasi-static"]

@@ -128,8 +128,8 @@ def test_the_terminal_shows_fit_range_and_own_measurement(fit_file: Path) -> Non
 
 
 def test_a_sweep_s_table_takes_the_fit(fit_file: Path, tmp_path: Path) -> None:
-    from unitcad.batch.estimate_table import evaluate
-    from unitcad.batch.sweep import load_sweep
+    from unitcad.sweeps.estimate_table import evaluate
+    from unitcad.sweeps.sweep import load_sweep
 
     (tmp_path / "s.toml").write_text(
         'base = "./u.toml"\n[sweep]\nmode = "product"\n"layers.0.material" = ["ecoflex-00-10", "dragon-skin-30"]\n'

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from unitcad.mould_checks import check_moulds
+from unitcad.checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape
 from unitcad.spec import Spec

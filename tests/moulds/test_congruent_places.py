@@ -10,9 +10,9 @@ import pytest
 from faulty_sets import set_of, with_fault
 from manifold3d import Manifold, OpType
 
+from unitcad.checks import check_moulds, draw, groove_walls
+from unitcad.checks.walls import near
 from unitcad.kernels.mesh import realise, shells
-from unitcad.mould_checks import check_moulds, draw, groove_walls
-from unitcad.mould_checks.walls import near
 from unitcad.moulds.congruence import column_round, cropped
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, box, cut, union

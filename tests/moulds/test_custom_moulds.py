@@ -11,9 +11,9 @@ import pytest
 from faulty_sets import broken, of_spec, set_of
 
 from unitcad.casting.procedure import procedure
+from unitcad.checks import check_moulds, mould_checks, opening
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.kernels.mesh import realise
-from unitcad.mould_checks import check_moulds, mould_checks, opening
 from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.complement import complement
 from unitcad.moulds.cup import cup_blank

@@ -14,9 +14,9 @@ from msgspec import structs
 from unitcad.accuracy.outcomes import put_in, refusal_of
 from unitcad.accuracy.random_specs import DOCUMENTED, Seeded, random_spec
 from unitcad.catalogue import printers
+from unitcad.checks import air, check_moulds
 from unitcad.designs import dimensions
 from unitcad.errors import Refusal
-from unitcad.mould_checks import air, check_moulds
 from unitcad.moulds import lid
 from unitcad.moulds.layout import layout
 from unitcad.moulds.plan import plan
@@ -260,7 +260,7 @@ def test_random_specs_keep_the_laws_or_are_refused(seed: int) -> None:
 
 
 def test_docs_list_every_code() -> None:
-    from unitcad.mould_checks import mould_checks
+    from unitcad.checks import mould_checks
 
     page = (Path(__file__).parents[2] / "docs" / "moulds.md").read_text("utf-8")
     assert all(f"| {code} |" in page for code in mould_checks())

@@ -11,9 +11,9 @@ from faulty_sets import broken, of_spec, with_fault
 
 from unitcad.casting.procedure import procedure
 from unitcad.casting.written import to_markdown
+from unitcad.checks import check_moulds
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.kernels.mesh import bounds
-from unitcad.mould_checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
 from unitcad.pipeline.write import build

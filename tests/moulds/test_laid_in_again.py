@@ -9,7 +9,7 @@ from functools import cache
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
-from unitcad.mould_checks import draw, overlap
+from unitcad.checks import draw, overlap
 from unitcad.moulds.plan import Step
 from unitcad.moulds.removal import CAST, Removal, Way
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from unitcad.mould_checks import check_moulds
+from unitcad.checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import from_data
 

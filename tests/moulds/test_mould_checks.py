@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from faulty_sets import broken, set_of, with_fault, without
 
+from unitcad.checks import balance, check_moulds, mould_checks
 from unitcad.errors import Refusal
-from unitcad.mould_checks import balance, check_moulds, mould_checks
 from unitcad.moulds import dents
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.removal import CAST, Removal
@@ -153,7 +153,7 @@ def test_a_forgotten_tongue_is_a_leak() -> None:
 
 def test_an_unpulled_tongue_holds_the_cup() -> None:
     """Out of the procedure's order: the cup can't go up while its tongue is in."""
-    from unitcad.mould_checks.draw import blocked
+    from unitcad.checks.draw import blocked
 
     solids = set_of("encapsulating").solids
     assert blocked(solids["cup1"], solids["tongue"], (0, 0, 1)) > 10

@@ -11,8 +11,8 @@ from faulty_sets import broken, set_of, with_fault
 
 from unitcad.casting.figures import UNEVEN, eccentricity, shift_per_depth
 from unitcad.catalogue import printers
+from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
-from unitcad.mould_checks import check_moulds
 from unitcad.moulds.base import tapered
 from unitcad.moulds.cup import skirt_end
 from unitcad.moulds.mould_set import MouldSet

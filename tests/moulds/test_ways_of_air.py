@@ -7,8 +7,8 @@ import random
 import numpy as np
 import pytest
 
+from unitcad.checks.air import _ways_out
 from unitcad.geometry.components import components
-from unitcad.mould_checks.air import _ways_out
 
 
 def flooded(edges: np.ndarray, height: np.ndarray, opening: np.ndarray) -> list[float]:

@@ -8,7 +8,7 @@ import pytest
 from faulty_sets import set_of, with_fault
 from test_congruent_places import shown, whole_plate_cavity
 
-from unitcad.mould_checks import check_moulds, groove_walls, overlap
+from unitcad.checks import check_moulds, groove_walls, overlap
 from unitcad.moulds.cavities import Cavity, united
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, box, cut, cylinder, moved, union

@@ -11,10 +11,10 @@ import pytest
 from chromium import Visit
 from pagetable import column, table_page
 
-from unitcad.batch import BatchOptions, run
-from unitcad.batch.executors import SerialExecutor
-from unitcad.batch.sweep import from_file
 from unitcad.report import write_report
+from unitcad.sweeps import BatchOptions, run
+from unitcad.sweeps.executors import SerialExecutor
+from unitcad.sweeps.sweep import from_file
 
 
 @pytest.fixture(scope="module")

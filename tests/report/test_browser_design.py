@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from unitcad.inverse.design_files import contents
-from unitcad.inverse.proposals import invert
-from unitcad.inverse.target_file import load_target
+from unitcad.search.design_files import contents
+from unitcad.search.proposals import invert
+from unitcad.search.target_file import load_target
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ from typing import Any
 import msgspec
 
 from unitcad import catalogue
-from unitcad.batch.sweep import Range, SweepFile
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.toml import text_of
+from unitcad.sweeps.sweep import Range, SweepFile
 from unitcad.validation import put
 
 SCHEMAS = {

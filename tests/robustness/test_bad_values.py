@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from bad_values import bad_values, sample, toml, with_value
 
-from unitcad.batch.sweep import from_file
 from unitcad.cli import main
 from unitcad.errors import Refusal, UnitcadError, UnknownKey
 from unitcad.spec import to_data
+from unitcad.sweeps.sweep import from_file
 from unitcad.validation import from_data, load
 
 SEED = 13

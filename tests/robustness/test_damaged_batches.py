@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-sys.path.append(str(Path(__file__).parent.parent / "batch"))
+sys.path.append(str(Path(__file__).parent.parent / "sweeps"))
 from batching import bytes_of, leftovers, ring_sweep
 
-from unitcad.batch import BatchOptions, Summary, load_sweep, run
-from unitcad.batch.executors import SerialExecutor
-from unitcad.batch.journal import JOURNAL
 from unitcad.errors import UnitcadError
+from unitcad.sweeps import BatchOptions, Summary, load_sweep, run
+from unitcad.sweeps.executors import SerialExecutor
+from unitcad.sweeps.journal import JOURNAL
 
 FAR = 4_000_000_000
 Change = Callable[[Path, random.Random], None]

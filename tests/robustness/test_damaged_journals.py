@@ -13,9 +13,9 @@ import pytest
 from msgspec import to_builtins
 from msgspec.structs import replace
 
-from unitcad.batch.batch_records import BatchHead, JournalEntry
-from unitcad.batch.journal import JOURNAL, Journal
 from unitcad.errors import UnitcadError
+from unitcad.sweeps.batch_records import BatchHead, JournalEntry
+from unitcad.sweeps.journal import JOURNAL, Journal
 
 HEAD = BatchHead(batch="0123456789abcdef", name="rings")
 CODE = "0.1.0+abc"

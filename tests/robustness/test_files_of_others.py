@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from unitcad import files
-from unitcad.batch import BatchOptions, load_sweep, run
-from unitcad.batch.executors import SerialExecutor
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import build, clear_leftovers, replacing, subject
 from unitcad.report import write_report
+from unitcad.sweeps import BatchOptions, load_sweep, run
+from unitcad.sweeps.executors import SerialExecutor
 from unitcad.validation import load
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and pipes as POSIX has them")

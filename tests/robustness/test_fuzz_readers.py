@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "check"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "meshcheck"))
 
 from glb_files import packed, scene
 from polygon_files import every_way
 from shapes import mesh_xml, model_xml, package, stl, text_stl
 
-from unitcad.check import Limits, Options, check_bytes
+from unitcad.meshcheck import Limits, Options, check_bytes
 
 OUTLINE = [(0.0, 0.0), (9.0, 0.0), (9.0, 4.0), (4.0, 4.0), (4.0, 9.0), (0.0, 9.0)]
 LIMITS = Limits(max_faces=100_000, seconds=20)

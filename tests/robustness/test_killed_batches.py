@@ -17,11 +17,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-sys.path.append(str(Path(__file__).parent.parent / "batch"))
+sys.path.append(str(Path(__file__).parent.parent / "sweeps"))
 from batching import bytes_of, command, environment, leftovers, ring_sweep, rows
 
-from unitcad.batch.journal import JOURNAL
 from unitcad.pipeline.write import whole
+from unitcad.sweeps.journal import JOURNAL
 
 HEIGHTS = [float(height) for height in range(2, 10)]
 MATERIALS = 3

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "check"))
+sys.path.insert(0, str(Path(__file__).parent.parent / "meshcheck"))
 
 import exact_pairs
 from closed_bodies import closed_body
 from shapes import FORMATS, in_format, turned
 
-from unitcad.check import Options, check_bytes
-from unitcad.check.findings import Location
+from unitcad.meshcheck import Options, check_bytes
+from unitcad.meshcheck.findings import Location
 
 HARMLESS = {"G003", "T003", "T004", "G006", "S001", "T011", "T010", "V002"}
 """What a boolean may leave on a sound solid: a touch, a cavity, a sliver. Sizes differ, so S001 may be there too."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.append(str(Path(__file__).parent.parent / "batch"))
+sys.path.append(str(Path(__file__).parent.parent / "sweeps"))
 from batching import command, environment, ring_sweep, unitcad
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")

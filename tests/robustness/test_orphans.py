@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path += [str(Path(__file__).parent.parent / room) for room in ("batch", "serve")]
+sys.path += [str(Path(__file__).parent.parent / room) for room in ("sweeps", "serve")]
 from batching import command, environment, ring_sweep
 from process_trees import below, left, until
 from running import Server

@@ -12,12 +12,12 @@ from typing import Any
 import pytest
 from running import Server, serving
 
-from unitcad.batch.sweep import from_file
+from unitcad.checks import check_moulds
 from unitcad.estimating import estimate_spec
-from unitcad.mould_checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
 from unitcad.serve.messages import Field
+from unitcad.sweeps.sweep import from_file
 from unitcad.validation import load, templates
 
 

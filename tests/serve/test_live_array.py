@@ -23,11 +23,11 @@ from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
 from unitcad.arrays.crosstalk_matrix import crosstalk
 from unitcad.arrays.patch import patch_parts
 from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measured_files import charts_of
 from unitcad.lab.measuring import measure
-from unitcad.mould_checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import patch_glb
 from unitcad.serve.server import serve

@@ -9,12 +9,12 @@ import pytest
 from live import WALL, Live
 from running import serving
 
-from unitcad.batch import BatchOptions, run
-from unitcad.batch.executors import SerialExecutor
-from unitcad.batch.sweep import from_file
 from unitcad.cache import MemoryStore
 from unitcad.pipeline.write import build
 from unitcad.report.page import page_data
+from unitcad.sweeps import BatchOptions, run
+from unitcad.sweeps.executors import SerialExecutor
+from unitcad.sweeps.sweep import from_file
 from unitcad.validation import load
 
 

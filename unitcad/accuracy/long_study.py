@@ -13,9 +13,9 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, TypeVar
 
-from unitcad.batch.executors import Workers
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.plan import code_version
+from unitcad.sweeps.executors import Workers
 from unitcad.workers import WorkerEnded
 
 J = TypeVar("J")

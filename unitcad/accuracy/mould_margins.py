@@ -10,8 +10,8 @@ from unitcad.accuracy.random_specs import seeded_spec
 from unitcad.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.timing import machine, timing
 from unitcad.cache import MemoryStore
+from unitcad.checks import mould_checks
 from unitcad.errors import Refusal
-from unitcad.mould_checks import mould_checks
 from unitcad.pipeline.make import Progress, Subject
 from unitcad.pipeline.manifest import FindingRecord
 from unitcad.spec import Spec

@@ -14,11 +14,11 @@ from unitcad.accuracy.timing import machine
 from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
 from unitcad.attenuation.edge.predictive import STACKED, Predictive, stack
 from unitcad.errors import Refusal
-from unitcad.inverse.candidates import Candidates, candidates
-from unitcad.inverse.geometries import Lengths
-from unitcad.inverse.ranking_order import kinds
-from unitcad.inverse.refinement import alone, refined
-from unitcad.inverse.target_file import Target, target_of
+from unitcad.search.candidates import Candidates, candidates
+from unitcad.search.geometries import Lengths
+from unitcad.search.ranking_order import kinds
+from unitcad.search.refinement import alone, refined
+from unitcad.search.target_file import Target, target_of
 
 STACKS = {"every closed form": STACKED, "crossings, fitted, paper": ("crossings", "fitted", "paper")}
 LEVELS = (0.03, 0.06, 0.12, 0.25, 0.5)

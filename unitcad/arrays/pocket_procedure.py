@@ -20,7 +20,7 @@ from unitcad.casting.preparation import cleaning, fall, joining, level, printing
 from unitcad.casting.procedure import Procedure, pour_of
 from unitcad.casting.steps import BenchStep, Phase, duration, phases
 from unitcad.casting.views import picture_path
-from unitcad.check.findings import counted
+from unitcad.meshcheck.findings import counted
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.lettering import seen
 from unitcad.text import listed, number

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 from unitcad.arrays.array import Array, Box
 from unitcad.arrays.outlines import rounded, slot_profile
-from unitcad.mould_checks.seam import WEEP
+from unitcad.checks.seam import WEEP
 from unitcad.moulds.dovetails import Seam, length
 
 ROUNDING = 0.97

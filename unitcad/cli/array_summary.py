@@ -12,7 +12,7 @@ from unitcad.arrays.array_extras import CROSSTALK
 from unitcad.arrays.construction import construction_of
 from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.casting.steps import in_short
-from unitcad.check.findings import counted
+from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.write import PAGE, Built
 from unitcad.text import number
 

@@ -25,8 +25,8 @@ from unitcad.cli.shared_options import (
 )
 
 if TYPE_CHECKING:
-    from unitcad.batch import BatchOptions, Summary
-    from unitcad.batch.batch_records import Preview
+    from unitcad.sweeps import BatchOptions, Summary
+    from unitcad.sweeps.batch_records import Preview
 
 
 def batch(
@@ -101,15 +101,15 @@ def batch(
     """Make every variant of a sweep, each distinct part once. The last line printed is the folder."""
     from msgspec import to_builtins
 
-    from unitcad.batch import BatchOptions, load_sweep
-    from unitcad.batch.batch_call import checked_tables, folders_for, make
-    from unitcad.batch.cluster import Certificates
-    from unitcad.batch.executors import Workers
-    from unitcad.batch.preview import preview
-    from unitcad.batch.shards import shard_of
     from unitcad.cli.batch_progress import watching
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal
+    from unitcad.sweeps import BatchOptions, load_sweep
+    from unitcad.sweeps.batch_call import checked_tables, folders_for, make
+    from unitcad.sweeps.cluster import Certificates
+    from unitcad.sweeps.executors import Workers
+    from unitcad.sweeps.preview import preview
+    from unitcad.sweeps.shards import shard_of
 
     named = listed(table) if table is not None else None
     if sweep == "merge":
@@ -172,9 +172,9 @@ def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: boo
     """Join shards as one batch: in the folder that holds them, or in `out`."""
     from msgspec import to_builtins
 
-    from unitcad.batch.merging import merge
-    from unitcad.batch.shards import shard_folders
     from unitcad.cli.output import print_json
+    from unitcad.sweeps.merging import merge
+    from unitcad.sweeps.shards import shard_folders
 
     folders = [each for path in named for each in (shard_folders(path) or [path])]
     whole = out or (folders[0].parent if folders else Path())
@@ -208,7 +208,7 @@ def _write_page(folder: Path, asked: bool) -> None:
 
 
 def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> None:
-    from unitcad.check.findings import counted
+    from unitcad.meshcheck.findings import counted
 
     for warning in summary.warnings:
         warn(f"warning: {warning}")
@@ -232,14 +232,14 @@ def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> N
 
 
 def _parts(summary: Summary) -> str:
-    from unitcad.check.findings import counted
+    from unitcad.meshcheck.findings import counted
 
     known = f"{counted(summary.reused, 'variant')} of known parts alone"
     return f"{counted(summary.geometries, 'geometry', 'geometries')}, {known}"
 
 
 def _print_preview(size: Preview) -> None:
-    from unitcad.check.findings import counted
+    from unitcad.meshcheck.findings import counted
 
     about = "" if size.exact else "about "
     typer.echo(f"{counted(size.variants, 'variant')} of {about}{counted(size.geometries, 'geometry', 'geometries')}")

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 
 from msgspec import to_builtins
 
-from unitcad.batch.batch_records import Summary
-from unitcad.batch.run import Watch
-from unitcad.batch.task import VariantOutcome
 from unitcad.cli.output import console, print_json_line, stage_lines
+from unitcad.sweeps.batch_records import Summary
+from unitcad.sweeps.run import Watch
+from unitcad.sweeps.task import VariantOutcome
 
 
 @contextlib.contextmanager

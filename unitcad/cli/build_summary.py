@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterator
 
 from unitcad.casting.steps import in_short
-from unitcad.check.findings import counted
+from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import row
 from unitcad.pipeline.write import PAGE, Built
 from unitcad.spec import Spec, assumed_lengths

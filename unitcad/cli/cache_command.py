@@ -53,9 +53,9 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Make the folders of some variants of a batch, from its store. Each is a line printed."""
-    from unitcad.batch.result_folders import export_variants
     from unitcad.cache import DiskStore, default_root
     from unitcad.cli.output import print_json
+    from unitcad.sweeps.result_folders import export_variants
 
     kept = DiskStore(where or default_root())
     try:

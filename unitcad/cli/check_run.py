@@ -13,8 +13,8 @@ from unitcad.errors import Refusal, UnitcadError, unknown_name
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
-    from unitcad.check import FileReport, Limits, Options
     from unitcad.cli.check_settings import Configuration
+    from unitcad.meshcheck import FileReport, Limits, Options
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,13 +53,13 @@ class Asked:
 
 def run(asked: Asked) -> int:
     """Check the files and print or save the report; return the exit code. Raises UnitcadError or Refusal."""
-    from unitcad.check import Options, detail, many_files
-    from unitcad.check.output import as_text
-    from unitcad.check.output.render import FORMATS, render
-    from unitcad.check.rules.registry import check_prefixes, rules
-    from unitcad.check.rules.registry import explain as explanation
-    from unitcad.check.units import unit_named
     from unitcad.cli import check_settings
+    from unitcad.meshcheck import Options, detail, many_files
+    from unitcad.meshcheck.output import as_text
+    from unitcad.meshcheck.output.render import FORMATS, render
+    from unitcad.meshcheck.rules.registry import check_prefixes, rules
+    from unitcad.meshcheck.rules.registry import explain as explanation
+    from unitcad.meshcheck.units import unit_named
 
     if asked.list_rules:
         sys.stdout.write("".join(f"{rule.code} {rule.severity}: {rule.title}\n" for rule in rules().values()))
@@ -84,7 +84,7 @@ def run(asked: Asked) -> int:
     if asked.write_baseline and base is None:
         raise UnitcadError("--write-baseline needs a file: --baseline FILE, or the key baseline of the settings")
     if base is not None:
-        from unitcad.check import baseline as baselines
+        from unitcad.meshcheck import baseline as baselines
 
         known = baselines.read(base) if base.exists() or not asked.write_baseline else baselines.EMPTY
     selected = check_prefixes(*configuration.chosen("select", _split(asked.select)))
@@ -184,7 +184,7 @@ def _reports(
 
     if manifest is None:
         return list(check_all([(path, of_path(path)) for path in paths]))
-    from unitcad.check import manifest as listing
+    from unitcad.meshcheck import manifest as listing
 
     listed = listing.read(manifest)
     work = listing.work(listed, paths, of_path, options.printer is not None)
@@ -201,7 +201,7 @@ def _printer(field: str, name: str | None) -> Printer | None:
 
 
 def _limits(max_faces: int | None, field: str, seconds: float | None) -> Limits:
-    from unitcad.check import Limits
+    from unitcad.meshcheck import Limits
 
     default = Limits()
     if seconds is not None and not seconds < 1e7:

@@ -29,11 +29,11 @@ def design(
     """
     from unitcad.cli.output import console, print_json, progress
     from unitcad.files import seen_from
-    from unitcad.inverse import design_files
-    from unitcad.inverse.design_words import explanation_lines
-    from unitcad.inverse.explanation import explain as explained
-    from unitcad.inverse.proposals import invert
-    from unitcad.inverse.target_file import load_target
+    from unitcad.search import design_files
+    from unitcad.search.design_words import explanation_lines
+    from unitcad.search.explanation import explain as explained
+    from unitcad.search.proposals import invert
+    from unitcad.search.target_file import load_target
 
     wish = load_target(target)
     if explain is None:
@@ -64,7 +64,7 @@ def _print(data: dict[str, Any]) -> None:
     from rich.text import Text
 
     from unitcad.cli.output import console
-    from unitcad.inverse import design_words as words
+    from unitcad.search import design_words as words
 
     screen = console()
     screen.print(Text.assemble((data["name"], "bold"), f": {words.wish_line(data['wish'])}"), soft_wrap=True)

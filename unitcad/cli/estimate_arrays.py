@@ -9,9 +9,9 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from unitcad.check.findings import counted
 from unitcad.cli.output import console, print_json, progress
 from unitcad.errors import Refusal
+from unitcad.meshcheck.findings import counted
 from unitcad.text import number
 
 _MOST_PLACES, _MOST_PAIRS = 64, 16

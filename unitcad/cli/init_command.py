@@ -55,7 +55,7 @@ def init(
     elif target is None:
         text = starter(stem, template)
     else:
-        from unitcad.inverse.target_file import shipped
+        from unitcad.search.target_file import shipped
 
         if template is not None:
             raise Refusal("--target", target, "is for a target file, --template for a spec: leave one out")

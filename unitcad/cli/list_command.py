@@ -68,15 +68,15 @@ def _entries(kind: str) -> dict[str, Any]:
 
         return {name: _first_comment(path.read_text("utf-8")) for name, path in phantoms().items()}
     if kind == "sweeps":
-        from unitcad.batch.sweep import shipped as sweeps
+        from unitcad.sweeps.sweep import shipped as sweeps
 
         return {name: _first_comment(path.read_text("utf-8")) for name, path in sweeps().items()}
     if kind == "targets":
-        from unitcad.inverse.target_file import shipped as targets
+        from unitcad.search.target_file import shipped as targets
 
         return {name: _first_comment(path.read_text("utf-8")) for name, path in targets().items()}
     if kind == "rules":
-        from unitcad.check.rules.registry import rules
+        from unitcad.meshcheck.rules.registry import rules
 
         return {code: rule.title for code, rule in rules().items()}
     entries = {"materials": catalogue.materials, "motors": catalogue.motors, "printers": catalogue.printers}[kind]()

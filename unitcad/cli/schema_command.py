@@ -28,12 +28,12 @@ def schema(
     from unitcad import files
     from unitcad.arrays.array_schema import with_kinds
     from unitcad.arrays.array_tables import AskedArray
-    from unitcad.batch.sweep import SweepFile
     from unitcad.casting.cast_record import CastRecord
     from unitcad.cli.output import print_json
     from unitcad.errors import unknown_name
-    from unitcad.inverse.target_file import TargetFile
+    from unitcad.search.target_file import TargetFile
     from unitcad.spec.asked import AskedSpec
+    from unitcad.sweeps.sweep import SweepFile
 
     if kind not in KINDS:
         raise unknown_name("schema", kind, KINDS)

@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy as np
 
 from unitcad import files
-from unitcad.check.findings import SEVERITIES, FileReport, Finding, Location
-from unitcad.check.geometry.triangle_mesh import LARGEST, Mesh, weld_exact
-from unitcad.check.rules.registry import rules
 from unitcad.export import drawing, raster, threemf
 from unitcad.export.marks import Marks, marks_of
+from unitcad.meshcheck.findings import SEVERITIES, FileReport, Finding, Location
+from unitcad.meshcheck.geometry.triangle_mesh import LARGEST, Mesh, weld_exact
+from unitcad.meshcheck.rules.registry import rules
 from unitcad.text import printable, xml_attribute, xml_text
 
 COLOURS = {"error": (0.86, 0.10, 0.12), "warning": (0.98, 0.58, 0.05), "info": (0.15, 0.45, 0.90)}

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check.findings import Location
-from unitcad.check.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.findings import Location
+from unitcad.meshcheck.geometry.triangle_mesh import Mesh
 
 _EDGES = {"T001", "T002", "T003", "T005", "T006", "T007", "G008", "G009"}
 _POINTS = {"T004", "G003"}

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.check.rules.rule import Rule
 from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.geometry.arrays import Floats, Ints
@@ -19,6 +18,7 @@ from unitcad.lab.chains.chain import LineFit, Mains
 from unitcad.lab.chains.line import clip_level, fit_line, spectrum
 from unitcad.lab.readers import TIME_NAMES, Layout, Recording, open_recording
 from unitcad.lab.units import UNITS, plain, ratio, seconds, to_si
+from unitcad.meshcheck.rules.rule import Rule
 
 RULES = {
     rule.code: rule

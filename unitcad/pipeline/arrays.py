@@ -38,8 +38,8 @@ from unitcad.casting.steps import pour_warnings
 from unitcad.casting.views import picture_path, views
 from unitcad.casting.written import files as written
 from unitcad.casting.written import step_section
-from unitcad.mould_checks.finding import FindingRecord
-from unitcad.mould_checks.gap import play_missing
+from unitcad.checks.finding import FindingRecord
+from unitcad.checks.gap import play_missing
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.make import Product, Progress, Subject, finished, geometry, mould_findings, record

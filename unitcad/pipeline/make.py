@@ -21,14 +21,14 @@ from unitcad.attenuation.inputs import EstimateInput
 from unitcad.cache import Store, digest
 from unitcad.casting.procedure import procedure
 from unitcad.casting.written import files as written
-from unitcad.check import Options, check_bytes
+from unitcad.checks import Strain, check_geometry, check_unit, strain_findings, strains
+from unitcad.checks.finding import FindingRecord
 from unitcad.errors import Unfinished
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.export.picture import NoPicture
 from unitcad.json_text import json_bytes
 from unitcad.kernels.mesh import bounds
-from unitcad.mould_checks import Strain, check_geometry, check_unit, strain_findings, strains
-from unitcad.mould_checks.finding import FindingRecord
+from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import manifest as manifests
 from unitcad.pipeline.manifest import (

@@ -13,9 +13,9 @@ from typing import Any, TypedDict
 
 from unitcad import __version__, catalogue
 from unitcad.attenuation.edge.estimate_summary import summary
+from unitcad.checks.finding import FindingRecord
 from unitcad.designs import design_of, no_estimate
 from unitcad.designs.design import Reason
-from unitcad.mould_checks.finding import FindingRecord
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import OUTPUTS, kernel_versions

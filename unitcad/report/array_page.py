@@ -14,9 +14,9 @@ from unitcad.arrays.array_file import array_of
 from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.arrays.layouts import layouts
 from unitcad.casting.steps import duration
-from unitcad.check.findings import counted
+from unitcad.checks import mould_checks
 from unitcad.errors import UnitcadError
-from unitcad.mould_checks import mould_checks
+from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import ArrayManifest
 from unitcad.pipeline.write import ARRAY, BENCH, PAGE
 from unitcad.report.array_view import array_model

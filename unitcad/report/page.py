@@ -10,9 +10,9 @@ from typing import Any
 from msgspec import structs
 
 from unitcad import __version__
-from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
 from unitcad.files import write
+from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.write import BENCH, PAGE
 from unitcad.report import batch_table, read_results
 from unitcad.report.bench_page import write_bench

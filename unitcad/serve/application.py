@@ -223,7 +223,7 @@ class Live:
 
     async def variant(self, request: Request) -> Response:
         """Answer with the spec of a variant of the batch, as text: of its folder, else from the batch's store."""
-        from unitcad.batch.result_folders import JOURNAL, stored_spec
+        from unitcad.sweeps.result_folders import JOURNAL, stored_spec
 
         root, folder = self.setting.batch, request.path_params["folder"]
         path = _within(root, f"{folder}/spec.toml") if root else None

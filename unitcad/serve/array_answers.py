@@ -153,7 +153,7 @@ def _tools(array: Array, answer: Answer) -> None:
     from unitcad.arrays.array_procedure import array_procedure
     from unitcad.arrays.patch_moulds import patch_moulds
     from unitcad.casting.steps import in_short
-    from unitcad.mould_checks import check_moulds
+    from unitcad.checks import check_moulds
     from unitcad.pipeline.arrays import unit_folders
     from unitcad.report.array_view import tools_model
 
@@ -174,7 +174,7 @@ def _tools(array: Array, answer: Answer) -> None:
 @lru_cache(maxsize=8)
 def _checked(unit: str, apart: bool) -> list[dict[str, Any]]:
     """Return what the mould checks find on a unit, given as JSON: with its moulds where it is cast `apart`."""
-    from unitcad.mould_checks import check_moulds, check_unit
+    from unitcad.checks import check_moulds, check_unit
     from unitcad.moulds.mould_set import MouldSet
 
     return [dict(finding.as_dict()) for finding in (check_moulds if apart else check_unit)(MouldSet(from_json(unit)))]

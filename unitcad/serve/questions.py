@@ -21,7 +21,7 @@ MEMORY = 4 << 30
 """Bytes of address space that a worker may take."""
 PRELOAD = (
     "unitcad.serve.answers",
-    "unitcad.mould_checks",
+    "unitcad.checks",
     "unitcad.estimating",
     "unitcad.export.svg",
     "unitcad.casting.procedure",

@@ -122,7 +122,7 @@ def _grams(spec: Spec, volumes: list[float]) -> list[float]:
 
 def _moulds(spec: Spec, answer: Answer) -> None:
     from unitcad.casting.steps import in_short
-    from unitcad.mould_checks import check_moulds
+    from unitcad.checks import check_moulds
     from unitcad.moulds.mould_set import MouldSet
     from unitcad.pipeline.plan import glb_content
     from unitcad.pipeline.scenes import moments, taken_apart

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from unitcad.check.findings import Finding
-from unitcad.check.one_file import check_file
-from unitcad.check.options import Options
-from unitcad.check.readers import sniff
-from unitcad.check.rules import s_scale
-from unitcad.check.rules.f_limits import F011, Deadline, Limits, Unreadable
 from unitcad.errors import Refusal, Unfinished, UnitcadError
 from unitcad.files import LARGEST, read
+from unitcad.meshcheck.findings import Finding
+from unitcad.meshcheck.one_file import check_file
+from unitcad.meshcheck.options import Options
+from unitcad.meshcheck.readers import sniff
+from unitcad.meshcheck.rules import s_scale
+from unitcad.meshcheck.rules.f_limits import F011, Deadline, Limits, Unreadable
 from unitcad.shape import Polyhedron
 from unitcad.shape.profile import GRID_PER_MM
 
@@ -102,12 +102,12 @@ def _bodies(path: Path) -> list[tuple[str, np.ndarray, np.ndarray]]:
     limits = Limits()
     deadline, data = Deadline(limits.seconds), memoryview(path.read_bytes())
     if _is_step(path):
-        from unitcad.check.readers.step_bodies import step_bodies
+        from unitcad.meshcheck.readers.step_bodies import step_bodies
 
         return step_bodies(path, TOLERANCE, limits.seconds)
     if sniff.kind_of(path.name) == "3mf":
-        from unitcad.check.readers.threemf.opc import open_package
-        from unitcad.check.readers.threemf.read_3mf import read_build
+        from unitcad.meshcheck.readers.threemf.opc import open_package
+        from unitcad.meshcheck.readers.threemf.read_3mf import read_build
 
         build = read_build(open_package(data, limits, deadline, strict=False), limits)
         instances = build.instances if build else []

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad import check, files
+from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import to_csv
 from unitcad.export import stl, svg, threemf
@@ -19,6 +19,7 @@ from unitcad.export.picture import Drawn, Scene, draw
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.lab.phantom import SEGMENTS, PhantomSet, bench, printed, tissue_table
+from unitcad.meshcheck import check
 from unitcad.shape.body import Body
 from unitcad.text import toml, toml_key
 
@@ -123,7 +124,7 @@ def write(folder: Path, found: Mapping[str, bytes], printer: str) -> list[str]:
     meshes = sorted(str(folder / name) for name in found if name.endswith((".stl", ".3mf")))
     return [
         f"{Path(report.path).name}: {finding.code} {finding.message}"
-        for report in check.check(*meshes, printer=printer).reports
+        for report in check(*meshes, printer=printer).reports
         for finding in report.findings
         if finding.severity == "error"
     ]

@@ -1,0 +1,113 @@
+"""Every pair of faces of small meshes against fractions: degenerate ones above all, that fill the exact stages."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from exact_pairs import counts
+from shapes import CUBE_CORNERS, CUBE_FACES
+
+from unitcad.geometry import boxes
+from unitcad.meshcheck.geometry import self_crossing, small_shells
+from unitcad.meshcheck.geometry.arranged import arranged
+from unitcad.meshcheck.geometry.stars import stars_of
+from unitcad.meshcheck.geometry.topology import topology_of
+from unitcad.meshcheck.geometry.triangle_mesh import Mesh, weld_exact
+from unitcad.meshcheck.rules.f_limits import Deadline
+
+KINDS = ["lattice", "lattice of tenths", "random", "one tilted plane", "sheared lattice", "slivers", "about a vertex",
+         "two heights", "boxes", "turned boxes", "block of boxes", "block of boxes and sheets", "far away"]  # fmt: skip
+
+
+def _soup(kind: str, rng: np.random.Generator) -> np.ndarray:
+    """Triangles (n, 3, 3)."""
+    n = int(rng.integers(6, 15))
+    lattice = rng.integers(-2, 3, (n, 3, 3)).astype(float)
+    if kind == "lattice":
+        return lattice
+    if kind == "lattice of tenths":
+        return lattice * 0.1
+    if kind == "one tilted plane":
+        return rng.integers(-3, 4, (n, 3, 2)) @ rng.integers(-5, 6, (2, 3)).astype(float)
+    if kind == "sheared lattice":
+        return (lattice @ rng.normal(size=(3, 3))).astype(np.float32).astype(float)
+    if kind == "slivers":
+        lattice[:, 2] = lattice[:, 0] + (lattice[:, 1] - lattice[:, 0]) * rng.random((n, 1))
+        return (lattice + rng.normal(size=(n, 3, 3)) * 1e-7).astype(np.float32).astype(float)
+    if kind == "about a vertex":
+        lattice[:, 0] = 0
+        return lattice
+    if kind == "two heights":
+        return np.abs(lattice) * [1, 1, 0.5]
+    if "block" in kind:
+        sizes = [1.0, 1.0, 0.0] if "sheets" in kind else [1.0, 1.0, 0.5]
+        places = rng.integers(0, 3, (4, 3)).astype(float)
+        boxes = [CUBE_CORNERS * (rng.choice(sizes, 3) if i % 2 else 1) + at for i, at in enumerate(places)]
+        return np.concatenate([box[CUBE_FACES[:, :: rng.choice([1, -1])]] for box in boxes])
+    if "boxes" in kind:
+        boxes = [CUBE_CORNERS * rng.choice([0.5, 1, 2], 3) + rng.choice([0, 0.5, 1], 3) for _ in range(2)]
+        if kind == "turned boxes":
+            turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            boxes = [(box @ turn).astype(np.float32).astype(float) for box in boxes]
+        return np.concatenate([box[CUBE_FACES] for box in boxes])
+    if kind == "far away":
+        return (rng.normal(size=(n, 3, 3)) * 0.01 + [1000, 0, 0]).astype(np.float32).astype(float)
+    return rng.normal(size=(n, 3, 3))
+
+
+def _compare(kind: str, seed: int) -> tuple[int, int, int]:
+    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    soup = _soup(kind, rng)
+    if seed % 2:
+        vertices, faces = weld_exact(soup)
+    else:
+        vertices, faces = soup.reshape(-1, 3), np.arange(3 * len(soup), dtype=np.int32).reshape(-1, 3)
+    top = topology_of(Mesh(vertices, faces), Deadline(60).tick)
+    solid, vertices = (top.stored_areas != 0).any(axis=1), top.mesh.vertices
+    faces, labels = top.stored[solid], top.shells[solid]
+    if len(faces) < 2:
+        return 0, 0, 0
+    crossings, overlaps, touching = counts(vertices, faces)
+    shells = {tuple(sorted((int(labels[i]), int(labels[j])))) for i, j in touching if labels[i] != labels[j]}
+    for least in (self_crossing.LEAST_SHELLS, 1):  # by a tree over all faces, and shell by shell
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(self_crossing, "LEAST_SHELLS", least)
+            patch.setattr(small_shells, "_MOST_FACES", 100)
+            patch.setattr(small_shells, "_MOST_PAIRS", 1000)
+            found = self_crossing.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick)
+        assert (found.meeting is not None) == (least == 1)
+        _agree(found, kind, crossings, overlaps)
+        assert {tuple(pair) for pair in found.touching().tolist()} == shells
+    return crossings, len(self_crossing.joined(found.covering)), len(shells)
+
+
+def _agree(found: self_crossing.Crossings, kind: str, crossings: int, overlaps: tuple[int, int]) -> None:
+    assert len(self_crossing.joined(found.crossing)) == crossings
+    # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.
+    covers = len(self_crossing.joined(found.covering))
+    assert (0 if kind == "slivers" else overlaps[0]) <= covers <= overlaps[1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_pair_is_what_fractions_say(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As it runs, and with pairs decided in many small blocks."""
+    sums = np.zeros(3, int)
+    for seed in range(8):
+        if seed == 4:
+            monkeypatch.setattr(self_crossing, "_BLOCK", 3)
+            monkeypatch.setattr(boxes, "_STEP_BITS", 2)
+            monkeypatch.setattr(boxes, "_STEP", 4)
+        sums += _compare(kind, seed)
+    assert sums[2] > 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_pair_of_thousands_of_meshes(kind: str) -> None:
+    for seed in range(100, 500):
+        _compare(kind, seed)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("about a vertex", 100), ("two heights", 104), ("one tilted plane", 397)])
+def test_shells_that_share_no_more_than_an_edge_touch(kind: str, seed: int) -> None:
+    _compare(kind, seed)

@@ -1,0 +1,119 @@
+"""Piles of faces and shells: what would take all time or memory is bounded, and found is what was found by then."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import Judge
+from shapes import box, stl
+
+from unitcad.geometry import boxes
+from unitcad.geometry.ticks import TooMany
+from unitcad.meshcheck.geometry import hubs, self_crossing
+
+Points = np.ndarray
+
+
+def cone(n: int, height: float = 30, cap: bool = True) -> Points:
+    """A cone of n facets of radius 20; its base is a fan round its middle, or round a point of its rim."""
+    turn = np.linspace(0, 2 * np.pi, n, endpoint=False)
+    rim = np.stack([20 * np.cos(turn), 20 * np.sin(turn), 0 * turn], axis=1)
+    after, tip = np.roll(rim, -1, axis=0), np.broadcast_to([0.0, 0, height], rim.shape)
+    middle = np.broadcast_to([0.0, 0, 0] if cap else rim[0], rim.shape)
+    base = np.stack([after, rim, middle], axis=1)
+    return np.concatenate([np.stack([rim, after, tip], axis=1), base if cap else base[1:-1]])
+
+
+@pytest.mark.parametrize("cap", [True, False])
+@pytest.mark.parametrize("through", [None, 5.0, 0.3])
+def test_faces_round_a_hub_are_judged_as_others_are(
+    cap: bool, through: float | None, monkeypatch: pytest.MonkeyPatch, judge: Judge
+) -> None:
+    """With and without hubs the findings are the same: of a cone, and of one that a box pierces near its rim."""
+    body = cone(3000, cap=cap)
+    if through is not None:
+        body = np.concatenate([body, box((through, 4, 60), (14, -2, -20))])
+    content, found = stl(body), []
+    for least in (hubs.LEAST, 10**9):
+        monkeypatch.setattr(hubs, "LEAST", least)
+        found.append([(item.code, item.severity, item.count) for item in judge(content).findings])
+    assert found[0] == found[1]
+    assert [code for code, _, _ in found[0]] == ([] if through is None else ["G001", "G002"])
+
+
+def test_a_cone_of_many_facets_is_looked_at_in_few_pairs(monkeypatch: pytest.MonkeyPatch, judge: Judge) -> None:
+    """Each facet has 40,000 others at its tip, and few at its base."""
+    looked = []
+    real = self_crossing._sieved
+    monkeypatch.setattr(self_crossing, "_sieved", lambda *given: looked.append(len(given[2][0])) or real(*given))
+    report = judge(stl(cone(20_000)))
+    assert report.findings == ()
+    assert sum(looked) < 50 * 40_000
+
+
+@pytest.mark.parametrize("n", [40, 300])
+def test_nested_cubes_are_solid_and_hollow_in_turn(n: int, judge: Judge) -> None:
+    """Every other one faces inwards: all are sound, and none overlaps."""
+    cubes = [(box() - 5) * (1 + i / 20) for i in range(n)]
+    sound = np.concatenate([cube if (n - i) % 2 else cube[:, ::-1] for i, cube in enumerate(cubes)])
+    report = judge(stl(sound))
+    assert {found.code: found.count for found in report.findings} == {"G006": n // 2}
+    all_out = judge(stl(np.concatenate(cubes)))
+    assert {found.code: found.count for found in all_out.findings} == {"G002": n // 2}
+
+
+def test_one_face_many_times_is_a_face_and_its_duplicates(judge: Judge) -> None:
+    n = 2000
+    report = judge(stl(np.repeat(np.array([[[0, 0, 0], [10, 0, 0], [0, 10, 0]]], float), n, axis=0)))
+    found = {finding.code: finding for finding in report.findings}
+    assert found["T009"].count == n - 1
+    assert (found["T003"].count, found["T007"].count, found["T007"].severity) == (3, 3, "error")
+    assert not report.has("F011")
+
+
+@pytest.mark.parametrize(
+    ("module", "bound", "name"),
+    [(self_crossing, "_MOST_LOOKS", "faces"), (boxes, "MOST_PAIRS", "boxes")],
+)
+def test_too_many_pairs_end_a_check_which_says_what_it_found(
+    module: object, bound: str, name: str, monkeypatch: pytest.MonkeyPatch, judge: Judge
+) -> None:
+    monkeypatch.setattr(module, bound, 20)
+    monkeypatch.setattr(self_crossing, "_LOOKS", 0)
+    body = np.concatenate([box(at=(i, i, i)) for i in range(20)])
+    report = judge(stl(np.concatenate([body, box()[2:] + 100])))
+    limit = next(found for found in report.findings if found.code == "F011")
+    assert limit.message == f"more than 20 pairs of {name} lie at each other; not all are compared"
+    assert report.has("T001")
+    assert report.facts.shells == 21
+
+
+def test_pairs_of_boxes_are_those_of_all_pairs_however_wide_a_level_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    low = np.random.default_rng(1).uniform(0, 4, (400, 3))
+    high = low + 1
+    meet = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    expected = np.argwhere(np.triu(meet, 1))
+    for wide in (1 << 20, 7):
+        monkeypatch.setattr(boxes, "_WIDE", wide)
+        assert np.array_equal(boxes.box_pairs(low, high, lambda: None), expected)
+    monkeypatch.setattr(boxes, "MOST_PAIRS", len(expected) - 1)
+    with pytest.raises(TooMany):
+        boxes.box_pairs(low, high, lambda: None)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of memory there")
+@pytest.mark.parametrize("name", ["a.stl", "a.obj", "a.ply", "a.3mf", "a.glb"])
+def test_a_file_larger_than_the_memory_allows_is_refused_by_its_size(name: str, tmp_path: Path) -> None:
+    with (tmp_path / name).open("wb") as file:
+        file.truncate(260_000_000)
+    done = subprocess.run(
+        [sys.executable, "-m", "unitcad", "check", name, "--memory", "1000"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout.splitlines()[0] == (
+        f"{name}: F011 error: 260000000 bytes, more than a quarter of the 1000 MB of memory (--memory)"
+    )

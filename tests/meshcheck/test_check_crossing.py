@@ -1,0 +1,328 @@
+"""Self-crossing against an independent reference in fractions, and on solids whose answer is known."""
+
+from __future__ import annotations
+
+import time
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from exact_pairs import cross, dot, minus, point, reference
+from shapes import CUBE_CORNERS, CUBE_FACES
+
+from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
+from unitcad.meshcheck import check_mesh
+from unitcad.meshcheck.geometry.predicates import integers, orient2d, orient2d_columns, orient3d
+from unitcad.meshcheck.geometry.triangles import common_point, coplanar, meet
+from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.rules.registry import explain
+
+
+@pytest.mark.parametrize("kind", ["grid", "grid sharing a corner", "random", "random sharing a corner"])
+def test_triangles_meet_as_fractions_say(kind: str) -> None:
+    rng = np.random.default_rng(7)
+    corners = rng.integers(-2, 3, (700, 2, 3, 3)).astype(float) if "grid" in kind else rng.normal(size=(700, 2, 3, 3))
+    if "corner" in kind:
+        corners[:, 1, 0] = corners[:, 0, 1]
+    normal = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
+    corners = corners[(np.abs(normal).sum(axis=-1) > 0).all(axis=1)]
+    found = meet(corners[:, 0], corners[:, 1])
+    compared = crossing = 0
+    for i, (a, b) in enumerate(corners):
+        expected = reference(a, b)
+        if expected is None:
+            continue
+        compared += 1
+        crossing += expected[0]
+        assert expected == (bool(found.crosses[i]), bool(found.touches[i])), (a, b)
+    assert compared > 500
+    assert 20 < crossing < compared - 20
+
+
+def _sign(value: Fraction) -> int:
+    return (value > 0) - (value < 0)
+
+
+@pytest.mark.parametrize("scale", ["float32 near a plane", "float64 near a plane", "eighths on a plane", "wide range"])
+def test_orientation_is_never_wrong(scale: str) -> None:
+    rng = np.random.default_rng(3)
+    p = rng.normal(size=(4, 400, 3)) * (10.0 ** rng.uniform(-6, 6, (4, 400, 1)) if scale == "wide range" else 1)
+    if "near" in scale:
+        weight = rng.dirichlet([1, 1, 1], 400)
+        p[3] = sum(weight[:, k : k + 1] * p[k] for k in range(3))
+    if scale == "eighths on a plane":
+        p = np.round(p * 8) / 8
+        p[3] = p[0] + 2 * (p[1] - p[0]) - 3 * (p[2] - p[0])
+    if "float32" in scale:
+        p = p.astype(np.float32).astype(float)
+    found = orient3d(*p)
+    flat = orient2d(p[0, :, :2], p[1, :, :2], p[3, :, :2])
+    assert (orient2d_columns(p[0, :, :2].T, p[1, :, :2].T, p[3, :, :2].T) == flat).all()
+    for i in range(400):
+        a, b, c, d = (point(p[k, i]) for k in range(4))
+        u, v, w = minus(a, d), minus(b, d), minus(c, d)
+        assert found[i] == _sign(dot(cross(u, v), w))
+        s, t = minus(a, d), minus(b, d)
+        assert flat[i] == _sign(s[0] * t[1] - s[1] * t[0])
+    if scale == "eighths on a plane":
+        assert not found.any()
+
+
+def test_coplanar_overlap_by_counting_grid_points() -> None:
+    rng = np.random.default_rng(5)
+    corners = np.zeros((300, 2, 3, 3))
+    corners[..., :2] = rng.integers(0, 6, (300, 2, 3, 2))
+    area = _area(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
+    corners = corners[(area != 0).all(axis=1)]
+    share, _ = coplanar(corners[:, 0], corners[:, 1])
+    grid = np.stack(np.meshgrid(*[np.arange(0, 6, 0.02) + 0.0071] * 2), axis=-1).reshape(-1, 2)
+    inside = [[_inside(grid, triangle[:, :2]) for triangle in pair] for pair in corners]
+    counted = np.array([(a & b).any() for a, b in inside])
+    assert (share == counted).all()
+    assert 20 < share.sum() < len(share) - 20
+
+
+def _area(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _inside(points: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+    turn = [_area(triangle[(k + 1) % 3] - triangle[k], points - triangle[k]) for k in range(3)]
+    return (np.min(turn, axis=0) > 0) | (np.max(turn, axis=0) < 0)
+
+
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 3), (5, 40), (200, 77), (300, 4)])
+def test_box_pairs_are_all_that_meet(n: int, m: int) -> None:
+    rng = np.random.default_rng(0)
+    low = rng.random((n + m, 3))
+    places = np.concatenate([low, low + 0.1])
+    steps = frame_of(places).steps(places)
+    rows = np.arange(n + m)
+    both_sets = boxes_of(steps, rows, rows + n + m)
+    boxes, others = both_sets[:n].astype(int), both_sets[n:].astype(int)
+
+    def naive(a, b) -> bool:
+        return bool((a[:3] <= 65_535 - b[3:]).all() and (b[:3] <= 65_535 - a[3:]).all())
+
+    own = {
+        tuple(sorted(p))
+        for i, j in meeting_pairs(both_sets[:n], Deadline(60).tick)
+        for p in zip(i.tolist(), j.tolist(), strict=True)
+    }
+    assert own == {(a, b) for a in range(n) for b in range(a + 1, n) if naive(boxes[a], boxes[b])}
+    both = {
+        p
+        for i, j in meeting_between(both_sets[:n], both_sets[n:], Deadline(60).tick)
+        for p in zip(i.tolist(), j.tolist(), strict=True)
+    }
+    assert both == {(a, b) for a in range(n) for b in range(m) if naive(boxes[a], others[b])}
+    apart = (low[:n, None] > low[None, n:] + 0.1).any(axis=2) | (low[None, n:] > low[:n, None] + 0.1).any(axis=2)
+    assert both >= {(int(a), int(b)) for a, b in np.argwhere(~apart)}  # steps lose no pair
+
+
+def _codes(*parts: tuple[np.ndarray, np.ndarray]) -> set[str]:
+    points, faces, start = [], [], 0
+    for corners, triangles in parts:
+        points.append(corners * 10)
+        faces.append(triangles + start)
+        start += len(corners)
+    return {found.code for found in check_mesh(np.concatenate(points), np.concatenate(faces)).findings}
+
+
+CUBE = (CUBE_CORNERS, CUBE_FACES)
+TURN = np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)
+
+
+@pytest.mark.parametrize(
+    ("corners", "expected"),
+    [
+        (CUBE_CORNERS + np.array([3, 0, 0]), set()),
+        (CUBE_CORNERS + np.array([0, 0, 1]), {"G003", "G004"}),
+        (CUBE_CORNERS + np.array([0.5, 0.25, 1]), {"G003", "G004"}),
+        (CUBE_CORNERS + np.array([1, 0, 1]), {"G003"}),
+        (CUBE_CORNERS + 1, {"G003"}),
+        (CUBE_CORNERS * [0.5, 0.5, 2] + [0.25, 0.25, -0.5], {"G001", "G002"}),
+        (CUBE_CORNERS + 0.5, {"G001", "G002"}),
+        (CUBE_CORNERS * 0.5 + 0.25, {"G002"}),
+        ((CUBE_CORNERS - 0.5) @ TURN.T * [0.5, 0.5, 2] + 0.5, {"G001", "G002"}),
+    ],
+    ids=["apart", "stacked", "stacked aside", "edge", "corner", "pierced", "half in", "inside", "through edges"],
+)
+def test_two_cubes(corners: np.ndarray, expected: set[str]) -> None:
+    assert _codes(CUBE, (corners, CUBE_FACES)) == expected
+    assert _codes((corners, CUBE_FACES), CUBE) == expected
+
+
+def test_cavity_and_inverted_shell() -> None:
+    inner = CUBE_CORNERS * 0.5 + 0.25
+    assert _codes(CUBE, (inner, CUBE_FACES[:, ::-1])) == {"G006"}
+    assert _codes((CUBE_CORNERS, CUBE_FACES[:, ::-1])) == {"T008"}
+    assert _codes(CUBE, (inner, CUBE_FACES[:, ::-1]), (CUBE_CORNERS * 0.2 + 0.4, CUBE_FACES)) == {"G006"}
+
+
+def _sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A torus knot-free tube: a torus of n x n quads, wavy, so that nothing is coplanar."""
+    u, v = np.meshgrid(np.arange(n) * 2 * np.pi / n, np.arange(n) * 2 * np.pi / n, indexing="ij")
+    r = 8 + 0.3 * np.sin(9 * u) * np.sin(7 * v)
+    points = np.stack([(20 + r * np.cos(v)) * np.cos(u), (20 + r * np.cos(v)) * np.sin(u), r * np.sin(v)], axis=-1)
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    a, b, c, d = i * n + j, (i + 1) % n * n + j, (i + 1) % n * n + (j + 1) % n, i * n + (j + 1) % n
+    faces = np.concatenate([np.stack([a, b, c], axis=-1).reshape(-1, 3), np.stack([a, c, d], axis=-1).reshape(-1, 3)])
+    return points.reshape(-1, 3), faces
+
+
+def test_a_wavy_torus_does_not_cross_itself_until_it_is_pushed_through() -> None:
+    points, faces = _sphere(60)
+    assert check_mesh(points, faces).findings == ()
+    moved = points.copy()
+    moved[30 * 60 + 15] *= [-1.5, 1, 1]  # one vertex of the far side, pulled across the hole
+    found = {item.code for item in check_mesh(moved, faces).findings}
+    assert "G001" in found
+
+
+@pytest.mark.parametrize("scale", [2.5, 4.0])
+@pytest.mark.parametrize("mesh", ["closed", "with holes", "with faces turned over"])
+def test_crossing_count_equals_brute_force(mesh: str, scale: float) -> None:
+    points, faces = _sphere(7)
+    rng = np.random.default_rng(2)
+    points = points + rng.normal(scale=scale, size=points.shape)
+    some = rng.random(len(faces)) < 0.1
+    if mesh == "with holes":
+        faces = faces[~some]
+    elif mesh == "with faces turned over":
+        faces[some] = faces[some][:, ::-1]
+    report = check_mesh(points, faces)
+    counted = 0
+    for i in range(len(faces)):
+        for j in range(i + 1, len(faces)):
+            if len(set(faces[i]) & set(faces[j])) < 2:
+                answer = reference(points[faces[i]], points[faces[j]])
+                counted += answer is not None and answer[0]
+    crossing = next(found for found in report.findings if found.code == "G001")
+    assert crossing.count == counted > 0
+
+
+def test_one_missing_face_does_not_make_it_slow() -> None:
+    """Faces round a vertex are left aside wherever they surround it, hole or no hole elsewhere."""
+    points, faces = _sphere(100)
+    start = time.perf_counter()
+    whole = check_mesh(points, faces)
+    closed = time.perf_counter() - start
+    opened = check_mesh(points, faces[1:])
+    assert whole.findings == ()
+    assert [found.code for found in opened.findings] == ["T001"]
+    assert time.perf_counter() - start - closed < 10 * closed + 0.5
+
+
+def test_order_of_faces_and_vertices_does_not_matter() -> None:
+    points, faces = _sphere(16)
+    points = points + np.random.default_rng(4).normal(scale=1.0, size=points.shape)
+    first = {found.code: found.count for found in check_mesh(points, faces).findings}
+    order = np.random.default_rng(5).permutation(len(faces))
+    again = {found.code: found.count for found in check_mesh(points, faces[order][:, [1, 2, 0]]).findings}
+    assert first == again
+
+
+def test_morton_order_is_a_permutation() -> None:
+    points, faces = _sphere(10)
+    order = morton_order(frame_of(points).steps(points), faces[:, 0])
+    assert sorted(order.tolist()) == list(range(len(faces)))
+
+
+@pytest.mark.parametrize("step", [1, 2, 3])
+@pytest.mark.parametrize("tilt", [0.0, 0.4, 0.8])
+def test_a_star_that_goes_round_twice_crosses_itself(step: int, tilt: float) -> None:
+    """Double pyramids over a polygon of seven; over the star polygons {7/2} and {7/3} their sides pass through."""
+    angle = 2 * np.pi * step * np.arange(7) / 7
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    points = np.vstack([ring, [[0, 0, 1.5], [0, 0, -1.5]]])
+    c, s = np.cos(tilt), np.sin(tilt)
+    points = points @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    k = np.arange(7)
+    faces = np.vstack(
+        [np.column_stack([k, (k + 1) % 7, np.full(7, 7)]), np.column_stack([(k + 1) % 7, k, np.full(7, 8)])]
+    )
+    codes = {found.code for found in check_mesh(points, faces).findings}
+    assert ("G001" in codes) == (step > 1)
+
+
+def test_a_denormal_beside_ordinary_numbers_is_decided_without_a_warning() -> None:
+    """Warnings are errors here; the coordinates' exponents lie farther apart than a float's range."""
+    values = np.array([[0.0, 1e-320, 10.0]])
+    whole = integers(values).astype(object)[0].tolist()
+    assert whole[0] == 0
+    assert whole[2] * Fraction(1e-320) == whole[1] * 10
+
+
+@pytest.mark.parametrize("code", ["G001", "G002", "P019"])
+def test_rules_that_are_softer_in_some_files_say_so(code: str) -> None:
+    assert "3MF" in explain(code)
+    assert "warning" in explain(code).split("\n", 1)[1]
+
+
+@pytest.mark.parametrize("code", ["G002", "G003"])
+@pytest.mark.parametrize(("shared", "overlap"), [(0.0, False), (0.9e-6, False), (1.1e-6, True)])
+def test_shells_in_line_overlap_from_a_millionth_on_as_the_rules_say(code: str, shared: float, overlap: bool) -> None:
+    assert "a millionth of the smaller one" in explain(code)
+    points = np.concatenate([CUBE_CORNERS, CUBE_CORNERS * [2, 1, 1] + [1 - shared, 0, 0]]) * 10
+    found = {item.code for item in check_mesh(points, np.concatenate([CUBE_FACES, CUBE_FACES + 8])).findings}
+    assert "G003" in found
+    assert ("G002" in found) == overlap
+
+
+def _two(scale: tuple[float, float, float], at: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """A cube of 10 mm and a second box."""
+    points = np.concatenate([CUBE_CORNERS * 10, CUBE_CORNERS * scale + np.array(at)])
+    return points, np.concatenate([CUBE_FACES, CUBE_FACES + 8])
+
+
+@pytest.mark.parametrize(
+    ("code", "scale", "at", "low", "high"),
+    [
+        ("G001", (2, 2, 20), (4, 4, 5), (4, 4, 10), (6, 6, 10)),  # a pillar through the top
+        ("G001", (10, 10, 10), (9, 8, 7), (9, 8, 7), (10, 10, 10)),
+        ("G002", (10, 10, 10), (9, 8, 7), (9, 8, 7), (10, 10, 10)),
+        ("G003", (2, 2, 2), (10, 4, 4), (10, 4, 4), (10, 6, 6)),
+        ("G003", (5, 5, 5), (10, 10, 10), (10, 10, 10), (10, 10, 10)),
+        ("G003", (5, 5, 5), (10, 10, 2), (10, 10, 2), (10, 10, 7)),
+        ("G004", (2, 2, 2), (10, 4, 4), (10, 4, 4), (10, 6, 6)),
+    ],
+)
+@pytest.mark.parametrize("shift", [0.0, 777.7])
+def test_places_are_where_the_shells_meet_and_differ(
+    code: str, scale: tuple, at: tuple, low: tuple, high: tuple, shift: float
+) -> None:
+    points, faces = _two(scale, at)
+    report = check_mesh(points + shift, faces)
+    places = next(found.locations for found in report.findings if found.code == code)
+    where = np.array([place.xyz for place in places]) - shift
+    assert (where >= np.array(low) - 1e-6).all()
+    assert (where <= np.array(high) + 1e-6).all()
+    assert len({tuple(row) for row in np.round(where, 4).tolist()}) == len(places)
+    assert code in ("G002", "G003") or len({place.face for place in places}) == len(places) > 1
+
+
+def test_touching_shells_are_placed_pair_by_pair() -> None:
+    boxes = [CUBE_CORNERS * 10 + [10 * k, 0, 0] for k in range(4)]
+    report = check_mesh(np.concatenate(boxes), np.concatenate([CUBE_FACES + 8 * k for k in range(4)]))
+    places = next(found.locations for found in report.findings if found.code == "G003")
+    assert sorted(place.xyz[0] for place in places if place.xyz) == pytest.approx([10, 20, 30])
+
+
+@pytest.mark.parametrize(
+    ("other", "expected"),
+    [
+        ([[1, 1, -1], [1, 1, 1], [1, -9, 0]], (1, 0.5, 0)),  # a segment from the edge y = 0 to (1, 1, 0)
+        ([[2, 2, 0], [2, 2, 5], [9, 2, 5]], (2, 2, 0)),  # a corner on the inside
+        ([[0, 0, 0], [0, 0, 3], [6, 0, 3]], (0, 0, 0)),  # a common corner
+        ([[0, 0, 0], [6, 0, 0], [0, 0, 3]], (3, 0, 0)),  # a common edge
+        ([[1, 1, 0], [2, 1, 0], [1, 2, 0]], (4 / 3, 4 / 3, 0)),  # in one plane, inside
+        ([[0, 0, 1], [1, 0, 1], [0, 1, 1]], None),
+    ],
+)
+@pytest.mark.parametrize("scale", [1.0, 1e38, 1e-150])
+def test_the_middle_of_what_two_triangles_share(other: list, expected: tuple | None, scale: float) -> None:
+    found = common_point(*(scale * np.array(corners) for corners in ([[0, 0, 0], [6, 0, 0], [0, 6, 0]], other)))
+    assert (found is None) == (expected is None)
+    if found is not None and expected is not None:
+        assert np.array(found) / scale == pytest.approx(expected, abs=1e-7)

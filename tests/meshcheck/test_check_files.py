@@ -1,0 +1,62 @@
+"""What a path may be: sizes are looked at before anything is read, and only regular files are opened."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from shapes import box, stl
+
+from unitcad.meshcheck import Limits, Options, check_file
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="address space is bounded on Linux only")
+def test_a_small_file_takes_little_address_space(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(stl(box()))
+    code = (
+        "from unitcad.cli import main; import sys; sys.argv = ['unitcad', 'check', 'a.stl', '--memory', '3000']; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "1 file: 1 passed")
+
+
+def test_a_sparse_file_beyond_the_limit_is_refused_at_once(tmp_path: Path) -> None:
+    with (tmp_path / "a.stl").open("wb") as file:
+        file.truncate(20_000_000_000)
+    begin = time.perf_counter()
+    (found,) = check_file(tmp_path / "a.stl").findings
+    assert time.perf_counter() - begin < 1
+    assert (found.code, found.message) == ("F011", "20000000000 bytes, more than the limit of 4000000000")
+
+
+def test_the_limit_itself_is_allowed(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(stl(box()))
+    assert check_file(tmp_path / "a.stl", Options(limits=Limits(max_bytes=684))).verdict == "pass"
+    assert check_file(tmp_path / "a.stl", Options(limits=Limits(max_bytes=683))).has("F011")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX kinds of files")
+def test_what_is_no_regular_file_is_named_and_never_opened(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.stl")
+    (tmp_path / "b.stl").mkdir()
+    with socket.socket(socket.AF_UNIX) as made:
+        here = Path.cwd()
+        os.chdir(tmp_path)  # a socket's path may have 108 bytes only
+        try:
+            made.bind("c.stl")
+        finally:
+            os.chdir(here)
+        said = [
+            check_file(path).findings
+            for path in (tmp_path / "a.stl", tmp_path / "b.stl", tmp_path / "c.stl", "/dev/null")
+        ]
+    assert [[(found.code, found.message) for found in found] for found in said] == [
+        [("F012", f"{kind}, not a regular file")] for kind in ("a FIFO", "a folder", "a socket", "a device")
+    ]
+    assert check_file(tmp_path / "no.stl").findings[0].message == "no such file"
+    assert check_file("a\0.stl").findings[0].code == "F012"

@@ -1,0 +1,362 @@
+"""Output formats, the rule table and its page, select and ignore."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from make_checks import markdown
+from shapes import box, stl, text_stl
+
+from unitcad.errors import Refusal
+from unitcad.meshcheck import FileReport, Options, check_file, check_mesh
+from unitcad.meshcheck.findings import SEVERITIES, Finding, Location, merge
+from unitcad.meshcheck.geometry.source import Source
+from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.many_files import check_files
+from unitcad.meshcheck.one_mesh import check_surface, in_file
+from unitcad.meshcheck.output import as_text
+from unitcad.meshcheck.output.render import FORMATS, render
+from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.rules.registry import FAMILIES, check_prefixes, explain, rules
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture
+def reports(tmp_path: Path) -> list[FileReport]:
+    names = {"good.stl": stl(box()), "hole & <b>.stl": stl(box()[2:]), "text.stl": text_stl(box())[:-30].encode()}
+    names["warn, 100%.stl"] = stl(box(), header=b"solid")
+    found = []
+    for name, content in names.items():
+        (tmp_path / name).write_bytes(content)
+        found.append(check_file(tmp_path / name))
+    return [FileReport(Path(report.path).name, report.findings, report.facts) for report in found]
+
+
+def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
+    data = json.loads(render(reports, "json"))
+    assert list(data) == ["files", "config", "baseline"]
+    for entry, report in zip(data["files"], reports, strict=True):
+        assert list(entry) == ["path", "verdict", "findings", "facts"]
+        assert entry["verdict"] == report.verdict
+        assert list(entry["facts"]) == [
+            "triangles", "vertices", "shells", "volume_mm3", "area_mm2", "bbox_mm", "watertight"
+        ]  # fmt: skip
+        for found in entry["findings"]:
+            assert list(found) == ["code", "severity", "message", "count", "locations", "fix", "known"]
+            assert found["fix"] == rules()[found["code"]].fix
+    assert [entry["verdict"] for entry in data["files"]] == ["pass", "error", "error", "warning"]
+
+
+def test_sarif_is_valid_and_complete(reports: list[FileReport]) -> None:
+    data = json.loads(render(reports, "sarif"))
+    schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
+    run = data["runs"][0]
+    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == list(rules())
+    assert len(run["results"]) == sum(len(report.findings) for report in reports)
+    for result in run["results"]:
+        assert run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"] == result["ruleId"]
+        assert " " not in result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+
+
+def test_the_sarif_schema_refuses_what_sarif_does(reports: list[FileReport]) -> None:
+    schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
+    for spoil in (
+        lambda data: data.update(version="2.0.0"),
+        lambda data: data["runs"][0]["results"][0].update(level="info"),
+        lambda data: data["runs"][0]["results"][0].pop("message"),
+        lambda data: data["runs"][0]["results"][0].update(ruleIndex=-2),
+        lambda data: data["runs"][0]["tool"].pop("driver"),
+        lambda data: data["runs"][0]["results"][0].update(partialFingerprints={"a": 1}),
+    ):
+        data = json.loads(render(reports, "sarif"))
+        spoil(data)
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
+
+
+def test_fingerprints_stay_when_counts_and_places_change(tmp_path: Path) -> None:
+    def prints(content: bytes) -> set[str]:
+        path = tmp_path / "a.stl"
+        path.write_bytes(content)
+        data = json.loads(render([check_file(path)], "sarif"))
+        return {result["partialFingerprints"]["pathAndRule/v1"] for result in data["runs"][0]["results"]}
+
+    assert prints(stl(box()[2:])) == prints(stl(box((20, 20, 20))[4:])) != set()
+
+
+def test_github_annotations_are_escaped(reports: list[FileReport]) -> None:
+    *lines, last = render(reports, "github").splitlines()
+    assert last == "4 files: 2 failed, 1 warned, 1 passed"
+    assert len(lines) == sum(len(report.findings) for report in reports)
+    assert lines[0].startswith("::error file=hole & <b>.stl,title=T001 boundary edge::4 boundary edges")
+    assert any("::warning file=warn%2C 100%25.stl,title=F007 " in line for line in lines)
+    assert any("::error file=text.stl,line=" in line for line in lines)
+
+
+def test_junit_parses_and_counts(reports: list[FileReport]) -> None:
+    suite = ET.fromstring(render(reports, "junit"))[0]
+    assert (suite.get("tests"), suite.get("failures")) == ("4", "2")
+    strict = ET.fromstring(render(reports, "junit", "warning"))[0]
+    assert strict.get("failures") == "3"
+    assert [case.get("name") for case in suite] == [report.path for report in reports]
+
+
+def test_text_is_one_line_a_finding_and_holds_no_control_characters() -> None:
+    odd = FileReport("a\x1b[31m\n.stl", (Finding("F003", "error", "bad \x07 text", 1, (Location(line=3),)),))
+    lines = render([odd], "text").splitlines()
+    assert lines == [
+        "a\\x1b[31m\\n.stl: F003 error: bad \\x07 text (at line 3)",
+        "How to fix:",
+        "  F003 truncated text, XML or zip: Copy or export the file again.",
+        "`unitcad check --explain CODE` says what a code means and why it matters.",
+        "1 file: 1 failed, 0 passed",
+    ]
+    assert render([FileReport("a.stl")], "text") == "1 file: 1 passed\n"
+
+
+def test_markdown_is_a_table_that_no_name_leaves(reports: list[FileReport]) -> None:
+    lines = render(reports, "markdown").splitlines()
+    assert lines[:3] == ["## unitcad check", "", "4 files: 2 failed, 1 warned, 1 passed."]
+    rows = [line for line in lines if line.startswith("| ")][2:]
+    assert len(rows) == sum(len(report.findings) for report in reports)
+    severities = [row.split(" ")[1] for row in rows]
+    assert severities == sorted(severities, key=("error", "warning", "info").index)
+    assert "hole &amp; &lt;b&gt;.stl" in rows[0]
+    evil = "a|b<img src=x>\r\n# [c](javascript:d) @me `e`.stl"
+    row = render([FileReport(evil, (Finding("T001", "error", "m" * 9000),))], "markdown").splitlines()[6]
+    assert row.count(" | ") == 3
+    assert "a\\|b&lt;img src=x&gt;" in row
+    assert "\\[c\\](javascript:d) \\@me \\`e\\`.stl" in row
+    assert len(row) < 800
+
+
+def test_markdown_of_many_findings_fits_a_summary() -> None:
+    many = [FileReport(f"{'x' * 400}{i}.stl", (Finding("T001", "error", "y" * 4000),)) for i in range(2000)]
+    many.append(FileReport("known.stl", (Finding("T001", "error", "z", known=True),)))
+    said = render(many, "markdown")
+    assert len(said.encode()) < 1024 * 1024
+    assert "1,501 more findings are in the log." in said
+
+
+def test_github_says_of_a_clean_run_that_it_ran() -> None:
+    assert render([FileReport("::error::.stl")], "github") == "1 file: 1 passed\n"
+
+
+def test_junit_failures_have_a_body_and_cases_a_time(reports: list[FileReport]) -> None:
+    (report,) = check_files([(str(HERE / "nothing.stl"), Options())])
+    assert report.seconds is not None
+    assert report.seconds >= 0
+    assert "seconds" not in report.as_dict()
+    timed = [replace(reports[0], seconds=1.25), replace(reports[1], seconds=0.5), *reports[2:]]
+    suite = ET.fromstring(render(timed, "junit"))[0]
+    assert [case.get("time") for case in suite] == ["1.250", "0.500", None, None]
+    assert suite.get("time") == "1.750"
+    assert "time" not in ET.fromstring(render(reports, "junit"))[0].attrib
+    failure = suite[1].find("failure")
+    assert failure is not None
+    assert failure.text is not None
+    lines = failure.text.splitlines()
+    assert lines[0] == "T001 boundary edge: 4 boundary edges"
+    assert lines[1].startswith("at ")
+    assert lines[-1] == f"Fix: {rules()['T001'].fix}"
+
+
+def test_every_format_says_how_to_fix_what_was_found(reports: list[FileReport]) -> None:
+    for code in {found.code for report in reports for found in report.findings}:
+        for format_ in FORMATS:
+            strict = render(reports, format_, "warning")
+            if format_ == "markdown":
+                strict = html.unescape(re.sub(r"\\(.)", r"\1", strict))
+            assert (
+                json.dumps(rules()[code].fix)[1:-1] if format_ in ("json", "sarif") else rules()[code].fix
+            ) in strict
+    rule = json.loads(render(reports, "sarif"))["runs"][0]["tool"]["driver"]["rules"][0]
+    assert rule["help"]["text"].endswith(f" Fix: {rules()[rule['id']].fix}")
+    assert "**Fix:**" in rule["help"]["markdown"]
+
+
+def test_text_says_what_a_file_that_passed_holds(reports: list[FileReport]) -> None:
+    first = render(reports, "text").splitlines()[0]
+    assert first == "good.stl: passed: 10 x 10 x 10 mm, 1000 mm3, 1 shell, 12 triangles"
+
+
+def test_sarif_names_objects_as_logical_locations() -> None:
+    found = Finding("G001", "error", "x", 2, (Location(face=1, object="bolt"), Location(face=2, object="nut")))
+    data = json.loads(render([FileReport("a.obj", (found,))], "sarif"))
+    schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
+    jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
+    (place,) = data["runs"][0]["results"][0]["locations"]
+    assert [item["name"] for item in place["logicalLocations"]] == ["bolt", "nut"]
+
+
+def test_sarif_says_the_first_place_in_words_and_the_line_as_a_region() -> None:
+    places = (Location(line=7, part="3D/a.model"), Location(line=9))
+    said = FileReport("a.3mf", (Finding("P017", "error", "bad", 2, places),))
+    (result,) = json.loads(render([said], "sarif"))["runs"][0]["results"]
+    assert result["message"]["text"] == f"bad (at 3D/a.model line 7). Fix: {rules()['P017'].fix}"
+    assert result["locations"][0]["physicalLocation"]["region"] == {"startLine": 9}, "7 is a line of a part's XML"
+    annotation, _ = render([said], "github").splitlines()
+    assert annotation.startswith("::error file=a.3mf,line=9,title=P017")
+
+
+def test_a_place_of_which_nothing_is_known_is_none(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(stl(box(), header=b"solid"))
+    (found,) = check_file(tmp_path / "a.stl").as_dict()["findings"]
+    assert (found["code"], found["locations"]) == ("F007", [])
+
+
+def test_a_location_names_every_face_the_object_and_the_line() -> None:
+    assert Location(face=3) == Location(faces=(3,))
+    both = Location(faces=(3, 17), xyz=(1.0, -0.0, 2.5), line=12, object="bolt")
+    assert both.as_dict() == {"object": "bolt", "face": 3, "faces": [3, 17], "xyz": [1.0, 0.0, 2.5], "line": 12}
+    assert str(both) == "object 'bolt' line 12 faces 3 and 17 (1, 0, 2.5)"
+    assert str(Location(face=3, part="object 2", object="object 2")) == "object 2 face 3"
+
+
+def test_both_faces_of_a_crossing_are_named_in_every_format() -> None:
+    first = box()
+    report = check_mesh(np.concatenate([first, box((4, 4, 4), (8, 3, 3))]).reshape(-1, 3), np.arange(72).reshape(-1, 3))
+    (crossing,) = [found for found in report.findings if found.code == "G001"]
+    for place in crossing.locations:
+        one, other = sorted(place.faces)
+        assert one < 12 <= other  # one of each box
+    named = "faces {} and {} (".format(*crossing.locations[0].faces)
+    for format_ in ("text", "github", "junit"):
+        assert named in render([report], format_)
+    for result in json.loads(render([report], "sarif"))["runs"][0]["results"]:
+        if result["ruleId"] == "G001":
+            assert named in result["message"]["text"]
+            assert [tuple(place["faces"]) for place in result["properties"]["places"]] == [
+                place.faces for place in crossing.locations
+            ]
+
+
+def test_line_and_object_of_a_face_come_from_its_mesh() -> None:
+    points = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]], float)
+    mesh = Mesh(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3]]), source=Source(
+        lines=np.array([7, 8, 11]), starts=np.array([0, 1, 2]), names=b"bolt\nnut\n"))  # fmt: skip
+    found = check_surface(mesh, Deadline(60)).findings
+    assert {(place.face, place.line, place.object) for item in found for place in item.locations} <= {
+        (0, 7, "bolt"), (1, 8, "nut"), (2, 11, None)
+    }  # fmt: skip
+    assert {item.code for item in found} == {"T001"}
+    (two,) = in_file([rules()["G001"].finding("x", places=[Location(faces=(1, 0))])], mesh)
+    assert (two.locations[0].line, two.locations[0].object) == (8, "nut and bolt")
+
+
+def test_fingerprints_are_those_of_the_file_however_it_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sub").mkdir()
+    monkeypatch.chdir(tmp_path)
+
+    def print_of(path: str) -> str:
+        data = json.loads(render([FileReport(path, (Finding("T001", "error", "x"),))], "sarif"))
+        return data["runs"][0]["results"][0]["partialFingerprints"]["pathAndRule/v1"]
+
+    names = ["sub/a.stl", "./sub/a.stl", str(tmp_path / "sub" / "a.stl"), "sub/../sub/a.stl"]
+    assert len({print_of(name) for name in names}) == 1
+    assert print_of("a.stl") != print_of("sub/a.stl")
+    assert print_of(str(tmp_path) + "2/a.stl") != print_of("2/a.stl")
+
+
+def test_explain_takes_commas_and_prefixes() -> None:
+    said = explain("t001, G001")
+    assert [line[:4] for line in said.splitlines() if line[:4] in rules()] == ["T001", "G001"]
+    family = explain("V")
+    assert all(f"{code} {rule.title} (" in family for code, rule in rules().items() if code.startswith("V"))
+    assert "T001 " not in family
+    for wrong in ("", ",", "T001,Q"):
+        with pytest.raises(Refusal):
+            explain(wrong)
+
+
+def test_an_unknown_code_names_one_nearest_at_most() -> None:
+    with pytest.raises(Refusal, match=r"^--explain = 'T0001': begins no rule's code; nearest accepted: 'T00\d'$"):
+        explain("T0001")
+    with pytest.raises(Refusal, match=r"^--select = 'boundary': begins no rule's code$"):
+        check_prefixes("--select", ["boundary"])
+
+
+@pytest.mark.parametrize("format_", FORMATS)
+def test_every_format_survives_odd_names(format_: str) -> None:
+    odd = FileReport("\udce4 \x00 <&>\"'.stl", (Finding("T001", "error", "x \ud800 \x01"),))
+    assert render([odd], format_)
+
+
+def test_merge_adds_counts_and_keeps_the_worst() -> None:
+    one = Finding("P017", "warning", "a", 2, tuple(Location(face=i) for i in range(4)))
+    two = Finding("P017", "error", "b", 3, tuple(Location(face=i) for i in range(4, 9)))
+    (merged,) = merge([one, two])
+    assert (merged.severity, merged.count, len(merged.locations)) == ("error", 5, 5)
+    assert merged.message == "a; and b (5 in all)"
+    assert merge([one])[0].message == "a"
+
+
+def test_statistics_count_files_and_findings() -> None:
+    once = FileReport("a.stl", (Finding("T001", "error", "x", 2), Finding("T004", "warning", "y")))
+    lines = as_text.statistics([once, FileReport("b.stl", once.findings[:1])]).splitlines()
+    assert [line.split() for line in lines] == [
+        ["2", "files", "4", "x", "T001", "boundary", "edge"],
+        ["1", "file", "1", "x", "T004", "pinch", "vertex"],
+    ]
+    assert lines[0].index("T001") == lines[1].index("T004")
+
+
+def test_rules_are_whole() -> None:
+    for code, rule in rules().items():
+        assert rule.severity in SEVERITIES
+        assert code[0] in FAMILIES
+        assert rule.title
+        assert rule.cause.endswith(".")
+        assert rule.example.endswith(".")
+        assert rule.fix
+        assert rule.cause in explain(code)
+        assert rule.fix in explain(code.lower())
+        assert rule.example in explain(code)
+
+
+def test_the_page_is_made_of_the_rules() -> None:
+    docs = HERE.parent.parent / "docs"
+    assert (docs / "checks.md").read_text("utf-8") == markdown()
+    for code in rules():
+        assert f"| {code} |" in markdown()
+
+
+def test_select_and_ignore_by_longest_prefix(tmp_path: Path) -> None:
+    path = tmp_path / "a.stl"
+    path.write_bytes(stl(box()[2:], header=b"solid", normals=np.tile([0.0, 0.0, 1.0], (10, 1))))
+
+    def codes(**given: tuple[str, ...]) -> list[str]:
+        return [found.code for found in check_file(path, Options(**given)).findings]
+
+    assert codes() == ["T001", "F007", "T013"]
+    assert codes(select=("T",)) == ["T001", "T013"]
+    assert codes(select=("T001", "F")) == ["T001", "F007"]
+    assert codes(ignore=("T",)) == ["F007"]
+    assert codes(select=("T001",), ignore=("T",)) == ["T001"]
+    assert codes(select=("T",), ignore=("T013",)) == ["T001"]
+    with pytest.raises(Refusal):
+        check_prefixes("--select", ["X9"])
+
+
+def test_importing_is_light() -> None:
+    code = (
+        "import sys, unitcad.meshcheck as c; c.Options(); "
+        "heavy = {'scipy', 'trimesh', 'manifold3d', 'OCP', 'msgspec'} & {m.split('.')[0] for m in sys.modules}; "
+        "sys.exit(repr(heavy) if heavy else 0)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

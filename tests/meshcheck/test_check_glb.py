@@ -1,0 +1,200 @@
+"""GLB: the scene's triangles in mm, z up, each node in its place; and what cannot be read is refused by name."""
+
+from __future__ import annotations
+
+import copy
+import io
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from conftest import Judge
+from glb_files import packed, scene
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapes import CUBE_CORNERS, CUBE_FACES
+
+from unitcad.export import glb
+from unitcad.meshcheck.findings import Finding
+from unitcad.meshcheck.readers.sniff import reader_of
+from unitcad.meshcheck.rules.f_limits import Deadline, Limits
+
+CUBE = (CUBE_CORNERS * 0.01).astype("<f4")  # metres
+FACES = CUBE_FACES.astype("<u2")
+
+
+def soup(content: bytes) -> np.ndarray:
+    findings: list[Finding] = []
+    mesh = reader_of("glb")(memoryview(content), Limits(), Deadline(60), findings)
+    assert findings == []
+    assert mesh is not None
+    return mesh.vertices[mesh.faces]
+
+
+def test_metres_with_y_up_become_millimetres_with_z_up(judge: Judge) -> None:
+    report = judge(packed(*scene(CUBE * np.array([1, 2, 3], "<f4"), FACES)), "a.glb", printer="fdm-0.4")
+    assert report.findings == ()
+    low, high = report.facts.bbox_mm or ((), ())
+    np.testing.assert_allclose(low, (0, -30, 0), atol=1e-5)
+    np.testing.assert_allclose(high, (10, 0, 20), atol=1e-5)
+    assert report.facts.volume_mm3 == pytest.approx(6000, rel=1e-6)
+
+
+def test_a_unit_that_is_named_takes_the_place_of_the_metre(judge: Judge) -> None:
+    content = packed(*scene((CUBE_CORNERS * 10).astype("<f4"), FACES))
+    (found,) = judge(content, "a.glb").findings
+    assert (found.code, "10 mm if the numbers are millimetres" in found.message) == ("S001", True)
+    report = judge(content, "a.glb", unit="millimeter")
+    assert report.findings == ()
+    assert report.facts.volume_mm3 == pytest.approx(1000, rel=1e-12)
+
+
+def test_our_own_files_come_back_to_the_last_bit() -> None:
+    vertices = (CUBE_CORNERS * [12.3, 4.56, 78.9] + [1.1, 2.2, 3.3]).astype(np.float32)
+    content = glb.content([glb.GlbPart("a", (1, 1, 1), vertices.astype(float), CUBE_FACES)])
+    found = soup(content)
+    assert {tuple(p) for p in found.reshape(-1, 3).tolist()} == {tuple(p) for p in vertices.astype(float).tolist()}
+
+
+TURN = [0.0, np.sin(0.35), 0.0, np.cos(0.35)]
+NODES = [
+    {"children": [1, 2], "translation": [0.1, 0, 0], "name": "root"},
+    {"mesh": 0, "rotation": TURN, "scale": [1, 2, 1], "name": "turned"},
+    {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.3, 0.2, 0.1, 1], "children": [3], "name": "mirrored"},
+    {"mesh": 0, "translation": [0, 0.5, 0]},
+]  # fmt: skip
+
+
+def test_nodes_place_their_meshes_as_trimesh_has_them(judge: Judge) -> None:
+    content = packed(*scene(CUBE, FACES, NODES))
+    theirs = trimesh.load(io.BytesIO(content), file_type="glb", process=False)
+    assert isinstance(theirs, trimesh.Scene)
+    whole = theirs.to_geometry()
+    expected = np.asarray(whole.vertices)[np.asarray(whole.faces)]
+    expected = np.stack([expected[..., 0], -expected[..., 2], expected[..., 1]], axis=-1) * 1000
+    found = soup(content)
+
+    def sums(corners: np.ndarray) -> tuple[float, float]:
+        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+        normals = np.cross(b - a, c - a)
+        return float(np.linalg.norm(normals, axis=1).sum()), float(np.einsum("ij,ij->", a, normals))
+
+    assert sums(found) == pytest.approx(sums(expected), rel=1e-5)
+    np.testing.assert_allclose(np.sort(found.reshape(-1, 3), 0), np.sort(expected.reshape(-1, 3), 0), atol=1e-3)
+    report = judge(content, "a.glb")
+    assert report.facts.shells == 3
+    assert report.facts.volume_mm3 == pytest.approx(4000, rel=1e-5)  # all outwards, the mirrored ones too
+    assert not report.has("T008")
+
+
+def test_faces_are_named_by_their_node(judge: Judge) -> None:
+    content = packed(*scene(CUBE, FACES[:-1], NODES))
+    (hole,) = (found for found in judge(content, "a.glb").findings if found.code == "T001")
+    assert {place.object for place in hole.locations} <= {"turned", "mirrored", "node 3"}
+    assert all(place.object == ("turned", "mirrored", "node 3")[(place.face or 0) // 11] for place in hole.locations)
+
+
+def test_strips_and_fans_and_lists_without_indices() -> None:
+    strip = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0]], "<f4")
+    for mode, rows in ((5, [[0, 1, 2], [1, 3, 2], [2, 3, 4]]), (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0]])):
+        for corners in (None, np.arange(5, dtype="<u1")):
+            expected = strip[rows].astype(float)
+            expected = np.stack([expected[..., 0], -expected[..., 2], expected[..., 1]], axis=-1) * 1000
+            np.testing.assert_array_equal(soup(packed(*scene(strip, corners, mode=mode))), expected)
+    assert len(soup(packed(*scene(CUBE[CUBE_FACES.ravel()], None)))) == 12
+
+
+def test_interleaved_and_quantized_positions() -> None:
+    document, binary = scene(CUBE, FACES)
+    rows = np.zeros((8, 6), "<f4")
+    rows[:, 3:] = CUBE
+    document["bufferViews"].append(
+        {"buffer": 0, "byteOffset": len(binary), "byteLength": rows.nbytes, "byteStride": 24}
+    )
+    document["accessors"][0] |= {"bufferView": 2, "byteOffset": 12}
+    np.testing.assert_array_equal(soup(packed(document, binary + rows.tobytes())), soup(packed(*scene(CUBE, FACES))))
+    short = (CUBE_CORNERS * 32767).astype("<i2")
+    document, binary = scene(short, FACES, [{"mesh": 0, "scale": [0.01] * 3}])
+    document["accessors"][0]["normalized"] = True
+    document["extensionsRequired"] = ["KHR_mesh_quantization"]
+    np.testing.assert_array_equal(soup(packed(document, binary)), soup(packed(*scene(CUBE, FACES))))
+
+
+def spoil(change: Callable[[dict[str, Any]], Any]) -> bytes:
+    document, binary = scene(CUBE, FACES)
+    document = copy.deepcopy(document)
+    change(document)
+    return packed(document, binary)
+
+
+HUGE = [{"scale": [1e29] * 3, "children": [1]}, {"mesh": 0, "scale": [1e29] * 3}]
+GOOD = packed(*scene(CUBE, FACES))
+BAD: list[tuple[str, bytes, str, str]] = [
+    ("no glb", b"solid a\n" * 9, "F005", "no binary glTF"),
+    ("short", GOOD[:16], "F001", "shorter than a GLB's header"),
+    ("cut", GOOD[:-1], "F002", "the header promises"),
+    ("chunk", GOOD[:12] + b"\xff\xff\xff\x7f" + GOOD[16:], "F002", "a chunk promises"),
+    ("version", packed({}, version=1), "F003", "glTF of version 1"),
+    ("json", packed(b'{"a":'), "F003", "the glTF document cannot be read"),
+    ("digits", packed(b'{"scene":' + b"1" * 9999 + b"}"), "F003", "the glTF document cannot be read"),
+    ("nan", packed(b'{"a":NaN}'), "F003", "JSON is malformed"),
+    ("nested", packed(b'{"a":' + b"[" * 100_000 + b"]" * 100_000 + b"}"), "F011", "nested too deeply"),
+    ("list", packed([]), "F003", "Expected `object`, got `array`"),
+    ("nothing", packed({}), "F001", "the file has no face"),
+    ("draco", spoil(lambda d: d.update(extensionsRequired=["KHR_draco_mesh_compression"])), "P016", "'KHR_draco_mesh_"),
+    ("meshopt", spoil(lambda d: d.update(extensionsRequired=["EXT_meshopt_compression"])), "P016", "cannot be read"),
+    ("sparse", spoil(lambda d: d["accessors"][0].update(sparse={"count": 1})), "F003", "accessor 0 is sparse"),
+    ("no view", spoil(lambda d: d["accessors"][0].pop("bufferView")), "F003", "without a buffer view"),
+    ("uri", spoil(lambda d: d["buffers"][0].update(uri="a.bin")), "P007", "not in the file's own binary chunk"),
+    ("other", spoil(lambda d: d["accessors"][0].update(componentType=5130)), "F003", "not VEC3 of a known type"),
+    ("count", spoil(lambda d: d["accessors"][0].update(count=9)), "F002", "accessor 0 promises 9 numbers of 12 bytes"),
+    ("view", spoil(lambda d: d["bufferViews"][0].update(byteLength=95)), "F002", "accessor 0 promises 8 numbers"),
+    ("negative", spoil(lambda d: d["bufferViews"][0].update(byteOffset=-4)), "F003", "`int` >= 0 - at `$.bufferV"),
+    ("many", spoil(lambda d: d["accessors"][1].update(count=10**12)), "F011", "more than --max-faces"),
+    ("loop", spoil(lambda d: d["nodes"][0].update(children=[0])), "P012", "contains itself"),
+    ("mesh", spoil(lambda d: d["nodes"][0].update(mesh=7)), "P011", "names meshes 7, the list has 1"),
+    ("scene", spoil(lambda d: d.update(scene=3)), "P011", "names scenes 3"),
+    ("scale", spoil(lambda d: d["nodes"][0].update(scale=[1, 0, 1])), "P013", "determinant zero"),
+    ("huge", spoil(lambda d: d["nodes"][0].update(scale=[1, 1e40, 1])), "P013", "not of 3 finite numbers"),
+    ("large", spoil(lambda d: d.update(nodes=HUGE)), "V001", "not finite"),
+    ("no position", spoil(lambda d: d["meshes"][0]["primitives"][0].update(attributes={})), "F003", "no POSITION"),
+    ("kind", spoil(lambda d: d["accessors"][0].update(componentType=[])), "F003", "Expected `int`, got `array`"),
+    ("mode", spoil(lambda d: d["meshes"][0]["primitives"][0].update(mode=9)), "F003", "Expected `int` <= 6"),
+    ("lines", spoil(lambda d: d["meshes"][0]["primitives"][0].update(mode=1)), "F001", "the file has no face"),
+    ("index", packed(*scene(CUBE, FACES + FACES.dtype.type(1))), "P011", "a face names vertex 8 of 8, counted from 0"),
+    ("corners", spoil(lambda d: d["accessors"][1].update(count=35)), "F008", "35 corners of triangles"),
+    ("trailing", GOOD + b"abc", "F006", "3 bytes after the last chunk"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "code", "said"), [case[1:] for case in BAD], ids=[case[0] for case in BAD])
+def test_what_is_wrong_is_named(content: bytes, code: str, said: str, judge: Judge) -> None:
+    report = judge(content, "a.glb")
+    assert [found.message for found in report.findings if found.code == code and said in found.message], report.findings
+    assert report.verdict == ("warning" if code == "F006" else "error")
+
+
+def test_a_deep_tree_and_many_placings_are_bounded(judge: Judge) -> None:
+    chain = [{"children": [i + 1]} for i in range(80)]
+    assert judge(packed(*scene(CUBE, FACES, [*chain, {"mesh": 0}])), "a.glb").has("P009")
+    crowd: list[dict[str, Any]] = [{"children": list(range(1, 400))}, *({"mesh": 0} for _ in range(399))]
+    document, binary = scene(CUBE, FACES, crowd)
+    document["meshes"][0]["primitives"] *= 300
+    document["meshes"][0]["name"] = "a" * 100_000
+    (found,) = judge(packed(document, binary), "a.glb").findings
+    assert (found.code, "more primitives than the limit" in found.message) == ("F011", True)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=4))
+def test_spoiled_bytes_give_a_verdict(edits: list[tuple[int, int]]) -> None:
+    from unitcad.meshcheck import check_bytes
+
+    data = bytearray(packed(*scene(CUBE, FACES, NODES)))
+    for place, value in edits:
+        data[place % len(data)] = value
+    report = check_bytes(bytes(data), "a.glb")
+    assert report.facts.triangles is not None or report.verdict == "error"
+    assert not report.has("F011") or "internal" not in report.findings[0].message

@@ -1,0 +1,244 @@
+"""The pre-commit hook and the GitHub Action, as data and by running what they run."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from msgspec import structs
+from shapes import box, stl
+from test_check_command import run
+from typer.main import get_command
+
+from unitcad.cli import app, check_settings
+from unitcad.meshcheck.output.as_json import as_dict
+
+needs_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action's script is bash")
+ROOT = Path(__file__).parent.parent.parent
+
+
+def _value(text: str, key: str) -> str:
+    found = re.search(rf"(?m)^\s*{key}: (.+)$", text)
+    assert found is not None
+    return found.group(1)
+
+
+@pytest.mark.parametrize(("name", "wanted"), [
+    ("a.stl", True), ("dir/b.STL", True), ("c.3mf", True), ("d.obj", True), ("e.ply", True), ("f.off", True),
+    ("g.step", False), ("h.stl.txt", False), ("stl", False), ("i.object", False),
+])  # fmt: skip
+def test_hook_takes_mesh_files_by_suffix(name: str, wanted: bool) -> None:
+    hook = (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8")
+    assert bool(re.search(_value(hook, "files"), name)) == wanted
+    assert _value(hook, "entry") == "unitcad check"
+
+
+def _scripts() -> list[str]:
+    """The action's scripts: that of the step Install, that of the step Check."""
+    text = (ROOT / "action.yml").read_text("utf-8")
+    return [
+        "".join(line[8:] for line in found.splitlines(keepends=True))
+        for found in re.findall(r"(?m)^      run: \|\n((?: {8}.*\n)+)", text)
+    ]
+
+
+def _program(path: Path, words: str) -> None:
+    """A program at `path` that writes its arguments down in a file beside the folder, then runs `words`."""
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(
+        f'#!/bin/sh\nprintf "%s|" "$@" >> {path.parent.parent}/calls\necho >> {path.parent.parent}/calls\n{words}\n'
+    )
+    path.chmod(0o755)
+
+
+def _calls(folder: Path) -> list[str]:
+    return (folder / "calls").read_text("utf-8").splitlines()
+
+
+def _run_action(folder: Path, **given: str) -> subprocess.CompletedProcess[str]:
+    """The action's last script as a runner starts it, with a `unitcad` on the path that is this one."""
+    text = (ROOT / "action.yml").read_text("utf-8")
+    script = folder / "step.sh"
+    script.write_text(_scripts()[1])
+    _program(folder / "bin/unitcad", f'exec {sys.executable} -c "from unitcad.cli import main; main()" "$@"')
+    (folder / "bin/python").write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
+    (folder / "bin/python").chmod(0o755)
+    inputs = {"FILES": ".", "FAIL_ON": "", "PRINTER": "", "ARGUMENTS": "", "SARIF": "", "SUMMARY": "true"} | given
+    for name in inputs:
+        assert f"{name}: ${{{{ inputs." in text
+    runner = {"PATH": f"{folder / 'bin'}:{os.environ['PATH']}", "GITHUB_STEP_SUMMARY": str(folder / "summary.md")}
+    environment = {**os.environ, **inputs, **runner}
+    (folder / "work").mkdir(exist_ok=True)
+    (folder / "work/good.stl").write_bytes(stl(box()))
+    (folder / "work/bad.stl").write_bytes(stl(box()[2:]))
+    return subprocess.run(
+        ["bash", "--noprofile", "--norc", "-eo", "pipefail", str(script)],
+        cwd=folder / "work", env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@needs_bash
+@pytest.mark.parametrize("sarif", ["", "out.sarif", "deep/er/out.sarif"])
+@pytest.mark.parametrize(("files", "code"), [("good.stl", 0), ("bad.stl\ngood.stl", 1), ("*.stl", 1)])
+def test_the_action_reports_and_fails_on_findings(files: str, code: int, sarif: str, tmp_path: Path) -> None:
+    done = _run_action(tmp_path, FILES=files, SARIF=sarif)
+    assert done.returncode == code, done.stderr
+    assert ("::error file=bad.stl" in done.stdout) == bool(code)
+    assert len(_calls(tmp_path)) == 1, "one run judges, whatever is written"
+    told = (tmp_path / "summary.md").read_text("utf-8")
+    assert ("| error | bad.stl | T001 " in told) == bool(code)
+    assert f"{len(files.split())} file" in told or files == "*.stl"
+    if sarif:
+        results = json.loads((tmp_path / "work" / sarif).read_text("utf-8"))["runs"][0]["results"]
+        assert bool(results) == bool(code)
+
+
+@needs_bash
+@pytest.mark.parametrize("sarif", ["", "out.sarif"])
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [({"FAIL_ON": "never"}, "--fail-on"), ({"FILES": " "}, "needs files"), ({"PRINTER": "none-such"}, "--printer"),
+     ({"ARGUMENTS": "--no-such-option"}, "--no-such-option")],
+)  # fmt: skip
+def test_the_action_fails_on_wrong_inputs_and_says_so(
+    given: dict[str, str], said: str, sarif: str, tmp_path: Path
+) -> None:
+    done = _run_action(tmp_path, **given, SARIF=sarif)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not (tmp_path / "work/out.sarif").exists()
+
+
+@needs_bash
+def test_the_action_passes_its_arguments_on(tmp_path: Path) -> None:
+    assert _run_action(tmp_path, FILES="bad.stl", ARGUMENTS="--ignore T001").returncode == 0
+
+
+@needs_bash
+@pytest.mark.parametrize("names", [
+    "my parts", "my parts/bad one.stl\n", "  my parts/bad one.stl  \r\n good.stl", "my parts/*.stl",
+    "my parts/**/bad*.stl", "good.stl my*/bad*.stl",
+])  # fmt: skip
+def test_the_action_takes_names_with_blanks(names: str, tmp_path: Path) -> None:
+    (tmp_path / "work/my parts/deep er").mkdir(parents=True)
+    for name in ("bad one.stl", "deep er/bad two.stl"):
+        (tmp_path / "work/my parts" / name).write_bytes(stl(box()[2:]))
+    done = _run_action(tmp_path, FILES=names)
+    assert done.returncode == 1, done.stderr
+    assert "::error file=my parts/bad one.stl" in done.stdout
+    assert "F001" not in done.stdout
+    assert ("bad two" in done.stdout) == (names in ("my parts", "my parts/**/bad*.stl"))
+
+
+@needs_bash
+def test_the_action_takes_arguments_in_quotes_and_none_as_a_pattern(tmp_path: Path) -> None:
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work/my settings.toml").write_text("[check]\nignore = ['T001']\n")
+    given = "--config 'my settings.toml'\n--jobs \"1\" --ignore F*"
+    done = _run_action(tmp_path, FILES="bad.stl", ARGUMENTS=given)
+    assert "--config|my settings.toml|--jobs|1|--ignore|F*|" in _calls(tmp_path)[0]
+    assert done.returncode == 2, "F* is no prefix of a code"
+    open_quote = _run_action(tmp_path, FILES="bad.stl", ARGUMENTS="--config 'my")
+    assert open_quote.returncode == 2
+    assert "a quote is not closed" in open_quote.stdout
+
+
+@needs_bash
+def test_the_action_leaves_the_summary_out(tmp_path: Path) -> None:
+    assert _run_action(tmp_path, FILES="bad.stl", SUMMARY="false").returncode == 1
+    assert not (tmp_path / "summary.md").exists()
+
+
+@needs_bash
+def test_a_wrong_command_leaves_no_report_of_an_earlier_run(tmp_path: Path) -> None:
+    assert _run_action(tmp_path, FILES="bad.stl", SARIF="out.sarif").returncode == 1
+    assert (tmp_path / "work/out.sarif").exists()
+    assert _run_action(tmp_path, FAIL_ON="never", SARIF="out.sarif").returncode == 2
+    assert not (tmp_path / "work/out.sarif").exists()
+
+
+@needs_bash
+@pytest.mark.parametrize(("step", "code", "wanted"), [("true", 0, "[step]"), ("false", 0, ""), ("yes", 2, None)])
+def test_the_action_installs_the_step_kernel_on_demand(
+    step: str, code: int, wanted: str | None, tmp_path: Path
+) -> None:
+    _program(tmp_path / "bin/python", "")
+    environment = {
+        **os.environ,
+        "SOURCE": "/a b/unitcad",
+        "STEP": step,
+        "PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}",
+    }
+    done = subprocess.run(
+        ["bash", "-eo", "pipefail", "-c", _scripts()[0]], env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == code
+    if wanted is None:
+        assert "step must be true or false, not yes" in done.stdout
+    else:
+        assert _calls(tmp_path) == [f"-m|pip|install|--quiet|/a b/unitcad{wanted}|"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    assert "step" in extras
+
+
+@needs_bash
+@pytest.mark.parametrize(("fail_on", "code"), [("", 1), ("error", 0)])
+def test_the_action_takes_the_checkouts_settings(fail_on: str, code: int, tmp_path: Path) -> None:
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work/warn.stl").write_bytes(stl(box(), header=b"solid"))
+    (tmp_path / "work/unitcad.toml").write_text("[check]\nfail-on = 'warning'\n")
+    done = _run_action(tmp_path, FILES="warn.stl", FAIL_ON=fail_on)
+    assert done.returncode == code, done.stderr
+
+
+def test_the_settings_on_the_page_are_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (ROOT / "docs/checks-in-ci.md").read_text("utf-8")
+    monkeypatch.chdir(tmp_path)
+    shown = re.findall(r"```toml\n# (\S+)\n(.*?)```", page, re.DOTALL)
+    assert [name for name, _ in shown] == ["unitcad.toml", "pyproject.toml"]
+    for name, text in shown:
+        (tmp_path / name).write_text(text)
+        found = check_settings.find(name)
+        assert found.settings.select is not None
+        assert found.ignored("scans/a.stl")
+        if name == "unitcad.toml":  # it shows every key there is
+            assert all(value is not None for value in structs.asdict(found.settings).values())
+            (tmp_path / "known.json").write_text('{"unitcad-baseline": 1, "files": {}}')
+            (tmp_path / "part.stl").write_bytes(stl(box()))
+            assert run("part.stl", cwd=tmp_path).returncode == 0
+
+
+def test_the_actions_inputs_are_not_pasted_into_its_script() -> None:
+    """An input inside `run:` would let a pull request's text become a command."""
+    assert (ROOT / "action.yml").read_text("utf-8").count("run:") == len(_scripts()) == 2
+    assert not any("${{" in script for script in _scripts())
+
+
+def test_the_page_on_ci_names_what_there_is() -> None:
+    """Its snippets use the hook's id, every input of the action and no other, and options of the command only."""
+    page = (ROOT / "docs/checks-in-ci.md").read_text("utf-8")
+    action = (ROOT / "action.yml").read_text("utf-8")
+    assert f"- id: {_value((ROOT / '.pre-commit-hooks.yaml').read_text('utf-8'), '- id')}\n" in page
+    inputs = re.findall(r"(?m)^  ([\w-]+):$", action[action.index("inputs:") : action.index("runs:")])
+    step = page[page.index("you/unitcad@REF  #") : page.index("- uses: github/codeql-action")]
+    assert re.findall(r"(?m)^          ([\w-]+):", step) == inputs
+    known = {name for parameter in get_command(app).commands["check"].params for name in parameter.opts}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", page)) <= known
+
+
+def test_the_page_on_ci_shows_the_json_that_is_written(judge) -> None:
+    page = (ROOT / "docs/checks-in-ci.md").read_text("utf-8")
+    shown = json.loads(page[page.index("```json\n") + 8 : page.index("```\n", page.index("```json"))])
+    content = re.search(r"open\('open.obj', 'w'\).write\('(.*)'\)", page)
+    assert content is not None
+    found = as_dict([judge(content.group(1).replace("\\n", "\n"), "open.obj")])
+    found["files"][0]["path"] = "open.obj"
+    del found["files"][0]["findings"][0]["locations"][1:]
+    found["files"][0]["facts"]["area_mm2"] = round(found["files"][0]["facts"]["area_mm2"], 6)
+    assert shown == found

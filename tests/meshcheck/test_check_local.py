@@ -1,0 +1,203 @@
+"""Tolerances belong to a shell and its edges: what else is in the file has no say, nor do scale, place and attitude."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, box, in_format, stl, turned
+
+from unitcad.meshcheck import check_bytes, check_mesh
+from unitcad.meshcheck.geometry.triangle_mesh import weld_exact
+from unitcad.meshcheck.rules.registry import explain
+
+BEAM = box((30_000, 10, 10), (0, 5, 0))
+
+
+def codes(report) -> set[str]:
+    return {found.code for found in report.findings} - {"S001"}
+
+
+def _noisy(gap: float, size: float = 10.0) -> np.ndarray:
+    """A cube of which one triangle lies `gap` (part of the size, each way) off its place."""
+    cube = box((size, size, size))
+    cube[0] += gap * size
+    return cube
+
+
+def _sliver() -> np.ndarray:
+    """A box with a long face lower than a float32 step."""
+    cube = box(at=(3, 3, 3))
+    a, b, c = cube[0]
+    point = (a + b) / 2 + (c - (a + b) / 2) * 3e-8
+    return np.concatenate([cube[1:], [[a, point, c], [point, b, c], [a, b, point]]])
+
+
+def _sheet() -> np.ndarray:
+    """A flat tetrahedron: closed, without thickness."""
+    a, b, c, d = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0], [3, 3, 0]], float)
+    return np.array([[a, b, d], [b, c, d], [c, a, d], [a, c, b]])
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("missing", [1, 2])
+def test_a_hole_in_a_small_cube_beside_a_large_part_is_a_hole(name: str, missing: int, judge) -> None:
+    parts = np.concatenate([box((0.2, 0.2, 0.2))[missing:], BEAM])
+    report = judge(in_format(parts, name), name)
+    assert codes(report) == {"T001"}
+    assert next(found.count for found in report.findings if found.code == "T001") == 2 + missing
+
+
+@pytest.mark.parametrize("width", [0.2, 0.002])
+def test_a_slit_is_no_seam_whatever_lies_beside_it(width: float) -> None:
+    """A box of 50 mm with a strip of its top missing: wider than 1e-5 of the box's diagonal of 87 mm."""
+    left, right = 25 - width / 2, 25 + width / 2
+    x = [0, left, right, 50]
+    top = [[[x[k], 0, 50], [x[k + 1], 0, 50], [x[k + 1], 50, 50], [x[k], 50, 50]] for k in (0, 2)]
+    sides = []
+    for y, order in ((0, 1), (50, -1)):
+        ring = [[0, y, 0], [50, y, 0], [50, y, 50], [right, y, 50], [left, y, 50], [0, y, 50]]
+        for a, b, c in ([0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]):
+            sides.append([ring[a], ring[b], ring[c]][::order])
+    bottom = [[0, 0, 0], [0, 50, 0], [50, 50, 0], [50, 0, 0]]
+    ends = [[[0, 0, 0], [0, 0, 50], [0, 50, 50], [0, 50, 0]], [[50, 0, 0], [50, 50, 0], [50, 50, 50], [50, 0, 50]]]
+    for side in (*top, bottom, *ends):
+        sides += [[side[0], side[1], side[2]], [side[0], side[2], side[3]]]
+    slit = np.array(sides, float)
+    assert codes(check_bytes(stl(slit), "a.stl")) == {"T001"}
+    assert codes(check_bytes(stl(np.concatenate([slit, BEAM + np.array([0, 100, 0])])), "a.stl")) == {"T001"}
+    closed = slit.copy()
+    closed[(slit == left) | (slit == right)] = 25
+    kept = np.linalg.norm(np.cross(closed[:, 1] - closed[:, 0], closed[:, 2] - closed[:, 0]), axis=1) > 0
+    assert codes(check_bytes(stl(closed[kept]), "a.stl")) == set()
+
+
+@pytest.mark.parametrize(("gap", "closes"), [(0.9e-5, True), (1.1e-5, False)])
+@pytest.mark.parametrize("company", [False, True])
+@pytest.mark.parametrize("scale", [1.0, 0.02, 300.0])
+def test_the_weld_reaches_as_far_as_the_rule_says(gap: float, closes: bool, company: bool, scale: float) -> None:
+    assert "1e-5 of their own shell's diagonal" in explain("T006")
+    soup = _noisy(gap) * scale
+    if company:
+        soup = np.concatenate([soup, BEAM + np.array([0, 0, 20 * scale])])
+    report = check_mesh(*weld_exact(soup))
+    assert report.has("T006") == closes
+    assert report.has("T001") == (not closes)
+
+
+@pytest.mark.parametrize(("gap", "closes"), [(0.09, True), (0.11, False)])
+def test_the_weld_reaches_no_farther_than_a_tenth_of_the_shortest_edge(gap: float, closes: bool) -> None:
+    """A pyramid of a millimetre on a plate of 30 m (1e-5 of it is 0.4 mm), one of its sides off its place."""
+    assert "a tenth of the shortest edge" in explain("T006")
+    low, high = 0.0, 3e4
+    rim = np.array([[low, low, 0], [high, low, 0], [high, high, 0], [low, high, 0]])
+    foot = np.array([[500, 500, 0], [501, 500, 0], [501, 501, 0], [500, 501, 0]], float)
+    tip = np.array([500.5, 500.5, 1])
+    found = []
+    for k in range(4):
+        m = (k + 1) % 4
+        found += [[rim[k], rim[m], foot[m]], [rim[k], foot[m], foot[k]], [foot[k], foot[m], tip]]
+        found += [[rim[m], rim[k], rim[k] - [0, 0, 9]], [rim[m], rim[k] - [0, 0, 9], rim[m] - [0, 0, 9]]]
+    under = rim - [0, 0, 9]
+    found += [[under[0], under[2], under[1]], [under[0], under[3], under[2]]]
+    soup = np.array(found)
+    assert codes(check_mesh(*weld_exact(soup))) == set()
+    soup[2] += [0, gap * np.sqrt(0.5), gap * np.sqrt(0.5)]
+    report = check_mesh(*weld_exact(soup))
+    assert report.has("T006") == closes
+    assert report.has("T001") == (not closes)
+
+
+def test_normals_are_those_of_the_faces_as_stored() -> None:
+    """Beside a part of 300 mm a weld by the file's size would move a corner of the small cube far."""
+    soup = np.concatenate([_noisy(0.24, 0.012), box((300, 300, 300), (20, 20, 20))])
+    for some in (soup, soup[:12], _noisy(5e-6)):
+        stored = some.astype(np.float32).astype(float)
+        normal = np.cross(stored[:, 1] - stored[:, 0], stored[:, 2] - stored[:, 0])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        report = check_bytes(stl(stored, normals=normal), "a.stl")
+        assert not report.has("T013")
+        assert check_bytes(stl(stored, normals=-normal), "a.stl").has("T013")
+
+
+@pytest.mark.parametrize(("shift", "crosses"), [(5e-5, True), (-5e-5, False)])
+def test_crossings_are_those_of_the_faces_as_stored(shift: float, crosses: bool) -> None:
+    """A side of a cube pushed in by less than the tolerance passes through the top, pulled out it does not."""
+    soup = box()
+    soup[0] += [shift, 0, 5e-5]
+    report = check_bytes(stl(soup), "a.stl")
+    assert report.has("T006")
+    assert report.has("G001") == crosses
+    assert report.facts.volume_mm3 == pytest.approx(1000, rel=1e-4)
+
+
+def test_a_vertex_that_no_face_uses_has_no_part_in_the_size() -> None:
+    """At 30 km it would let a missing face of the cube pass, and take a cube for a sheet."""
+    points = np.concatenate([CUBE_CORNERS * 10, [[3e7, 0, 0]]])
+    assert codes(check_mesh(points, CUBE_FACES)) == {"T012"}
+    assert codes(check_mesh(points, CUBE_FACES[1:])) == {"T001", "T012"}
+
+
+@pytest.mark.parametrize(
+    ("part", "code"),
+    [(_sliver(), "T011"), (_sheet(), "G007"), (box(at=(25_000, 0, 100)), "V002")],
+    ids=["sliver", "sheet", "far"],
+)
+def test_small_shells_are_judged_by_their_own_size(part: np.ndarray, code: str, judge) -> None:
+    alone = codes(judge(stl(part)))
+    report = judge(stl(np.concatenate([part, BEAM - [0, 0, 50]])))
+    assert code in alone
+    assert codes(report) == alone
+    assert next(found.count for found in report.findings if found.code == code) == 1
+
+
+PARTS = {
+    "sound": box(),
+    "hole": box()[1:],
+    "seam": _noisy(5e-6),
+    "gap": _noisy(5e-5),
+    "sliver": _sliver(),
+    "sheet": _sheet(),
+    "line": np.concatenate([box(), [[[0, 0, 0], [10, 0, 0], [5, 0, 0]]]]),
+    "inside out": box()[:, ::-1],
+    "turned over": np.concatenate([box()[:1, ::-1], box()[1:]]),
+    "hollow": np.concatenate([box(), box((5, 5, 5), (2, 2, 2))[:, ::-1]]),
+    "nested": np.concatenate([box(), box((5, 5, 5), (2, 2, 2))]),
+    "pierced": np.concatenate([box(), box((5, 5, 20), (2, 2, -5))]),
+    "stacked": np.concatenate([box(), box((4, 4, 4), (3, 3, 10))]),
+    "edge to edge": np.concatenate([box(), box(at=(10, 10, 0))]),
+    "twice": np.concatenate([box(), box()]),
+}
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    one=st.sampled_from(sorted(PARTS)),
+    other=st.sampled_from(sorted(PARTS)),
+    scale=st.sampled_from([0.02, 1.0, 3.7, 500.0]),
+    seed=st.integers(0, 99),
+)
+def test_two_parts_far_apart_have_the_findings_of_each(one: str, other: str, scale: float, seed: int) -> None:
+    """In double precision, the second part scaled and turned; both stay as they are when they are judged together."""
+    first, second = PARTS[one] + 0.0, turned(PARTS[other], seed, scale)
+    second += [50 - second[:, :, 0].min(), 0, 0]
+    alone = codes(check_mesh(*weld_exact(first))) | codes(check_mesh(*weld_exact(second)))
+    assert codes(check_mesh(*weld_exact(np.concatenate([first, second])))) == alone
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    part=st.sampled_from(["sound", "hole", "seam", "gap", "inside out", "turned over", "hollow", "nested", "pierced"]),
+    seed=st.integers(0, 999),
+    scale=st.sampled_from([0.15, 1.0, 3.7, 90.0]),
+    mirror=st.booleans(),
+)
+def test_scale_place_attitude_and_mirror_do_not_matter(part: str, seed: int, scale: float, mirror: bool) -> None:
+    """As float32; a shift of up to five sizes leaves the grid fine enough for each of these defects."""
+    moved = turned(PARTS[part], seed, scale, 50 * scale, mirror)
+    plain = codes(check_bytes(stl(PARTS[part]), "a.stl"))
+    found = codes(check_bytes(stl(moved), "a.stl"))
+    if part in ("seam", "gap"):  # which side of its neighbours the loose face lies on decides whether it crosses them
+        plain, found = plain - {"G001"}, found - {"G001"}
+    assert found == plain

@@ -1,0 +1,299 @@
+"""A shell that overlaps itself (G008), and walls and gaps without thickness (G009)."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from manifold3d import triangulate
+from shapes import FORMATS, box, in_format, obj, stl, text_ply, turned
+
+from unitcad.meshcheck import check_bytes, check_mesh
+from unitcad.meshcheck.geometry.triangle_mesh import weld_exact
+from unitcad.meshcheck.rules.registry import rules
+
+OVERLAP = {"G002", "G008", "T008", "G009", "T009"}
+
+
+def codes(report) -> set[str]:
+    return {found.code for found in report.findings} - {"S001"}
+
+
+def pentagram(peaks: bool) -> np.ndarray:
+    """A prism over the star polygon {5/2}, 5 high; its walls share edges where they meet, so that no faces cross.
+
+    Its middle pentagon is covered twice at top and bottom: by two fans, or by two pyramids of different height.
+    """
+    angle = np.radians(90 + 72 * np.arange(5))
+    inner = 10 * np.sin(np.radians(18)) / np.sin(np.radians(126))
+    rings = [np.stack([r * np.cos(a), r * np.sin(a)], axis=1) for r, a in ((10, angle), (inner, angle + np.pi / 5))]
+    plan = np.concatenate(rings)
+
+    def at(i: int, z: float) -> list[float]:
+        return [*plan[i], z]
+
+    found = []
+    for k in range(5):
+        path = [k, 5 + k, 5 + (k + 1) % 5, (k + 2) % 5]
+        for u, v in itertools.pairwise(path):
+            found += [[at(u, 0), at(v, 0), at(v, 5)], [at(u, 0), at(v, 5), at(u, 5)]]
+    caps = [(k, 5 + k, 5 + (k - 1) % 5) for k in range(5)]
+    if peaks:
+        for height in (1, 3):
+            for k in range(5):
+                u, v = 5 + k, 5 + (k + 1) % 5
+                found += [[at(u, 5), at(v, 5), [0, 0, 5 + height]], [at(v, 0), at(u, 0), [0, 0, -height]]]
+    else:
+        caps += [(5 + s, 5 + (s + j) % 5, 5 + (s + j + 1) % 5) for s in (0, 2) for j in (1, 2, 3)]
+    for a, b, c in caps:
+        found += [[at(a, 5), at(b, 5), at(c, 5)], [at(a, 0), at(c, 0), at(b, 0)]]
+    return np.array(found)
+
+
+def double_sphere(n: int = 6) -> tuple[np.ndarray, np.ndarray]:
+    """A sphere that goes round twice between its poles; the second round is listed apart and has other diagonals."""
+    points = [[0.0, 0.0, 10.0], [0.0, 0.0, -10.0]]
+    place: dict[tuple[int, int], int] = {}
+    for i in range(1, n):
+        for j in range(4 * n):
+            place[i, j] = len(points)
+            theta, phi = np.pi * i / n, 2 * np.pi * (j % (2 * n)) / (2 * n)
+            points.append([10 * np.sin(theta) * np.cos(phi), 10 * np.sin(theta) * np.sin(phi), 10 * np.cos(theta)])
+    faces = []
+    for j in range(4 * n):
+        k = (j + 1) % (4 * n)
+        faces += [[0, place[1, j], place[1, k]], [1, place[n - 1, k], place[n - 1, j]]]
+        for i in range(1, n - 1):
+            a, b, c, d = place[i, j], place[i + 1, j], place[i + 1, k], place[i, k]
+            faces += [[a, b, c], [a, c, d]] if j < 2 * n else [[a, b, d], [b, c, d]]
+    return np.array(points), np.array(faces)
+
+
+def prisms(triangles: list, height: float = 5) -> np.ndarray:
+    """Upright prisms over triangles in plan that turn anticlockwise or clockwise; common walls are left out."""
+    found, sides = [], {}
+    for corners in triangles:
+        a, b, c = corners
+        found += [[[*a, height], [*b, height], [*c, height]], [[*a, 0], [*c, 0], [*b, 0]]]
+        for side in ((a, b), (b, c), (c, a)):
+            sides[side] = sides.get(side, 0) + 1
+    for (u, v), n in sides.items():
+        for _ in range(n - sides.get((v, u), 0)):
+            found += [[[*u, 0], [*v, 0], [*v, height]], [[*u, 0], [*v, height], [*u, height]]]
+    return np.array(found, float)
+
+
+BOW_TIE = prisms([((0, 0), (5, -3), (5, 3)), ((0, 0), (-5, -4), (-5, 4))])
+TWO_WEDGES = prisms([((0, 0), (5, -3), (5, 3)), ((0, 0), (-5, 4), (-5, -4))])
+EDGE_TO_EDGE = np.concatenate([box(), box(at=(10, 10, 0))])
+
+
+@pytest.mark.parametrize(
+    "body", [pentagram(True), pentagram(False), BOW_TIE], ids=["pentagram with peaks", "pentagram", "bow tie"]
+)
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_shell_that_passes_through_itself_along_edges(body: np.ndarray, name: str, judge) -> None:
+    for seed, scale, shift, mirror in ((0, 1, 0, False), (1, 1, 20, True), (2, 7.3, 100, False), (3, 0.3, 1, True)):
+        moved = turned(body, seed, scale, shift, mirror) if seed else body
+        found = {item.code: item for item in judge(in_format(moved, name), name).findings}
+        assert "G001" not in found
+        assert found["G008"].severity == ("warning" if name == "part.3mf" else "error")
+    assert rules()["G008"].severity == "error"
+
+
+@pytest.mark.parametrize("listed_apart", [False, True])
+@pytest.mark.parametrize("form", [text_ply, obj], ids=["ply", "obj"])
+def test_vertices_listed_apart_do_not_hide_an_overlap(listed_apart: bool, form, judge) -> None:
+    points, faces = double_sphere()
+    if not listed_apart:
+        points, faces = weld_exact(points[faces])
+    name = "part.ply" if form is text_ply else "part.obj"
+    report = judge(form(points, faces), name)
+    assert report.verdict == "error"
+    assert codes(report) & {"G008", "G002", "T009"}
+    assert codes(check_mesh(turned(points, 3), faces)) & OVERLAP
+
+
+@pytest.mark.parametrize("body", [EDGE_TO_EDGE, TWO_WEDGES], ids=["cubes", "wedges"])
+@pytest.mark.parametrize("apart", [False, True])
+def test_solids_that_share_an_edge_do_not_overlap(body: np.ndarray, apart: bool) -> None:
+    for seed in range(6):
+        moved = turned(body, seed, 1 + seed, 10 * seed, bool(seed % 2)).astype(np.float32).astype(float)
+        points, faces = weld_exact(moved)
+        if apart:
+            half = len(moved) // 2 if body is EDGE_TO_EDGE else None
+            if half is None:
+                continue
+            (one, first), (other, second) = weld_exact(moved[:half]), weld_exact(moved[half:])
+            points, faces = np.concatenate([one, other]), np.concatenate([first, second + len(one)])
+        assert codes(check_mesh(points, faces)) <= {"G003", "T003"}
+
+
+def _surface(field: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The faces between cells of different winding number, as many as the numbers differ, with either diagonal."""
+    padded, found = np.pad(field, 1), []
+    for axis in range(3):
+        u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+        step = np.diff(padded, axis=axis)
+        for cell in np.argwhere(step):
+            corner = cell + np.eye(3)[axis]
+            ring = [corner, corner + u, corner + u + v, corner + v]
+            rise = step[tuple(cell)]
+            ring = ring[::-1] if rise > 0 else ring
+            for _ in range(abs(rise)):
+                k = int(rng.integers(0, 2))
+                found += [[ring[k], ring[k + 1], ring[k + 2]], [ring[k], ring[k + 2], ring[(k + 3) % 4]]]
+    return np.array(found)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    values=st.sampled_from([(0, 1), (0, 1, 2), (-1, 0, 1), (0, 1, 2, 3)]),
+    turn=st.booleans(),
+)
+def test_every_winding_number_but_0_and_1_is_an_error(seed: int, values: tuple[int, ...], turn: bool) -> None:
+    """Random cells with a winding number each, and the surface between them: neighbours differ by one at most, so that
+    no face is there twice; where edges meet the surface touches itself in every way that a grid has.
+    """
+    rng = np.random.default_rng(seed)
+    field = rng.choice(values, (3, 3, 3), p=[0.5, 0.5] if len(values) == 2 else None)
+    for _ in range(40):  # smooth until no neighbours differ by more
+        padded = np.pad(field, 1)
+        low = np.full(field.shape, -9)
+        for axis in range(3):
+            for way in (-1, 1):
+                low = np.maximum(low, np.roll(padded, way, axis)[1:-1, 1:-1, 1:-1] - 1)
+        field = np.maximum(field, low)
+    padded = np.pad(field, 1)
+    if any(np.abs(np.diff(padded, axis=axis)).max() > 1 for axis in range(3)) or not field.any():
+        return
+    body = _surface(field, rng)
+    body = turned(body, seed, 3.0, 20, bool(seed % 2)) if turn else body
+    report = check_bytes(stl(body), "a.stl")
+    errors = {found.code for found in report.findings if found.severity == "error"}
+    assert bool(errors) == (not {0, 1} >= set(field.ravel().tolist())), (errors, field)
+
+
+@settings(max_examples=40, deadline=None)
+@given(n=st.integers(4, 12), seed=st.integers(0, 10**6), turn=st.booleans(), scale=st.sampled_from([0.3, 1.0, 40.0]))
+def test_faces_of_one_concave_polygon_are_not_accused(n: int, seed: int, turn: bool, scale: float) -> None:
+    """Top and bottom of a prism are one concave polygon each, cut into triangles that do not overlap."""
+    rng = np.random.default_rng(seed)
+    angle = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
+    radius = 10 * np.where(np.arange(n) % 2, rng.uniform(0.15, 0.5, n), 1.0)
+    outline = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1).astype(np.float32).astype(float)
+    low, high = (np.column_stack([outline, np.full(n, z)]) for z in (0.0, 5.0))
+    cut = np.array(triangulate([outline]))
+    sides = [[[low[k], low[k - n + 1], high[k - n + 1]], [low[k], high[k - n + 1], high[k]]] for k in range(n)]
+    body = np.concatenate([high[cut], low[cut][:, ::-1], np.array(sides).reshape(-1, 3, 3)])
+    body = turned(body, seed, scale, 3 * scale, bool(seed % 2)) if turn else body
+    for name in ("binary.stl", "part.ply"):
+        content = in_format(body, name)
+        report = check_bytes(content if isinstance(content, bytes) else content.encode(), name)
+        assert codes(report) == set()
+
+
+@pytest.mark.parametrize("form", ["ply", "obj", "off"])
+@pytest.mark.parametrize("first", range(4))
+def test_a_solid_of_concave_quads_passes_as_polygons(form: str, first: int, judge) -> None:
+    """An arrow head of quads, read from polygons, whichever corner of the concave ones is listed first."""
+    outline = [(0, 0), (10, -10), (0, 20), (-10, -10)]
+    points = [(x, y, z) for z in (0, 5) for x, y in outline]
+    caps = [[0, 3, 2, 1], [4, 5, 6, 7]]
+    faces = [cap[first:] + cap[:first] for cap in caps] + [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
+    rows = "".join(f"{x} {y} {z}\n" for x, y, z in points)
+    listed = "".join(f"4 {' '.join(map(str, face))}\n" for face in faces)
+    if form == "ply":
+        head = "ply\nformat ascii 1.0\nelement vertex 8\n" + "".join(f"property float {axis}\n" for axis in "xyz")
+        text = f"{head}element face 6\nproperty list uchar int vertex_indices\nend_header\n{rows}{listed}"
+    elif form == "off":
+        text = f"OFF\n8 6 0\n{rows}{listed}"
+    else:
+        text = "".join(f"v {x} {y} {z}\n" for x, y, z in points)
+        text += "".join(f"f {' '.join(str(k + 1) for k in face)}\n" for face in faces)
+    report = judge(text, f"part.{form}")
+    assert report.findings == ()
+    assert report.facts.volume_mm3 == pytest.approx(5 * 200)
+
+
+def fin(*, other_diagonals: bool, cells: int = 1) -> np.ndarray:
+    """Two coincident sheets from the origin's upright edge outwards, 5 sqrt(2) by 10; `cells` quads each way."""
+    found = []
+    steps = np.linspace(0, 1, cells + 1)
+    for i in range(cells):
+        for j in range(cells):
+            ring = [np.array([-5 * s, -5 * s, 10 * t])
+                    for s, t in ((steps[i], steps[j]), (steps[i], steps[j + 1]),
+                                 (steps[i + 1], steps[j + 1]), (steps[i + 1], steps[j]))]  # fmt: skip
+            a, b, c, d = ring
+            found += [[a, b, c], [a, c, d]]
+            found += [[b, a, d], [b, d, c]] if other_diagonals else [[a, c, b], [a, d, c]]
+    return np.array(found)
+
+
+@pytest.mark.parametrize("cells", [1, 2, 5])
+@pytest.mark.parametrize("place", ["attached", "beside", "alone", "on a face", "in a corner"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fin_is_an_error_whichever_way_its_quads_are_cut(cells: int, place: str, seed: int) -> None:
+    verdicts = []
+    for other in (False, True):
+        sheet = fin(other_diagonals=other, cells=cells)
+        if place == "beside":
+            sheet = sheet - 20
+        elif place == "on a face":
+            sheet = sheet * 0.5 + [7, 7, 10]
+        elif place == "in a corner":
+            sheet = sheet * [1, 1, 0.5] + [0, 0, -10]
+        body = sheet if place == "alone" else np.concatenate([box(), sheet])
+        if seed:
+            body = turned(body, seed, 1 + seed, 10, bool(seed % 2))
+        verdicts.append(check_bytes(stl(body), "a.stl").verdict)
+    assert verdicts == ["error", "error"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_fin_whose_sides_are_cut_by_different_points_is_an_error(seed: int) -> None:
+    """One side is a fan about a point near its middle, the other a grid; the rim is the same."""
+    rng = np.random.default_rng(seed)
+    steps = np.linspace(0, 1, 4)
+    rim = [(s, 0.0) for s in steps[:-1]] + [(1.0, s) for s in steps[:-1]]
+    rim += [(s, 1.0) for s in steps[:0:-1]] + [(0.0, s) for s in steps[:0:-1]]
+    middle = tuple(0.5 + rng.uniform(-0.1, 0.1, 2))
+    front = [[middle, rim[k], rim[(k + 1) % len(rim)]] for k in range(len(rim))]
+    back = []
+    for i in range(3):
+        for j in range(3):
+            a, b = (steps[i], steps[j]), (steps[i + 1], steps[j])
+            c, d = (steps[i + 1], steps[j + 1]), (steps[i], steps[j + 1])
+            back += [[a, c, b], [a, d, c]]
+    plan = np.array(front + back)
+    sheet = plan[..., :1] * [-5, -5, 0] + plan[..., 1:] * [0, 0, 10]
+    for body in (sheet, np.concatenate([box(), sheet])):
+        moved = turned(body, seed, 1.3, 10) if seed else body
+        assert check_bytes(stl(moved), "a.stl").verdict == "error"
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-3])
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("parts", "thin"),
+    [
+        (lambda gap: [box(), box((4, 4, 4), (3, 3, 10 + gap))], False),
+        (lambda gap: [box(), box((6, 6, 6), (2, 2, 2))[:, ::-1], box((4, 4, 4), (3, 3, 2 + gap))], False),
+        (lambda gap: [box(), box((4, 4, 4), (3, 3, 6 - gap))[:, ::-1]], True),
+        (lambda gap: [box(), box((10, 10, 4), (0, 0, 10 + gap))], False),
+        (lambda gap: [box(), box((4, 4, 4), (6 - gap, 6 - gap, 6 - gap))[:, ::-1]], True),
+    ],
+    ids=["stacked", "in a cavity", "cavity at the surface", "stacked flush", "cavity in the corner"],
+)
+def test_solids_touch_but_a_cavity_at_the_surface_leaves_no_wall(parts, thin: bool, gap: float, seed: int) -> None:
+    body = np.concatenate(parts(gap))
+    if seed:  # quarter turns keep faces in one plane
+        body = np.roll(body, seed, axis=2) * [1, 1, 1] + [seed, -seed, 0]
+    found = codes(check_bytes(stl(body), "a.stl"))
+    assert bool(found & {"G009", "T009"}) == (thin and gap == 0)
+    assert not found & {"G001", "G002", "G008"}

@@ -1,0 +1,101 @@
+"""Work grows with the faces: counted, not timed. What reaches the exact stages and manifold3d, by size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from shapes import CUBE_CORNERS, CUBE_FACES
+
+from unitcad.meshcheck import check_mesh
+from unitcad.meshcheck.geometry import predicates, self_crossing, triangles
+from unitcad.meshcheck.rules import g_shells
+
+Built = tuple[np.ndarray, np.ndarray]
+
+
+def cubes(n: int, turned: bool = False) -> Built:
+    """n cubed cubes of 10 mm that touch."""
+    place = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    points = (CUBE_CORNERS + place).reshape(-1, 3) * 10
+    if turned:
+        turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+        points = (points @ turn).astype(np.float32).astype(float)
+    return points, (CUBE_FACES + 8 * np.arange(n**3)[:, None, None]).reshape(-1, 3).astype(np.int32)
+
+
+def plate(n: int, around: int = 24) -> Built:
+    """A plate with n squared round holes, cut into triangles by manifold3d: rims with fans of thin triangles."""
+    from manifold3d import CrossSection, Manifold
+
+    section = CrossSection.square((10.0 * n, 10.0 * n))
+    for i in range(n):
+        for j in range(n):
+            section -= CrossSection.circle(3.0, around).translate((10.0 * i + 5, 10.0 * j + 5))
+    mesh = Manifold.extrude(section, 4.0).to_mesh64()
+    return np.asarray(mesh.vert_properties)[:, :3].astype(np.float32).astype(float), np.asarray(
+        mesh.tri_verts, np.int32
+    )
+
+
+@pytest.fixture
+def work(monkeypatch: pytest.MonkeyPatch) -> Callable[[Built], dict[str, float]]:
+    """Pairs that get past the sieves, pairs decided, rows of Python's integers and booleans, a face of the mesh."""
+    count: dict[str, int] = {}
+
+    def watch(module: object, name: str, key: str, rows: Callable[..., int]) -> None:
+        real = getattr(module, name)
+
+        def counted(*given: object) -> object:
+            count[key] = count.get(key, 0) + rows(*given)
+            return real(*given)
+
+        monkeypatch.setattr(module, name, counted)
+
+    watch(self_crossing, "_decide_exactly", "sieved", lambda _, i, *others: len(i))
+    watch(triangles, "meet", "decided", lambda a, _: len(a))
+    watch(predicates, "integers", "integers", lambda values: values.shape[-1])
+    watch(g_shells, "_shared", "booleans", lambda *_: 1)
+
+    def judged(built: Built) -> dict[str, float]:
+        count.clear()
+        count.update(dict.fromkeys(("sieved", "decided", "integers", "booleans"), 0))
+        check_mesh(*built)
+        return {key: value / len(built[1]) for key, value in count.items()}
+
+    return judged
+
+
+def test_touching_cubes(work: Callable[[Built], dict[str, float]]) -> None:
+    """A cube has 26 neighbours at most, and the share of those inside grows a little with the size."""
+    small, large = work(cubes(5)), work(cubes(10))
+    assert large["sieved"] < 1.3 * small["sieved"] < 60
+    assert large["decided"] <= 1.3 * small["decided"] < 25
+    assert large["booleans"] == large["integers"] == 0
+
+
+def test_touching_cubes_that_are_turned(work: Callable[[Built], dict[str, float]]) -> None:
+    small, large = work(cubes(4, turned=True)), work(cubes(8, turned=True))
+    assert large["sieved"] < 1.5 * small["sieved"] < 90
+    assert large["booleans"] <= 26 / 2 / 12
+    assert large["integers"] == 0
+
+
+def test_plates_with_round_holes(work: Callable[[Built], dict[str, float]]) -> None:
+    small, large = work(plate(5)), work(plate(12))
+    assert large["sieved"] < 2 * small["sieved"] < 3
+    assert large["decided"] < 0.2
+    assert large["integers"] == 0
+
+
+def test_slivers_and_doubled_faces(work: Callable[[Built], dict[str, float]]) -> None:
+    """A bent sheet of slivers on a turned plane, and every third face twice, a hair off: none needs long integers."""
+    rng = np.random.default_rng(4)
+    points, faces = plate(6)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    again = points + rng.normal(size=points.shape) * 1e-6
+    points = (np.concatenate([points, again]) @ turn).astype(np.float32).astype(float)
+    done = work((points, np.concatenate([faces, faces[::3] + len(again)])))
+    assert done["decided"] > 1
+    assert done["integers"] == 0

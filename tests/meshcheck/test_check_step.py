@@ -1,0 +1,100 @@
+"""STEP: judged where a B-rep extra is installed, refused with a clear message where none is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from unitcad.meshcheck import Limits, Options, check_file, many_files
+from unitcad.meshcheck.readers import read_step
+
+
+def test_without_the_extra_the_message_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.step"
+    path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n")
+    monkeypatch.setattr(read_step, "installed", lambda: False)
+    report = check_file(path)
+    assert report.verdict == "error"
+    assert report.has("F012")
+    assert "pip install '.[step]'" in report.findings[0].message
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_step_in_a_folder_is_a_warning_without_the_extra(
+    there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.STEP").write_text("x")
+    (tmp_path / "b.stl").write_text("x")
+    monkeypatch.setattr(read_step, "installed", lambda: there)
+    paths, reports = many_files.expand([str(tmp_path)])
+    assert [Path(path).name for path in paths] == (["a.STEP", "b.stl"] if there else ["b.stl"])
+    assert [(report.verdict, report.has("F012")) for report in reports] == ([] if there else [("warning", True)])
+    assert many_files.expand([str(tmp_path / "a.STEP")]) == ([str(tmp_path / "a.STEP")], [])
+
+
+@pytest.mark.parametrize(
+    ("text", "code"), [("", "F001"), ("solid a", "F005"), ("ISO-10303-21;\nHEADER;", "F003"), ("<html>", "F005")]
+)
+def test_what_is_no_step_file(text: str, code: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.step"
+    path.write_text(text)
+    assert [found.code for found in check_file(path).findings] == [code]
+
+
+def test_solids_volume_and_box(tmp_path: Path) -> None:
+    pytest.importorskip("OCP")
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+    from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+    from OCP.TopoDS import TopoDS_Compound
+
+    compound, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(compound)
+    builder.Add(compound, BRepPrimAPI_MakeBox(10.0, 20.0, 30.0).Shape())
+    builder.Add(compound, BRepPrimAPI_MakeCylinder(5.0, 10.0).Shape())
+    writer = STEPControl_Writer()
+    writer.Transfer(compound, STEPControl_AsIs)
+    path = tmp_path / "two.step"
+    writer.Write(str(path))
+    report = check_file(path)
+    assert [found.code for found in report.findings] == ["G002"]  # a quarter of the cylinder lies in the box
+    assert report.facts.shells == 2
+    assert report.facts.volume_mm3 == pytest.approx(6000 + 785.3981633974483, rel=1e-9)
+    assert report.facts.bbox_mm is not None
+    assert report.facts.bbox_mm[1] == pytest.approx((10, 20, 30), abs=1e-6)
+    assert check_file(path, Options(shells=1)).has("G005")
+    cut = tmp_path / "cut.step"
+    cut.write_bytes(path.read_bytes()[:-200])
+    assert check_file(cut).has("F003")
+
+
+def test_a_reader_that_dies_or_prints_is_a_finding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.step"
+    path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n")
+    monkeypatch.setattr(read_step, "installed", lambda: True)
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    import dying
+
+    for child, code, said in (
+        (dying.aborts, "F003", "died"),
+        (dying.prints, "F012", "pip install"),
+        (dying.hangs, "F011", "not finished"),
+    ):
+        monkeypatch.setattr(read_step, "measure", child)
+        (found,) = check_file(path, Options(limits=Limits(seconds=5))).findings
+        assert found.code == code
+        assert said in found.message
+    assert capfd.readouterr().out == ""
+
+
+def test_damaged_step_files_give_a_verdict_and_print_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("OCP")
+    path = tmp_path / "a.step"
+    path.write_text(
+        "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=SHAPE_REPRESENTATION('',(#1),#1);\nENDSEC;\nEND-ISO-10303-21;\n"
+    )
+    assert [found.code for found in check_file(path).findings] == ["F003"]
+    assert capfd.readouterr().out == ""

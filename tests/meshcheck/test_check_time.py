@@ -1,0 +1,132 @@
+"""A file whose time runs out: everything that was found by then is reported, with F011 beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import CUBE_CORNERS, CUBE_FACES, mesh_xml, model_xml, package, stl
+
+from unitcad.catalogue import printers
+from unitcad.geometry import boxes
+from unitcad.meshcheck import check_bytes
+from unitcad.meshcheck.findings import Facts, FileReport
+from unitcad.meshcheck.geometry import self_crossing
+from unitcad.meshcheck.options import Options
+from unitcad.meshcheck.rules.f_limits import Deadline, OutOfTime, Unreadable
+
+
+def _open_and_crossing() -> tuple[np.ndarray, np.ndarray]:
+    """A cube without one face, and beside it twelve bars, each of which pierces a cube."""
+    corners, faces = [CUBE_CORNERS * 10], [CUBE_FACES[1:]]
+    for k in range(12):
+        at = np.array([20.0 * (k + 1), 0, 0])
+        for box in (CUBE_CORNERS * 10 + at, CUBE_CORNERS * [2, 2, 20] + [4, 4, -5] + at):
+            faces.append(CUBE_FACES + 8 * len(corners))
+            corners.append(box)
+    return np.concatenate(corners), np.concatenate(faces)
+
+
+def _stl() -> bytes:
+    points, faces = _open_and_crossing()
+    return stl(points[faces])
+
+
+def _threemf() -> bytes:
+    points, faces = _open_and_crossing()
+    objects = f'<object id="1">{mesh_xml()}</object><object id="2">{mesh_xml(points, faces)}</object>'
+    return package(model_xml(objects, '<build><item objectid="1"/><item objectid="2"/></build>'))
+
+
+@pytest.fixture
+def stopped(monkeypatch: pytest.MonkeyPatch):
+    """Judge `data` with a clock that runs out at its n-th look."""
+    monkeypatch.setattr(self_crossing, "_BLOCK", 100)
+    monkeypatch.setattr(boxes, "_STEP_BITS", 4)
+    monkeypatch.setattr(boxes, "_STEP", 16)
+
+    def judge(data: bytes, name: str, looks: int, options: Options) -> FileReport:
+        left = looks
+
+        def tick(clock: Deadline) -> None:
+            nonlocal left
+            left -= 1
+            if left < 0:
+                raise OutOfTime(clock.seconds)
+
+        monkeypatch.setattr(Deadline, "tick", tick)
+        return check_bytes(data, name, options)
+
+    return judge
+
+
+@pytest.mark.parametrize("name", ["a.stl", "a.3mf"])
+@pytest.mark.parametrize("printer", [False, True], ids=["mesh rules", "and a printer's"])
+def test_what_was_found_is_reported_and_never_lost_again(name: str, printer: bool, stopped) -> None:
+    data = _stl() if name == "a.stl" else _threemf()
+    options = Options(printer=printers()["fdm-0.4"] if printer else None)
+    whole = {item.code: item for item in stopped(data, name, 10**9, options).findings}
+    assert {"T001", "G001"} <= set(whole)
+    reached: dict[str, int] = {}
+    crossings, looks = [0], 0
+    while True:
+        report = stopped(data, name, looks, options)
+        if not report.has("F011"):
+            break
+        assert report.verdict == "error"
+        found = {item.code: item for item in report.findings}
+        for code in set(found) - {"F011"}:
+            reached.setdefault(code, looks)
+            assert found[code].count <= whole[code].count
+            assert found[code].severity == whole[code].severity
+        assert all(code in found for code in reached)
+        crossings.append(found["G001"].count if "G001" in found else 0)
+        looks += 1 + looks // 12
+    assert {"T001", "G001"} <= set(reached)
+    assert crossings == sorted(crossings)
+    assert len(set(crossings)) > 3  # crossings are counted as far as they were looked for
+    assert report.findings == tuple(whole.values())
+
+
+def test_facts_that_were_known_are_reported(stopped) -> None:
+    whole = stopped(_stl(), "a.stl", 10**9, Options())
+    assert stopped(_stl(), "a.stl", 0, Options()).facts == Facts()
+    known = [stopped(_stl(), "a.stl", looks, Options()).facts for looks in range(2, 20)]
+    assert all(facts.bbox_mm == whole.facts.bbox_mm for facts in known)
+    assert known[-1].area_mm2 == whole.facts.area_mm2
+
+
+def test_filters_drop_what_was_found_but_not_the_limit(stopped) -> None:
+    report = stopped(_stl(), "a.stl", 30, Options(ignore=("T", "F", "G")))
+    assert [item.code for item in report.findings] == ["F011"]
+
+
+def test_no_memory_ends_as_a_limit_with_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(self_crossing, "_decide", fails)
+    report = check_bytes(_stl(), "a.stl")
+    assert report.has("F011")
+    assert report.has("T001")
+    assert "out of memory" in next(item.message for item in report.findings if item.code == "F011")
+
+
+def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
+    import signal
+    import time
+
+    from unitcad.meshcheck import many_files
+    from unitcad.meshcheck.rules import g_shells
+    from unitcad.meshcheck.rules.f_limits import Limits
+
+    if not hasattr(signal, "setitimer"):
+        pytest.skip("no interval timer")
+    monkeypatch.setattr(many_files, "_GRACE", 0.1)
+    monkeypatch.setattr(g_shells, "check_mesh", lambda *_: time.sleep(60))
+    path = tmp_path / "a.stl"
+    path.write_bytes(_stl())
+    report = many_files.guarded(str(path), Options(limits=Limits(seconds=1.0)))
+    assert {"F011", "T001", "G001"} <= {item.code for item in report.findings}
+    assert next(item.message for item in report.findings if item.code == "F011") == "not finished within --timeout 1 s"
+    with pytest.raises(Unreadable), many_files._alarm(0.01):
+        time.sleep(60)

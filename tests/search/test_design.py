@@ -1,0 +1,427 @@
+"""`unitcad design`: the known answer, against one spec at a time; limits, impossible wishes, castability, files."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from unitcad.attenuation.crosstalk import crosstalk_ratio
+from unitcad.attenuation.curve import layered_block
+from unitcad.attenuation.edge.predictive import predictive_of
+from unitcad.attenuation.receivers import unit_mass
+from unitcad.casting.procedure import procedure
+from unitcad.errors import Refusal
+from unitcad.estimating import estimate_input
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.search import castability, design_files, proposals
+from unitcad.search.candidates import Candidates, candidates, sequences_of
+from unitcad.search.castability import Verdict
+from unitcad.search.explanation import explain
+from unitcad.search.geometries import grid, spec_data
+from unitcad.search.proposals import Inversion, invert, name_of
+from unitcad.search.ranking_order import front, kinds
+from unitcad.search.refinement import refined
+from unitcad.search.target_file import Target, load_target, target_of
+from unitcad.validation import from_data, load
+
+PAPER = ["crossings", "fitted", "paper"]
+
+
+def _target(models: list[str] | None = None, vary: dict[str, Any] | None = None, **wish: Any) -> Target:
+    data: dict[str, Any] = {"target": {"edge_max": 0.06, **wish}, "vary": vary or {}}
+    if wish.get("edge_max", 0) is None:
+        del data["target"]["edge_max"]
+    return target_of({**data, **({"estimate": {"models": models}} if models else {})})
+
+
+@pytest.fixture(scope="module")
+def known() -> Inversion:
+    """The target whose answer is known, moulds drawn."""
+    return invert(load_target("paper"))
+
+
+def test_the_answer_that_is_known(known: Inversion) -> None:
+    best = known.data["proposals"]
+    found = [(one["design"], one["materials"][1], round(one["probability"], 2)) for one in best]
+    assert found[:3] == [
+        ("encapsulating", "dragon-skin-30", 0.79),
+        ("encapsulating", "dragon-skin-10-medium", 0.52),
+        ("embedded", "dragon-skin-30", 0.10),
+    ]
+    assert all(one["materials"][0] == "ecoflex-00-10" for one in best)
+    ends = [100 * best[0]["edge"][end] for end in ("p10", "p90")]
+    assert ends == pytest.approx([2.6, 7.4], abs=0.1)
+    of_others = [kind.most for kind in kinds(known.found, known.rows)[3:]]
+    assert max(of_others) < 0.045
+    assert all("gain nothing" in one["lengths_gain"] for one in best)
+    assert set(known.data["left_out"]) == {"ecoflex-00-30", "ecoflex-00-50"}
+    assert [one["measured"]["level"] for one in best[:3]] == [0.0517, 0.04, 0.156]
+    assert all(one["checks"] > 20 and one["relies_on"] == [] for one in best)
+    assert best[0]["walls_mm"] == [1.25, 1.25]
+
+
+@pytest.fixture(scope="module")
+def found() -> Candidates:
+    return candidates(_target(crosstalk_ratio_max=0.4, pitch_mm=20, vary={"layers": [1, 2, 3], "step_mm": 0.5}))
+
+
+def test_each_candidate_is_what_its_spec_is_alone(found: Candidates) -> None:
+    """The table's columns against the spec's own estimate, mass and moulds, drawn at random."""
+    assert found.count == sum(len(sequences_of("abc", len(g.lengths.walls))) for g in found.geometries)
+    for row in np.random.default_rng(5).integers(0, found.count, 25):
+        spec = from_data(spec_data(found.target, found.lengths(row), found.materials(row)))
+        variant = estimate_input(spec)
+        alone = predictive_of([variant])
+        assert found.probability[row] == pytest.approx(alone.at_most(0.06)[0], abs=1e-9)
+        assert found.predictive.quantile(0.9)[row] == pytest.approx(alone.quantile(0.9)[0], rel=1e-6)
+        assert found.mass_g[row] == pytest.approx(1e3 * unit_mass(variant).middle, rel=1e-9)
+        assert found.diameter_mm[row] == spec.diameter_mm
+        made = procedure(MouldSet(spec), [400.0] * len(spec.layers), 9e3)
+        steps = [*(step for pour in made.pours for step in pour.steps), *made.release]
+        assert found.hours[row] == pytest.approx(sum(step.minutes + step.wait_min for step in steps) / 60)
+        tops = [body.shape for body in MouldSet(spec).unit]
+        assert tops
+        assert found.height_mm[row] == pytest.approx(_top(MouldSet(spec)), abs=0.02)
+
+
+def _top(moulds: MouldSet) -> float:
+    from unitcad.kernels.mesh import bounds
+
+    return max(bounds(moulds.mesh(body))[5] for body in moulds.unit)
+
+
+def test_mass_is_that_of_the_drawn_bodies(found: Candidates) -> None:
+    """The slot of the tail is not taken off: less than 3 %."""
+    from unitcad.catalogue import materials
+
+    row = int(np.argmax(found.probability))
+    spec = from_data(spec_data(found.target, found.lengths(row), found.materials(row)))
+    moulds, known = MouldSet(spec), materials()
+    drawn = sum(
+        moulds.mesh(body).volume() * float(known[layer.material].density_g_cm3) / 1e3
+        for body, layer in zip([b for b in moulds.unit if b.name.startswith("layer")], spec.layers, strict=True)
+    )
+    motor = 1e3 * estimate_input(spec).geometry.motor_mass.middle
+    assert found.mass_g[row] - motor == pytest.approx(drawn, rel=0.03)
+
+
+def test_crosstalk_is_that_of_the_layered_curve(found: Candidates) -> None:
+    variant = found.geometries[0].variant
+    block = layered_block(variant)["drives"][variant.drive]["u"]
+    ratio = crosstalk_ratio(variant, variant.diameter / 2 + 13e-3)
+    for end in ("value", "low", "high"):
+        assert getattr(ratio, end) == pytest.approx(block[end][13], rel=2e-3)
+    at_pitch = crosstalk_ratio(found.geometries[0].variant, 20e-3, spread=False).middle
+    assert found.crosstalk[found.geometry == 0] == pytest.approx(at_pitch)
+
+
+def test_no_search_finds_a_better_candidate_than_the_grid_and_its_refinement() -> None:
+    """Random lengths, each judged by its own spec: none beats the best of the grid refined."""
+    target = _target(vary={"layers": [2], "wall_mm": [1.1, 1.8], "diameter_mm": [13.0, 15.0], "step_mm": 0.35})
+    table = candidates(target)
+    row = int(np.argmax(table.probability))
+    better = refined(table, row)
+    best = max(float(table.probability[row]), float(better.probability[0]) if better else 0.0)
+    rng, tried = np.random.default_rng(3), []
+    for _ in range(150):
+        walls = rng.uniform(1.1, 1.8, 2).tolist()
+        lengths = replace(
+            table.lengths(row), walls=tuple(walls), caps=tuple(walls), diameter=float(rng.uniform(13.0, 15.0))
+        )
+        try:
+            spec = from_data(spec_data(target, lengths, table.materials(row)))
+        except Refusal:
+            continue
+        tried.append(predictive_of([estimate_input(spec)]).at_most(0.06)[0])
+    assert len(tried) > 30
+    assert max(tried) < best + 0.02
+
+
+def test_refinement_finds_what_lies_between_the_steps() -> None:
+    """A limit on mass between two steps: the best lies on it."""
+    target = _target(vary={"layers": [2], "wall_mm": [1.1, 2.1], "step_mm": 0.5}, mass_max_g=1.08)
+    made = invert(target, check=False)
+    kind = ("encapsulating", ("ecoflex-00-10", "dragon-skin-10-medium"))
+    second = next(one for one in made.data["proposals"] if (one["design"], tuple(one["materials"])) == kind)
+    of_kind = [row for row in made.rows if (made.found.kind(row)[0], made.found.materials(row)) == kind]
+    assert second["refined"]
+    assert second["lengths_gain"].endswith("this one lies between the steps")
+    assert second["probability"] > made.found.probability[of_kind].max() + 0.02
+    assert 1.05 < second["mass_g"] <= 1.08
+    assert all(round(wall / 0.05, 6) == round(wall / 0.05) for wall in second["walls_mm"])
+
+
+@pytest.mark.parametrize(
+    ("wish", "field"),
+    [
+        ({"edge_max": 0.03}, "target.edge_max"),
+        ({"edge_max": None, "edge_min": 0.95}, "target.edge_min"),
+        ({"edge_max": 0.06, "edge_min": 0.055}, "target.probability_min"),
+        ({"diameter_max_mm": 9.0}, "target.diameter_max_mm"),
+        ({"height_max_mm": 1.9}, "target.height_max_mm"),
+        ({"mass_max_g": 0.3}, "target.mass_max_g"),
+        ({"cure_hours_max": 1.0}, "target.cure_hours_max"),
+        ({"crosstalk_ratio_max": 0.05, "pitch_mm": 20}, "target.crosstalk_ratio_max"),
+        ({"pitch_mm": 10}, "target.pitch_mm"),
+    ],
+)
+def test_an_impossible_wish_is_refused_with_the_nearest_that_is_possible(wish: dict[str, Any], field: str) -> None:
+    with pytest.raises(Refusal, match="none of") as refused:
+        invert(_target(PAPER, **wish), check=False)
+    assert refused.value.field == field
+    assert invert(_target(PAPER, **_changed(wish, refused.value)), check=False).data["proposals"]
+
+
+def _changed(wish: dict[str, Any], refused: Refusal) -> dict[str, Any]:
+    """Return a wish with every value that a refusal offers in its place."""
+    return {"edge_max": 0.06, **wish} | {one.field.split(".")[1]: one.nearest for one in (refused, *refused.others)}
+
+
+@pytest.mark.parametrize("wishes", [18, pytest.param(60, marks=pytest.mark.long)])
+def test_what_is_offered_for_several_impossible_wishes_is_accepted_together(wishes: int) -> None:
+    """Wishes drawn at random over and under what there is: each refusal's offers are accepted, all at once."""
+    rng, refusals, several = np.random.default_rng(17), 0, 0
+    for i in range(wishes):
+        ends = {
+            "diameter_max_mm": (9, 16),
+            "height_max_mm": (1.8, 5),
+            "mass_max_g": (0.3, 1.2),
+            "cure_hours_max": (1, 25),
+            "pitch_mm": (9, 40),
+        }
+        kept = {key: ends[key] for key in ends if rng.random() < 0.5}
+        wish = {key: round(float(rng.uniform(*of)), 2) for key, of in kept.items()}
+        level = float(np.exp(rng.uniform(np.log(0.01), np.log(0.2))))
+        wish |= {"edge_max": level} if i % 3 else {"edge_max": level, "edge_min": 0.9 * level}
+        if "pitch_mm" in wish:
+            wish["crosstalk_ratio_max"] = float(np.exp(rng.uniform(np.log(0.02), 0.0)))
+        models = PAPER if i % 2 else None
+        try:
+            invert(_target(models, **wish), check=False)
+        except Refusal as refused:
+            refusals, several = refusals + 1, several + bool(refused.others)
+            assert invert(_target(models, **_changed(wish, refused)), check=False).data["proposals"], wish
+    assert refusals > wishes / 2
+    assert several > wishes / 6
+
+
+def test_three_per_cent_is_answered_with_the_least_that_is_possible() -> None:
+    with pytest.raises(Refusal) as refused:
+        invert(_target(PAPER, edge_max=0.03), check=False)
+    assert refused.value.nearest == 0.04
+    least = "4 % of the motor's amplitude is the least as measured (encapsulating ecoflex-00-10/dragon-skin-10-medium"
+    assert least in str(refused.value)
+    accepted = invert(_target(PAPER, edge_max=0.04), check=False).data["proposals"][0]
+    assert (accepted["measured"]["level"], accepted["nearest_other"]) == (0.04, False)
+    with pytest.raises(Refusal):
+        invert(_target(PAPER, edge_max=0.0399), check=False)
+
+
+def test_what_no_unit_was_measured_at_is_answered_by_the_probability() -> None:
+    vary = {"wall_mm": [1.5, 1.5]}
+    with pytest.raises(Refusal, match=r"4\.34 % of the motor's amplitude is the least with it") as refused:
+        invert(_target(PAPER, vary, edge_max=0.03), check=False)
+    assert refused.value.nearest == pytest.approx(0.0434, abs=0.0003)
+    assert invert(_target(PAPER, vary, edge_max=refused.value.nearest), check=False).data["proposals"]
+
+
+def test_a_measured_level_is_the_most_where_it_is_above_the_probable_ones() -> None:
+    with pytest.raises(Refusal) as refused:
+        invert(_target(PAPER, edge_max=None, edge_min=0.95, probability_min=0.9), check=False)
+    assert refused.value.nearest == 0.671
+    assert "67.1 % of the motor's amplitude is the most as measured" in str(refused.value)
+    wish = {"edge_max": None, "edge_min": 0.671, "probability_min": 0.9}
+    assert invert(_target(PAPER, **wish), check=False).data["proposals"][0]["measured"]["meets"]
+
+
+def test_limits_that_exclude_each_other_are_named_together() -> None:
+    with pytest.raises(
+        Refusal, match=r"target\.mass_max_g = 0\.3: none of .* with target\.cure_hours_max = "
+    ) as refused:
+        invert(_target(mass_max_g=0.3, cure_hours_max=1.0), check=False)
+    assert [one.field for one in refused.value.others] == ["target.cure_hours_max"]
+
+
+def test_a_pitch_at_which_units_overlap_is_answered_with_one_that_keeps_the_crosstalk() -> None:
+    wish = {"pitch_mm": 10.0, "crosstalk_ratio_max": 0.4}
+    with pytest.raises(Refusal, match=r"a pitch of 18\.3 mm is the least") as refused:
+        invert(_target(**wish), check=False)
+    variant = estimate_input(load("encapsulating"))
+    assert crosstalk_ratio(variant, 1e-3 * refused.value.nearest).value <= 0.4
+    assert crosstalk_ratio(variant, 1e-3 * (refused.value.nearest - 0.1)).value > 0.4
+
+
+def test_a_single_layer_is_tried_as_thick_as_the_measured_controls() -> None:
+    made = invert(_target(edge_max=0.5), check=False)
+    controls = [one for one in made.measured if len(made.found.materials(one)) == 1]
+    assert {made.found.lengths(row).walls for row in controls} == {(2.5,)}
+    assert {made.found.materials(row)[0] for row in controls} == {
+        "ecoflex-00-10",
+        "dragon-skin-10-medium",
+        "dragon-skin-30",
+    }
+    two = [one.lengths.walls for one in made.found.geometries if len(one.lengths.walls) == 2]
+    assert max(map(max, two)) == 2.0
+
+
+def test_what_is_over_a_limit_is_no_proposal() -> None:
+    made = invert(_target(edge_max=0.2, cure_hours_max=12.0, mass_max_g=0.9), check=False)
+    assert made.rows.size < made.found.count
+    for one in made.data["proposals"]:
+        assert one["cure_hours"] <= 12.0
+        assert one["mass_g"] <= 0.9
+        assert any("cure" in line for line in one["within"])
+
+
+def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    def judged(spec: Any) -> Verdict:
+        bad = spec.layers[0].wall_mm == 1.25
+        return Verdict(9, ("C300 layer1: 0.1 against 0.2 mm",)) if bad else Verdict(9, ())
+
+    monkeypatch.setattr(proposals, "castability", judged)
+    made = invert(_target(PAPER))
+    assert all(one["walls_mm"][0] != 1.25 for one in made.data["proposals"])
+    assert made.data["not_castable"][0]["failed"] == ["C300 layer1: 0.1 against 0.2 mm"]
+    out = explain(made, made.data["not_castable"][0]["name"])
+    assert "can't be cast: C300 layer1: 0.1 against 0.2 mm" in out["reasons"]
+
+
+def test_faults_of_real_moulds_are_found() -> None:
+    """The drawn plan refuses a lid's vents that do not come in fours; a design can't know."""
+    sound = castability.castability(load("encapsulating"))
+    assert sound.castable
+    assert sound.checked > 20
+    verdict = castability.castability(load("encapsulating", {"moulds.pour": "injected", "moulds.vents": 1}))
+    assert not verdict.castable
+    assert "moulds.vents = 1" in verdict.failed[0]
+
+
+@pytest.mark.parametrize("check", [True, False])
+def test_moulds_that_nothing_can_be_cast_in_are_refused_by_their_field(check: bool) -> None:
+    injected = {"target": {"edge_max": 0.06}, "spec": {"moulds": {"pour": "injected", "vents": 1}}}
+    with pytest.raises(Refusal, match=r"moulds\.vents = 1: vents come in fours"):
+        invert(target_of(injected), check=check)
+
+
+def test_what_was_never_measured_is_said() -> None:
+    target = target_of(
+        {
+            "target": {"edge_max": 0.3, "frequency_hz": 60},
+            "at_hand": {"motors": ["VC1018B001L"], "materials": ["ecoflex-00-10", "dragon-skin-30"]},
+            "vary": {"layers": [3], "wall_mm": [1.5, 1.5]},
+        }
+    )
+    notes = " | ".join(invert(target, check=False).data["proposals"][0]["relies_on"])
+    assert "walls of 1.5, 1.5 and 1.5 mm" in notes
+    assert "crossings does not read it" in notes
+    assert "every measured unit had 14 mm" in notes
+    assert "3 layers: only units of 1 and 2 layers were measured" in notes
+    assert "the motor VC1018B001L (10 x" in notes
+    assert "60 Hz: measured was at 125 Hz" in notes
+
+
+def test_the_models_that_differ_are_named_and_the_measured_unit_of_the_kind_stands_beside() -> None:
+    best = invert(_target(), check=False).data["proposals"][0]
+    assert set(best["by_model"]) == {"bush", "crossings"}
+    assert best["measured"] is None
+    assert best["measured_sibling"]["level"] == 0.0517
+    assert best["measured_sibling"]["probability"] < best["probability"]
+
+
+def test_reasons_of_what_is_not_among_the_proposals(known: Inversion) -> None:
+    assert explain(known, "encapsulating-e10-d30-1.25-1.25")["reasons"] == []
+    same = explain(known, "encapsulating")
+    assert (same["rank"], same["reasons"]) == (1, [])
+    three = explain(known, "three-layer")["reasons"]
+    assert any("vary.layers has no 3" in line for line in three)
+    other = explain(known, "embedded-e10-d30-1.5-1.5")["reasons"]
+    assert "best of its kind" in other[0]
+    last = explain(known, "embedded-d10-e10-1.25-1.25")["reasons"]
+    assert "4 kinds come before it" in last[0]
+    assert any("not at hand" in line for line in explain(known, "motor-10mm")["reasons"])
+    with pytest.raises(Refusal, match="--explain = 'nothing'"):
+        explain(known, "nothing")
+
+
+def test_a_material_without_a_modulus_is_explained(known: Inversion, tmp_path: Path) -> None:
+    spec = tmp_path / "soft.toml"
+    text = (Path(load_target.__code__.co_filename).parents[2] / "templates/embedded.toml").read_text("utf-8")
+    spec.write_text(text.replace("ecoflex-00-10", "ecoflex-00-50"), "utf-8")
+    assert any("no small-strain modulus" in line for line in explain(known, str(spec))["reasons"])
+
+
+def test_the_front_is_what_nothing_beats(found: Candidates) -> None:
+    rows = np.arange(found.count)
+    best = front(found, rows, found.mass_g)
+    p, mass = found.probability, found.mass_g
+    for row in best:
+        assert not np.any((p > p[row] + 1e-9) & (mass <= mass[row]))
+    for row in np.random.default_rng(1).integers(0, found.count, 40):
+        beaten = [one for one in best if p[one] >= p[row] - 1e-9 and mass[one] <= mass[row] + 1e-12]
+        assert beaten
+
+
+def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(known: Inversion, tmp_path: Path) -> None:
+    first = design_files.contents(known, "out/design-paper")
+    again = design_files.contents(invert(load_target("paper"), check=True), "out/design-paper")
+    assert first == again
+    design_files.write(tmp_path / "design-paper", first)
+    rows = list(csv.DictReader((tmp_path / "design-paper/ranking.csv").read_text("utf-8").splitlines()))
+    assert len(rows) == known.found.count
+    assert [int(row["place"]) for row in rows] == list(range(1, len(rows) + 1))
+    p = [round(float(row["probability"]), 2) for row in rows]
+    assert p == sorted(p, reverse=True)
+    ElementTree.fromstring(first["front.svg"])
+    data = json.loads(first["design.json"])
+    for one, spec in zip(data["proposals"], known.specs, strict=True):
+        file = tmp_path / "design-paper/specs" / Path(one["file"]).name
+        assert load(file) == spec
+    assert "<script" not in first["design.html"].decode()
+    assert len({name_of(known.found, row) for row in range(known.found.count)}) == known.found.count
+
+
+def test_a_new_result_leaves_none_of_the_old_specs_but_what_others_put_there(known: Inversion, tmp_path: Path) -> None:
+    folder = tmp_path / "design-x"
+    design_files.write(folder, {**design_files.contents(known, "x"), "specs/9-old.toml": b""})
+    (folder / "notes.txt").write_text("mine", "utf-8")
+    design_files.write(folder, design_files.contents(known, "x"))
+    assert not (folder / "specs/9-old.toml").exists()
+    assert (folder / "notes.txt").read_text("utf-8") == "mine"
+
+
+def test_grid() -> None:
+    assert grid((1.0, 2.0), 0.25) == (1.0, 1.25, 1.5, 1.75, 2.0)
+    assert grid((1.0, 1.6), 0.25) == (1.0, 1.25, 1.5, 1.6)
+    assert grid((1.25, 1.25), 0.25) == (1.25,)
+    assert sequences_of(("a", "b"), 3) == [("a", "b", "a"), ("b", "a", "b")]
+    assert len(sequences_of("abc", 2)) == len(list(itertools.permutations("abc", 2)))
+
+
+def test_the_command_writes_its_folder_and_explains(run: Any, tmp_path: Path) -> None:
+    done = run("design", "paper", "--no-check", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "out/design-paper"
+    assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the wish; probability 0.79, 2.5 %" in done.stdout
+    assert {p.name for p in (tmp_path / "out/design-paper").iterdir()} == set(design_files.OWN)
+    as_json = json.loads(run("design", "paper", "--no-check", "--json", cwd=tmp_path).stdout)
+    assert as_json["folder"] == "out/design-paper"
+    why = run("design", "paper", "--no-check", "--explain", "three-layer", "-o", "other", cwd=tmp_path)
+    assert "vary.layers has no 3" in why.stdout
+    assert not (tmp_path / "other").exists()
+    spec = as_json["proposals"][0]["file"]
+    built = run("build", spec, "--only", "estimate", cwd=tmp_path)
+    assert built.returncode == 0, built.stderr
+    wish = tmp_path / "wish.toml"
+    wish.write_text("[target]\nedge_max = 0.01\n", "utf-8")
+    refused = run("design", "wish.toml", "-o", "none", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "target.edge_max = 0.01: none of " in refused.stderr
+    assert not (tmp_path / "none").exists()

@@ -1,0 +1,91 @@
+"""Target files: what is refused, with which nearest value; the shipped ones; lists, schema and a file to start from."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+from unittest.mock import ANY
+
+import pytest
+
+from unitcad.errors import Refusal
+from unitcad.search.candidates import candidates
+from unitcad.search.target_file import load_target, shipped, target_of
+
+
+@pytest.mark.parametrize(
+    ("data", "field", "limit", "nearest"),
+    [
+        ({"target": {}}, "target.edge_max", "is required, or edge_min", None),
+        ({}, "target", "is required", None),
+        ({"target": {"edge_max": 6}}, "target.edge_max", "fraction of the motor's amplitude", 0.06),
+        ({"target": {"edge_max": 0.0}}, "target.edge_max", "at least 0.001", 0.001),
+        ({"target": {"edge_max": 0.1, "edge_min": 0.2}}, "target.edge_min", "below edge_max", 0.05),
+        ({"target": {"edge_max": 0.1, "crosstalk_ratio_max": 0.2}}, "target.pitch_mm", "required with", None),
+        ({"target": {"edge_max": 0.1, "pitch_mm": 900}}, "target.pitch_mm", "at most 200", 200.0),
+        (
+            {"target": {"edge_max": 0.1, "diameter_mm": 9}},
+            "target.diameter_mm",
+            "unknown key",
+            "target.diameter_max_mm",
+        ),
+        ({"at_hand": {"materials": ["ecoflex"]}}, "at_hand.materials.0", "not known", "ecoflex-00-50"),
+        ({"at_hand": {"materials": ["ecoflex-00-10"] * 2}}, "at_hand.materials.1", "is there twice", None),
+        ({"at_hand": {"printer": "prusa"}}, "at_hand.printer", "not known", ANY),
+        ({"at_hand": {"motors": ["LCM"]}}, "at_hand.motors.0", "not known", None),
+        ({"at_hand": {"designs": ["embeded"]}}, "at_hand.designs.0", "not known", "embedded"),
+        ({"at_hand": {"materials": ["ecoflex-00-50"]}}, "at_hand.materials", "no level can be estimated", None),
+        ({"vary": {"wall_mm": [2.0, 1.0]}}, "vary.wall_mm", "from the least to the largest", [1.0, 2.0]),
+        ({"vary": {"wall_mm": [0.1, 1.0]}}, "vary.wall_mm.0", "at least 0.5", 0.5),
+        ({"vary": {"layers": [1, 9]}}, "vary.layers.1", "at most 5", 5),
+        ({"vary": {"layers": [2, 2]}}, "vary.layers.1", "is there twice", None),
+        ({"vary": {"layers": [5], "step_mm": 0.1}}, "vary.step_mm", "more than 20000 sets of lengths", 0.2),
+        ({"estimate": {"models": ["bushes"]}}, "estimate.models.0", "not known; closest: bush", "bush"),
+        ({"estimate": {"fit": "none.toml"}}, "estimate.fit", "none.toml", None),
+        ({"spec": {"layers": {}}}, "spec.layers", "not known", None),
+        ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "stands in at_hand.motors", None),
+    ],
+)
+def test_what_is_refused(data: dict[str, Any], field: str, limit: str, nearest: object) -> None:
+    given = data if "target" in data or not data else {"target": {"edge_max": 0.06}, **data}
+    with pytest.raises(Refusal) as refused:
+        candidates(target_of(given))
+    assert refused.value.field == field
+    assert limit in str(refused.value)
+    assert nearest is ANY or refused.value.nearest == nearest
+
+
+def test_a_fault_of_a_table_for_every_spec_is_named() -> None:
+    wrong = {"target": {"edge_max": 0.06}, "spec": {"fpcb": {"tail_width_mm": 30.0}}}
+    with pytest.raises(Refusal, match=r"^spec\.fpcb\.tail_width_mm = 30: "):
+        candidates(target_of(wrong))
+
+
+def test_shipped_targets_load_and_are_listed(run: Any) -> None:
+    assert set(shipped()) == {"amplify", "paper", "quiet-edge"}
+    for name in shipped():
+        assert load_target(name).name == name
+        assert name in run("list", "targets").stdout
+
+
+def test_a_name_that_is_no_target_is_refused(run: Any) -> None:
+    done = run("design", "quiet")
+    assert done.returncode == 2
+    assert "TARGET = 'quiet': not known; closest: quiet-edge" in done.stderr
+
+
+def test_a_target_to_start_from(run: Any, tmp_path: Path) -> None:
+    assert run("init", "mine", "--target", "quiet-edge", cwd=tmp_path).returncode == 0
+    assert load_target(tmp_path / "mine.toml").wish.edge_max == 0.06
+    assert run("init", "other", "--target", "none", cwd=tmp_path).returncode == 2
+    assert run("init", "other", "--target", "paper", "--template", "embedded", cwd=tmp_path).returncode == 2
+    assert not (tmp_path / "other.toml").exists()
+
+
+def test_the_schema_takes_the_shipped_targets(run: Any) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads(run("schema", "target").stdout)
+    for path in shipped().values():
+        jsonschema.validate(tomllib.loads(path.read_text("utf-8")), schema)

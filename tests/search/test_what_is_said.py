@@ -1,0 +1,191 @@
+"""What a result says of itself: specs that keep the models, what was not measured, refusals, the ranking."""
+
+from __future__ import annotations
+
+import csv
+import html
+import itertools
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from unitcad.attenuation.crosstalk import crosstalk_ratio
+from unitcad.errors import Refusal, UnknownKey
+from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.search.design_files import contents, ranking
+from unitcad.search.design_words import explanation_lines, reasons, size_line, title
+from unitcad.search.explanation import explain
+from unitcad.search.proposals import Inversion, invert
+from unitcad.search.target_file import load_target, target_of
+from unitcad.spec import to_data, to_toml
+from unitcad.validation import from_data, load
+
+FIELD = "target.edge_max"
+
+
+def _target(vary: dict[str, Any] | None = None, **wish: Any) -> Inversion:
+    return invert(target_of({"target": {"edge_max": 0.2, **wish}, "vary": vary or {}}), check=False)
+
+
+@pytest.fixture(scope="module")
+def paper() -> Inversion:
+    return invert(load_target("paper"), check=False)
+
+
+@pytest.fixture(scope="module")
+def quiet() -> Inversion:
+    return invert(load_target("quiet-edge"), check=False)
+
+
+def test_the_estimate_of_a_proposals_spec_has_its_range(paper: Inversion, quiet: Inversion) -> None:
+    for made in (paper, quiet):
+        for spec, one in zip(made.specs, made.data["proposals"], strict=True):
+            answer = estimate_spec(spec)["answer"]
+            ends = [answer[end] for end in ("p10", "p50", "p90")]
+            assert ends == pytest.approx([one["edge"][end] for end in ("p10", "p50", "p90")], rel=1e-6)
+            assert answer["weights"] == pytest.approx(made.data["models"]["weights"])
+    assert paper.specs[0].estimate.models == ("fitted", "paper")
+
+
+def test_lengths_of_no_measured_number_of_layers_are_not_called_measured() -> None:
+    one = _target({"layers": [3], "wall_mm": [1.0, 1.0]}).data["proposals"][0]
+    notes = " | ".join(one["relies_on"])
+    assert "no unit of 3 layers was measured" in notes
+    assert "0.83" not in notes
+
+
+def test_only_lengths_that_some_candidate_has_are_counted(paper: Inversion) -> None:
+    two = {"target": {"edge_max": 0.6}, "at_hand": {"materials": ["ecoflex-00-10"]}}
+    tried = invert(target_of(two), check=False).data["tried"]
+    assert (tried["candidates"], tried["geometries"]) == (14, 14)
+    assert paper.data["tried"]["geometries"] == 64
+
+
+def test_lengths_that_were_never_measured_stand_in_the_title(paper: Inversion, quiet: Inversion) -> None:
+    assert title(quiet.data["proposals"][0]).endswith("walls 1.75 and 1 mm (not measured at these lengths)")
+    assert title(paper.data["proposals"][0]).endswith("walls 1.25 and 1.25 mm")
+
+
+def test_a_frequency_that_no_model_reads_is_said() -> None:
+    notes = _target(frequency_hz=216.6667).data["proposals"][0]["relies_on"]
+    assert "217 Hz: measured was at 125 Hz, and no model here reads it" in notes
+
+
+def test_the_ranking_has_the_proposals_numbers_and_the_measurements(quiet: Inversion) -> None:
+    rows = list(csv.DictReader(ranking(quiet).splitlines()))
+    p = [float(row["probability"]) for row in rows]
+    assert all(first >= second - 2e-6 for first, second in itertools.pairwise(p))
+    numbered = {row["name"]: row["proposal"] for row in rows if row["proposal"]}
+    of_grid = {one["name"]: str(one["rank"]) for one in quiet.data["proposals"] if not one["refined"]}
+    assert numbered == of_grid
+    measured = {row["name"]: row["measured"] for row in rows if row["measured"]}
+    assert measured["encapsulating-e10-d30-1.25-1.25"] == "0.0517"
+    assert all("1.25-1.25" in name or name.endswith("-2.5") for name in measured)
+
+
+def test_crosstalk_that_tells_no_designs_apart_and_the_level_at_the_neighbour(quiet: Inversion) -> None:
+    one = quiet.data["proposals"][0]
+    at = one["crosstalk"]["value"] * one["edge"]["p50"]
+    assert one["crosstalk"]["neighbour"] == pytest.approx(at, rel=1e-6)
+    assert any("the same for every unit of 14 mm and tells no designs apart" in line for line in reasons(one))
+
+
+def test_a_mass_is_shown_as_exactly_as_its_limit() -> None:
+    one = _target({"wall_mm": [1.5, 1.5]}, mass_max_g=1.052).data["proposals"][0]
+    assert f"{one['mass_g']:.3g} g with motor" in size_line(one)
+
+
+def test_another_diameter_and_a_unit_that_was_not_tried_are_explained(paper: Inversion, quiet: Inversion) -> None:
+    why = explain(paper, "motor-10mm")["reasons"]
+    assert any("diameters of 14 to 15.2 mm are tried, and this one's is 17" in line for line in why)
+    head = explanation_lines(explain(quiet, "three-layer"))[0]
+    assert head.endswith(" if it were tried")
+
+
+def _spec(made: Inversion, at: int, folder: Path, **changes: Any) -> str:
+    """Write a proposal's spec with other values, and return the file."""
+    file = folder / "mine.toml"
+    file.write_text(to_toml(from_data({**to_data(made.specs[at]), "name": "mine", "fpcb": {}, **changes})), "utf-8")
+    return str(file)
+
+
+def test_a_proposals_own_spec_is_recognised_and_another_is_not_called_a_proposal(
+    paper: Inversion, quiet: Inversion, tmp_path: Path
+) -> None:
+    for made in (paper, quiet):
+        own = explain(made, _spec(made, 1, tmp_path))
+        assert (own["listed"], own["reasons"], own["among"]) == (2, [], True)
+        assert explanation_lines(own)[1:] == ["  it is among the proposals, as number 2"]
+    thicker = [{"material": m, "wall_mm": 1.5, "cap_mm": 1.5} for m in paper.data["proposals"][0]["materials"]]
+    of_table = explain(paper, _spec(paper, 0, tmp_path, layers=thicker))
+    assert "encapsulating-e10-d30-1.25-1.25 is the best of its kind" in of_table["reasons"][0]
+    between = [{**one, "wall_mm": 1.3, "cap_mm": 1.3} for one in thicker]
+    lines = explanation_lines(explain(paper, _spec(paper, 0, tmp_path, layers=between)))
+    assert any("not tried: its lengths lie between the steps" in line for line in lines)
+    motor = {"part": "LCM0720A3463F", "fill": True}
+    filled = explanation_lines(explain(paper, _spec(paper, 0, tmp_path, motor=motor)))
+    assert any("with another motor or circuit" in line for line in filled)
+    assert not any("among the proposals" in line for line in [*lines, *filled])
+
+
+def test_a_specs_crosstalk_over_its_limit_is_among_the_reasons() -> None:
+    """The edge of a wider unit lies nearer to its neighbour's middle."""
+    made = _target(crosstalk_ratio_max=0.4, pitch_mm=20)
+    over = [line for line in explain(made, "three-layer")["reasons"] if "crosstalk" in line]
+    ratio = crosstalk_ratio(estimate_input(load("three-layer")), 20e-3).value
+    assert ratio is not None
+    assert over == [f"over a limit: crosstalk ratio {ratio:.3g} of at most 0.4"]
+    assert not any("crosstalk" in line for line in explain(made, "encapsulating")["reasons"])
+
+
+def test_the_command_that_builds_is_quoted(paper: Inversion) -> None:
+    found = contents(paper, "odd dir/design-paper")
+    file = f"odd dir/design-paper/specs/1-{paper.data['proposals'][0]['name']}.toml"
+    assert f"`unitcad build '{file}'`" in found["design.md"].decode()
+    assert f"unitcad build '{file}'" in html.unescape(found["design.html"].decode())
+
+
+def test_a_refined_proposals_name_is_explained() -> None:
+    made = _target({"layers": [2], "wall_mm": [1.1, 2.1], "step_mm": 0.5}, edge_max=0.06, mass_max_g=1.08)
+    one = next(one for one in made.data["proposals"] if one["refined"])
+    own = explain(made, one["name"])
+    assert (own["listed"], own["probability"]) == (one["rank"], one["probability"])
+
+
+def test_a_measurement_is_shown_and_the_nearest_others_are_no_proposals(paper: Inversion) -> None:
+    names = {one["rank"]: one["name"] for one in paper.data["proposals"]}
+    first = explanation_lines(explain(paper, names[1]))
+    assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the wish; probability 0.79" in first[0]
+    for third in (names[3], "embedded"):
+        lines = explanation_lines(explain(paper, third))
+        assert "measured 16 % (the paper): outside the wish; probability 0.10, below your 50 %" in lines[0]
+        assert lines[1:] == [
+            "  it is no proposal: it was measured outside the wish, and stands among the nearest others as number 3"
+        ]
+
+
+def test_every_impossible_wish_has_its_nearest() -> None:
+    with pytest.raises(
+        Refusal, match=r"target\.height_max_mm = 2: .* together with target\.cure_hours_max = "
+    ) as refused:
+        _target(height_max_mm=2.0, cure_hours_max=3.0)
+    assert "target.cure_hours_max = 3: none of" in str(refused.value.others[0])
+    assert refused.value.nearest == 2.11
+
+
+def test_a_crosstalk_that_is_out_of_reach_says_what_reaches_it() -> None:
+    with pytest.raises(Refusal, match=r"other vary\.diameter_mm.*; or target\.pitch_mm = 22.* in its place") as refused:
+        _target(crosstalk_ratio_max=0.3, pitch_mm=20)
+    assert "not tried, without a modulus: ecoflex-00-30" in str(refused.value)
+
+
+def test_what_is_typed_in_per_cent_has_a_nearest() -> None:
+    with pytest.raises(Refusal) as refused:
+        target_of({"target": {"edge_max": "6 %"}})
+    assert (refused.value.field, refused.value.nearest) == (FIELD, 0.06)
+
+
+def test_an_unknown_key_points_at_the_targets_schema() -> None:
+    with pytest.raises(UnknownKey, match="`unitcad schema target` lists all"):
+        target_of({"target": {"edge_max": 0.06, "crosstalk": 0.3}})

@@ -1,0 +1,393 @@
+"""Shards with a parent each, run at once, stopped, merged; tables as Parquet; folders made when asked for."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from batching import bytes_of, calls, command, environment, ring_sweep, rows, unitcad
+
+from unitcad.cache import DiskStore, objects, shared_store
+from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.report import write_report
+from unitcad.report.batch_table import read_parquet
+from unitcad.sweeps import BatchOptions, Summary, load_sweep, record_packs, result_folders, results
+from unitcad.sweeps.batch_call import make
+from unitcad.sweeps.batch_records import BatchHead, JournalEntry
+from unitcad.sweeps.executors import Workers
+from unitcad.sweeps.merging import merge
+from unitcad.sweeps.result_folders import export_variants
+from unitcad.sweeps.results import write_results
+from unitcad.sweeps.shards import Shard, shard_folders, shard_of
+
+
+def made(sweep: Path, out: Path, **options: Any) -> Summary:
+    record_packs.store_at.cache_clear()
+    return make(load_sweep(sweep), out, BatchOptions(("unit",), **options), Workers(jobs=0))
+
+
+def export_variant(batch: Path, wanted: str, out: Path, cache: DiskStore) -> Path:
+    (folder,) = export_variants(batch, [wanted], out, cache)
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def no_store_is_kept() -> Iterator[None]:
+    yield
+    record_packs.store_at.cache_clear()
+
+
+@pytest.mark.parametrize("count", [0, 1, 15, 16, 17, 1000])
+def test_shards_are_the_whole_sweep_in_order(count: int) -> None:
+    for of in (1, 3, 16):
+        parts = [Shard(number, of).indices(count) for number in range(1, of + 1)]
+        assert [index for part in parts for index in part] == list(range(count))
+        assert max(map(len, parts)) - min(map(len, parts)) <= 1
+    assert [Shard(n, 16).folder for n in (3, 16)] == ["shard-03-of-16", "shard-16-of-16"]
+
+
+@pytest.mark.parametrize(
+    ("text", "nearest"), [("17/16", "16/16"), ("0/4", "1/4"), ("3", "1/2"), ("-1/4", "1/2"), ("1/0", "1/1")]
+)
+def test_a_shard_that_is_none(text: str, nearest: str) -> None:
+    with pytest.raises(WrongArgument) as refused:
+        shard_of(text)
+    assert (refused.value.field, refused.value.value, refused.value.nearest) == ("shard", text, nearest)
+
+
+def test_shards_merged_are_the_batch_without_shards(tmp_path: Path) -> None:
+    # The geometry runs fastest: every shard has all of them.
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=5)
+    text = sweep.read_text().splitlines()
+    sweep.write_text("\n".join([*text[:-2], text[-1], text[-2]]) + "\n")
+    out = tmp_path / "out"
+    for number in (1, 2, 3):
+        summary = made(sweep, out, shard=Shard(number, 3))
+        assert summary.ok == summary.variants == len(Shard(number, 3).indices(10))
+    assert len(calls(tmp_path / "s")) == 2  # each geometry once across shards
+    assert [path.name for path in out.iterdir() if path.name != "store"] != []
+    assert not list(out.glob("ring-*"))
+
+    summary = merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh"))
+    assert (summary.ok, summary.failed) == (10, 0)
+    made(sweep, tmp_path / "plain", cache=tmp_path / "other")
+    merged = {p: sha for p, sha in bytes_of(out).items() if not p.startswith(("store/", "shard-"))}
+    assert merged == bytes_of(tmp_path / "plain")
+
+    folder = rows(out)[7]["folder"]
+    assert export_variant(out, folder[-12:], tmp_path / "one", DiskStore(tmp_path / "fresh")).name == folder
+
+    # The merged folder is a batch: the same command without --shard has nothing left to do.
+    again = made(sweep, out, store=str(out / "store"))
+    assert (again.resumed, again.ok) == (10, 10)
+    assert made(sweep, out, shard=Shard(2, 3)).resumed == 3
+
+
+def test_two_shards_at_once(tmp_path: Path) -> None:
+    """Processes of their own, on one store: what is made twice was in flight in both, so at most once in each."""
+    import subprocess
+
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=2), tmp_path / "out"
+    words = [command("batch", sweep, "-o", out, "--shard", f"{n}/2", "-j", 0, "--json") for n in (1, 2)]
+    with ThreadPoolExecutor(2) as pool:
+        run = lambda line: subprocess.run(line, capture_output=True, text=True, env=environment(), check=False)  # noqa: E731
+        done = list(pool.map(run, words))
+    assert [each.returncode for each in done] == [0, 0], done
+    assert sum(json.loads(each.stdout)["ok"] for each in done) == 6
+    assert max(Counter(calls(tmp_path / "s")).values()) <= 2
+    merged = unitcad("batch", "merge", out, "--json")
+    assert merged.returncode == 0, merged.stderr
+    assert json.loads(merged.stdout)["ok"] == 6
+    assert len(list(out.glob("ring-*"))) == 6
+
+
+def test_shards_that_do_not_fit_together(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    with pytest.raises(UnitcadError, match="there are no shards"):
+        merge(out, [], BatchOptions())
+    made(sweep, out, shard=Shard(1, 2))
+    with pytest.raises(UnitcadError, match="1 of 2 shards is missing: 2/2; run it with"):
+        merge(out, shard_folders(out), BatchOptions())
+    with pytest.raises(UnitcadError, match=r"is not a shard of a batch \(no shard.json\)"):
+        merge(out, [out], BatchOptions())
+    with pytest.raises(UnitcadError, match="nowhere: there is no such folder"):
+        merge(out, [tmp_path / "nowhere"], BatchOptions())
+    with pytest.raises(UnitcadError, match="holds shards, which unitcad batch merge joins"):
+        made(sweep, out)
+    first = out / "shard-1-of-2"
+    with pytest.raises(UnitcadError, match="is shard 1/2, as is"):
+        merge(out, [first, first], BatchOptions())
+    other = ring_sweep(tmp_path / "s", heights=[2.0, 5.0], materials=2)
+    made(other, tmp_path / "others", shard=Shard(2, 2))
+    with pytest.raises(UnitcadError, match="is a shard of another batch than"):
+        merge(out, [first, tmp_path / "others" / "shard-2-of-2"], BatchOptions())
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2)
+    made(sweep, out, shard=Shard(2, 2))
+    journal = out / "shard-2-of-2" / "journal.jsonl"
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:-1]))
+    with pytest.raises(UnitcadError, match="1 of 2 variants are not made yet, the first is variant 3"):
+        merge(out, shard_folders(out), BatchOptions())
+    assert not (out / "batch.json").exists()
+    assert not (out / "journal.jsonl").exists()
+    with pytest.raises(UnitcadError, match="shard-2-of-2 is of another batch"):  # another shard in a shard's folder
+        made(ring_sweep(tmp_path / "s", heights=[2.0, 5.0], materials=2), out, shard=Shard(1, 2))
+
+
+def test_a_shard_is_refused_where_no_merge_could_take_it(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    made(sweep, out, shard=Shard(1, 2))
+    with pytest.raises(UnitcadError, match=r"holds shards of 2 \(shard-1-of-2\).* go on with --shard K/2"):
+        made(sweep, out, shard=Shard(3, 3))
+    assert [path.name for path in shard_folders(out)] == ["shard-1-of-2"]
+    made(ring_sweep(tmp_path / "t", heights=[5.0]), tmp_path / "other")
+    with pytest.raises(UnitcadError, match="holds another batch"):
+        made(sweep, tmp_path / "other", shard=Shard(1, 2))
+    assert not shard_folders(tmp_path / "other")
+    made(sweep, out, shard=Shard(2, 2))
+    merge(out, shard_folders(out), BatchOptions(folders=False))
+    assert made(sweep, out, shard=Shard(2, 2)).resumed == 2  # beside the batch that was merged of it
+
+
+def test_a_shard_of_another_batch_is_refused_before_it_is_made(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    made(sweep, out, shard=Shard(1, 2))
+    for other, options in ((ring_sweep(tmp_path / "t", heights=[2.0, 5.0], materials=2), {}), (sweep, {"limit": 3})):
+        with pytest.raises(UnitcadError, match=r"shard-1-of-2 is of another batch \(sweep, --set"):
+            made(other, out, shard=Shard(2, 2), **options)
+    assert [path.name for path in shard_folders(out)] == ["shard-1-of-2"]
+    (out / "shard-1-of-2" / "shard.json").write_text("{")  # a merge says so
+    assert made(sweep, out, shard=Shard(2, 2)).ok == 2
+    with pytest.raises(UnitcadError, match=r"shard\.json: damaged"):
+        merge(out, shard_folders(out), BatchOptions())
+
+
+def test_shards_have_one_store(tmp_path: Path) -> None:
+    """Of two stores a merge made a batch that no variant could be exported from."""
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    made(sweep, out, shard=Shard(1, 2), store=str(tmp_path / "a"))
+    assert made(sweep, out, shard=Shard(1, 2)).resumed == 2
+    with pytest.raises(UnitcadError, match=r"shard-1-of-2 has its results in the store .*/a, so this shard"):
+        made(sweep, out, shard=Shard(2, 2), store=str(tmp_path / "b"))
+    assert made(sweep, out, shard=Shard(2, 2)).ok == 2  # in the first one's
+    assert not (out / "store").exists()
+    assert merge(out, shard_folders(out), BatchOptions(folders=False)).ok == 4
+    assert export_variant(out, rows(out)[3]["folder"], tmp_path / "one", DiskStore(tmp_path / "fresh")).is_dir()
+    # Where shards were made in several folders there may be several stores all the same.
+    made(sweep, tmp_path / "else", shard=Shard(2, 2), store=str(tmp_path / "b"))
+    both = [out / "shard-1-of-2", tmp_path / "else" / "shard-2-of-2"]
+    with pytest.raises(UnitcadError, match=r"have their results in 2 stores, .* merge with --folders"):
+        merge(tmp_path / "all", both, BatchOptions(folders=False))
+    assert not (tmp_path / "all").exists()
+    assert merge(tmp_path / "all", both, BatchOptions(cache=tmp_path / "fresh", folders=True)).ok == 4
+    assert len(list((tmp_path / "all").glob("ring-*"))) == 4
+
+
+def test_a_batch_goes_on_in_the_store_that_it_has(tmp_path: Path) -> None:
+    """Without --store it was made again beside itself, and store.json named the old store."""
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0]), tmp_path / "out"
+    made(sweep, out, store=str(tmp_path / "a"), folders=False)
+    assert made(sweep, out, folders=False).resumed == 2
+    assert not (out / "store").exists()
+    assert made(sweep, out, store=str(tmp_path / "b"), folders=False).resumed == 0  # asked for
+    assert json.loads((out / "store.json").read_text()) == {"store": str(tmp_path / "b")}
+
+
+def test_a_store_in_which_nobody_may_write_is_refused_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0])
+    made(sweep, tmp_path / "out", store=str(tmp_path / "a"))
+    closed = tmp_path / "a" / "packs"
+    asked = objects.os.access
+    monkeypatch.setattr(objects.os, "access", lambda path, mode: path != closed and asked(path, mode))  # root may all
+    with pytest.raises(UnitcadError, match="a/packs can't be read and written here"):
+        made(sweep, tmp_path / "other", store=str(tmp_path / "a"))
+    assert not (tmp_path / "other").exists()
+
+
+def test_a_merge_names_all_shards_whose_records_are_gone(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    for number in (1, 2):
+        made(sweep, out, shard=Shard(number, 2))
+    shutil.rmtree(out / "store" / "packs")
+    with pytest.raises(UnitcadError, match=r"variant 0: pack .* each of --shard 1/2 and 2/2 and --verify makes again"):
+        merge(out, shard_folders(out), BatchOptions())
+
+
+@pytest.mark.parametrize("lost", ["packs", "content", "unitcad-store"])
+def test_a_merge_of_what_the_store_has_lost_leaves_nothing(
+    lost: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shared_store, "PAUSE_S", 0.0)
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    for number in (1, 2):
+        made(sweep, out, shard=Shard(number, 2))
+    kept = sorted(path for path in (out / "store" / lost).rglob("*") if path.is_file())
+    if lost == "content":
+        kept = kept[-1:]  # not all: some folders are made before it is missed
+    for path in kept or [out / "store" / lost]:
+        path.unlink()
+    before = sorted(out.iterdir())
+    for folders in (True, False) if lost != "content" else (True,):
+        record_packs.store_at.cache_clear()
+        with pytest.raises(UnitcadError, match=r"--verify makes again|there is no store"):
+            merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=folders))
+        assert sorted(out.iterdir()) == before
+
+
+def test_shards_can_be_moved_with_their_store(tmp_path: Path) -> None:
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0], materials=2)
+    for number in (1, 2):
+        made(sweep, tmp_path / "here", shard=Shard(number, 2))
+    (tmp_path / "here").rename(tmp_path / "there")
+    out = tmp_path / "there"
+    cache = DiskStore(tmp_path / "fresh")
+    assert merge(out, shard_folders(out), BatchOptions(folders=False)).ok == 2
+    out = out.rename(tmp_path / "elsewhere")
+    for batch in (out, out / "shard-1-of-2"):
+        folder = rows(batch)[0]["folder"]
+        assert export_variant(batch, folder, batch, cache).is_dir()
+
+
+def test_a_merge_takes_no_option_that_it_does_not_read(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "out"
+    made(sweep, out, shard=Shard(1, 1))
+    for words in (["--dry-run"], ["--limit", 3], ["-j", 2], ["--set", "a=1"], ["--store", "x"], ["--verify"]):
+        done = unitcad("batch", "merge", out, *words)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert "merge takes -o, --folders" in done.stderr
+        assert not (out / "journal.jsonl").exists()
+    done = unitcad("batch", "merge", out, "--report", "--table", "csv")
+    assert done.returncode == 0, done.stderr
+    assert "4 of 4 variants joined; 0 failed;" in done.stdout
+    assert (out / "report.html").is_file()
+
+
+def test_the_command_line_refuses_what_is_no_shard(tmp_path: Path) -> None:
+    sweep = ring_sweep(tmp_path / "s")
+    for words, message in (
+        (
+            ("batch", sweep, "--shard", "17/16"),
+            "--shard = 17/16: the shards of 16 are numbered 1 to 16; nearest accepted: 16/16",
+        ),
+        (("batch", "merge", tmp_path / "nothing"), "there is no such folder"),
+    ):
+        done = unitcad(*words, cwd=tmp_path)
+        assert done.returncode == 2, done.stdout
+        assert message.replace('"', "") in done.stderr.replace('"', "").replace("'", "")
+        assert "Traceback" not in done.stderr
+
+
+def test_without_folders_one_is_made_when_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(result_folders, "FOLDERS_BELOW", 5)
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=3), tmp_path / "out"
+    made(sweep, out)  # six variants: too many for folders
+    assert not list(out.glob("ring-*"))
+    made(sweep, tmp_path / "plain", folders=True)
+    wanted = rows(out)[4]["folder"]
+    cache = DiskStore(tmp_path / "fresh")
+    assert export_variant(out, wanted[-12:-6], tmp_path / "some", cache) == tmp_path / "some" / wanted
+    plain = {path: sha for path, sha in bytes_of(tmp_path / "plain").items() if path.startswith(wanted)}
+    assert bytes_of(tmp_path / "some") == plain != {}
+    for wrong, words in (("ffffffffffff", "no variant"), ("nonsense", "needs 4 to 12"), ("../x", "needs 4 to 12")):
+        with pytest.raises(WrongArgument, match=words):
+            export_variant(out, wrong, tmp_path / "some", cache)
+    with pytest.raises(UnitcadError, match="is not in a store, its folder is its result"):
+        export_variant(tmp_path / "plain", wanted[-12:], tmp_path / "some", cache)
+    with pytest.raises(UnitcadError, match="--batch names the folder of a batch"):
+        export_variant(tmp_path, wanted[-12:], tmp_path / "some", cache)
+
+
+def test_folders_asked_for_later_are_made_of_what_is_kept(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    made(sweep, out, folders=False, cache=tmp_path / "one")
+    folder = rows(out)[0]["folder"]
+    before = len(calls(tmp_path / "s"))
+    summary = made(sweep, out, folders=True, cache=tmp_path / "two")
+    assert (summary.ok, summary.resumed, len(calls(tmp_path / "s"))) == (4, 4, before)
+    made(sweep, tmp_path / "plain", folders=True, cache=tmp_path / "one")
+    plain = bytes_of(tmp_path / "plain")
+    assert {path: sha for path, sha in bytes_of(out).items() if path.startswith("ring-")} == {
+        path: sha for path, sha in plain.items() if path.startswith("ring-")
+    }
+    # What the store has lost is made anew.
+    for path in (out / "store" / "packs").rglob("*"):
+        path.unlink() if path.is_file() else None
+    (out / folder / "manifest.json").unlink()
+    record_packs.store_at.cache_clear()
+    summary = made(sweep, out, folders=True, cache=tmp_path / "two")
+    assert (summary.ok, summary.resumed) == (4, 3)
+
+
+def test_what_makes_lost_content_again_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_store, "PAUSE_S", 0.0)
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=1), tmp_path / "out"
+    for number in (1, 2):
+        made(sweep, out, shard=Shard(number, 2))
+    for path in (out / "store" / "content").rglob("*"):
+        if path.is_file():
+            path.unlink()
+    record_packs.store_at.cache_clear()
+    with pytest.raises(UnitcadError, match=r"variant 0: .*; the sweep with --shard 1/2 and --verify makes again"):
+        merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=True))
+    merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=False))
+    folder = rows(out)[0]["folder"]
+    with pytest.raises(UnitcadError, match="the same batch with --verify makes again what is missing"):
+        export_variant(out, folder, tmp_path / "one", DiskStore(tmp_path / "fresh"))
+
+
+def test_parquet_has_the_rows_of_the_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=3)
+    made(sweep, tmp_path / "out", tables=("json", "parquet"))
+    rows_there = read_parquet(tmp_path / "out" / "variants.parquet")["variants"]
+    assert [{key: value for key, value in row.items() if value is not None} for row in rows_there] == rows(
+        tmp_path / "out"
+    )
+    schema = parquet.read_schema(tmp_path / "out" / "variants.parquet")
+    head = json.loads((tmp_path / "out" / "batch.json").read_text())
+    assert json.loads(schema.metadata[b"unitcad"]) == {k: v for k, v in head.items() if k != "variants"}
+    assert (str(schema.field("index").type), str(schema.field("layer1_mass_g").type)) == ("int64", "double")
+    # By default from MOST_ROWS on, and then alone; the same bytes again.
+    monkeypatch.setattr(results, "MOST_ROWS", 6)
+    made(sweep, tmp_path / "many")
+    tables = [(tmp_path / "many" / name).is_file() for name in ("variants.csv", "batch.json", "variants.parquet")]
+    assert tables == [False, False, True]
+    pages = [Path(write_report(tmp_path / name)).read_bytes() for name in ("many", "out")]
+    assert pages[0].replace(b">many", b">out") == pages[1].replace(b">many", b">out")
+    made(sweep, tmp_path / "parts", shard=Shard(1, 2))  # of the whole's table
+    assert (tmp_path / "parts" / "shard-1-of-2" / "variants.parquet").is_file()
+    assert (tmp_path / "many" / "variants.parquet").read_bytes() == (tmp_path / "out" / "variants.parquet").read_bytes()
+    made(sweep, tmp_path / "many", tables=("csv",))
+    assert (tmp_path / "many" / "variants.csv").is_file()
+
+
+def test_a_column_of_several_kinds_is_text(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    values = [1, 2.5, None, True, "a", [1, 2], 1 << 70]
+    entries = [
+        JournalEntry(index=i, status="ok", values={"mixed": v, "number": i + 0.5 * (i % 2)})
+        for i, v in enumerate(values)
+    ]
+    columns = ["index", "status", "reason", "folder", "mixed", "number"]
+    write_results(tmp_path, columns, lambda: entries, BatchHead(batch="a", name="b"), None, ("parquet",))
+    there = read_parquet(tmp_path / "variants.parquet")["variants"]
+    assert [row["mixed"] for row in there] == ["1", "2.5", None, "true", '"a"', "[1, 2]", str(1 << 70)]
+    assert [row["number"] for row in there] == [0.0, 1.5, 2.0, 3.5, 4.0, 5.5, 6.0]
+
+
+def test_without_the_extra_parquet_is_refused_and_tables_are_as_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(results, "can_write", lambda: False)
+    monkeypatch.setattr("unitcad.sweeps.parquet_table.can_write", lambda: False)
+    monkeypatch.setattr(results, "MOST_ROWS", 1)
+    head, entries = BatchHead(batch="a", name="b"), [JournalEntry(index=0, status="ok")]
+    write_results(tmp_path, ["index"], lambda: entries, head, None, None, 1)
+    assert (tmp_path / "variants.csv").read_text() == "index\n0\n"
+    with pytest.raises(UnitcadError, match=r"-m pip install .*\[parquet\]"):
+        write_results(tmp_path, ["index"], lambda: entries, head, None, ("parquet",), 1)

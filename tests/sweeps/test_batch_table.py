@@ -1,0 +1,128 @@
+"""Estimate-only sweeps: the arrays give what a plain loop over single estimates gives, variant by variant."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from batching import bytes_of, unitcad
+
+from unitcad.attenuation.edge.estimate_summary import summary
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.estimating import estimate_spec
+from unitcad.sweeps import BatchOptions, estimate_table
+from unitcad.sweeps.sweep import Sweep, from_file
+
+SILICONES = ["ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30"]
+BOTH = ["encapsulating", "single-embedded"]
+SWEEPS = {
+    "free axes": (
+        BOTH,
+        {
+            "layers.0.wall_mm": [1.0, 1.3],
+            "layers.0.material": SILICONES,
+            "estimate.frequency_hz": {"start": 60.0, "stop": 240.0, "num": 3},
+        },
+    ),
+    "two layers": (
+        "embedded",
+        {"layers.1.material": SILICONES, "layers.0.material": SILICONES, "casting.room_c": 20.0},
+    ),
+    "bound axes": (
+        "encapsulating",
+        {"motor.part": ["LCM0720A3463F"], "diameter_mm": [14.0, 15.5], "motor.fill": [False, True]},
+    ),
+    "zip": (
+        "encapsulating",
+        {"mode": "zip", "layers.0.material": SILICONES, "estimate.frequency_hz": [50.0, 60.0, 70.0, 80.0, 90.0]},
+    ),
+    "moduli": (
+        "encapsulating",
+        {"estimate.moduli": ["dynamic", "quasi-static"], "layers.0.material": ["ecoflex-00-10", "dragon-skin-30"]},
+    ),
+    "own silicone": (
+        "encapsulating",
+        {
+            "materials.ours.like": ["ecoflex-00-10"],
+            "materials.ours.youngs_modulus_kpa": [20.0, 80.0],
+            "layers.0.material": ["ours", "ecoflex-00-10"],
+        },
+    ),
+    "models": (
+        "encapsulating",
+        {"estimate.models": [["paper"], ["paper", "fitted"]], "layers.0.material": SILICONES[::2]},
+    ),
+}
+
+
+def _sweep(name: str) -> Sweep:
+    base, axes = SWEEPS[name]
+    return from_file({"base": base, "sweep": axes}, Path(), "test")
+
+
+def _rows(sweep: Sweep, out: Path) -> list[dict]:
+    estimate_table.write_estimates(sweep, out, BatchOptions(("estimate",)))
+    return json.loads((out / "batch.json").read_text())["variants"]
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_the_table_is_what_single_estimates_give(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(estimate_table, "BLOCK", 7)  # so that blocks end in the middle of an axis
+    sweep = _sweep(name)
+    rows = _rows(sweep, tmp_path / "o")
+    assert len(rows) == sweep.count
+    numbers = 0
+    for i, row in enumerate(rows):
+        spec = sweep.spec(i)
+        expected = summary(estimate_spec(spec, layered=lambda asked: {}))["models"]
+        assert (row["index"], row["design"], row["diameter_mm"]) == (i, spec.design, spec.diameter_mm)
+        for model in ("paper", "consistent", "fitted"):
+            single = expected.get(model, {}).get("edge")
+            if single is None:
+                assert row.get(f"edge_{model}") is None
+            else:
+                assert row[f"edge_{model}"] == pytest.approx(single, rel=1e-5)
+                numbers += 1
+    assert numbers >= len(rows)  # not a table of nothing
+    if name == "free axes":
+        assert estimate_table._free_axes(sweep) == [1, 2]
+
+
+def test_what_validation_refuses_is_refused_here(tmp_path: Path) -> None:
+    axes = {"layers.0.wall_mm": [1.0, 2.0, 3.0], "layers.0.material": ["ecoflex-00-10", "nonsense", "dragon-skin-30"]}
+    sweep = from_file({"base": "embedded", "sweep": axes}, Path(), "test")
+    rows = _rows(sweep, tmp_path / "o")
+    for i, row in enumerate(rows):
+        try:
+            sweep.spec(i)
+        except Refusal:
+            assert row["status"] == "refused"
+            assert row["reason"]
+        else:
+            assert row["status"] == "ok"
+    assert [row["status"] for row in rows] == ["ok", "refused", "ok"] * 2 + ["refused"] * 3
+
+
+def test_the_command_writes_the_same_table_each_time_and_no_folders(tmp_path: Path) -> None:
+    done = unitcad("batch", "all-materials", "--only", "estimate", "-o", tmp_path / "a", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["ok"] == 50
+    assert unitcad("batch", "all-materials", "--only", "estimate", "-o", tmp_path / "b").returncode == 0
+    assert bytes_of(tmp_path / "a") == bytes_of(tmp_path / "b")
+    assert not [path for path in (tmp_path / "a").iterdir() if path.is_dir()]
+    with open(tmp_path / "a" / "variants.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 50
+    assert sum(bool(row["edge_fitted"]) for row in rows) == 2 * 9  # three silicones have a small-strain modulus
+    assert unitcad("batch", "thickness", "--only", "estimate", "-o", tmp_path / "a").returncode == 2
+
+
+def test_a_hundred_thousand_variants_are_validated_a_handful_of_times() -> None:
+    axes = {"layers.0.material": SILICONES, "estimate.frequency_hz": {"start": 50.0, "stop": 250.0, "num": 20_000}}
+    sweep = from_file({"base": "encapsulating", "sweep": axes}, Path(), "test")
+    blocks = list(estimate_table.evaluate(sweep, sweep.count))
+    assert sum(len(block.known) for block in blocks) == 100_000
+    assert not any(isinstance(entry, UnitcadError) for block in blocks for entry in block.known)
+    assert len({id(entry) for block in blocks for entry in block.known}) == 1

@@ -1,0 +1,49 @@
+"""Mould checks: one file a code. Every file here that defines CHECK is one; all read a mould set and nothing else."""
+
+from __future__ import annotations
+
+import pkgutil
+from functools import cache
+from importlib import import_module
+
+from unitcad.checks import overlap
+from unitcad.checks.check import MouldCheck
+from unitcad.checks.finding import MouldFinding
+from unitcad.checks.strain import Strain, strain_findings, strains
+from unitcad.moulds.mould_set import MouldSet
+
+__all__ = [
+    "MouldCheck",
+    "MouldFinding",
+    "Strain",
+    "check_geometry",
+    "check_moulds",
+    "check_unit",
+    "mould_checks",
+    "strain_findings",
+    "strains",
+]
+
+
+@cache
+def mould_checks() -> dict[str, MouldCheck]:
+    """Return the mould checks by their code, in the order of codes."""
+    modules = (import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__))
+    checks = [module.CHECK for module in modules if hasattr(module, "CHECK")]
+    return {check.code: check for check in sorted(checks, key=lambda check: check.code)}
+
+
+def check_moulds(moulds: MouldSet) -> list[MouldFinding]:
+    """Return what all mould checks find on a unit and its moulds, in the order of codes."""
+    return [finding for check in mould_checks().values() for finding in check.findings(moulds)]
+
+
+def check_unit(moulds: MouldSet) -> list[MouldFinding]:
+    """Return what the checks find on the unit alone, without moulds: its overlaps."""
+    return overlap.of_unit(moulds)
+
+
+def check_geometry(moulds: MouldSet) -> list[MouldFinding]:
+    """Return what the checks find that read no silicone; variants of one geometry share it."""
+    checks = (check for check in mould_checks().values() if not check.reads_silicone)
+    return [finding for check in checks for finding in check.findings(moulds)]

@@ -1,0 +1,31 @@
+"""C100: the cavity that tools and earlier layers leave is the layer, and nothing more.
+
+It compares what was drawn as a unit with what was drawn as tools, and knows of neither how it was drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from unitcad.checks.check import MouldCheck
+from unitcad.checks.each_cavity import each_cavity
+from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.moulds.cavities import BALANCE, Cavity
+from unitcad.moulds.mould_set import MouldSet
+
+
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
+    """Compare what silicone can reach with the layer, in every cavity."""
+    return each_cavity(moulds, _of_cavity)
+
+
+def _of_cavity(cavity: Cavity) -> Iterator[MouldFinding]:
+    drawn, reached = cavity.drawn, cavity.reached
+    # What one has and the other lacks, both ways.
+    differ = abs(reached.volume() + drawn.volume() - 2 * (reached ^ drawn).volume())
+    yield at_most("C100", cavity.where, differ / drawn.volume(), BALANCE, "share of the layer")
+
+
+CHECK = MouldCheck(
+    "C100", "balance and leak: the cavity that tools and earlier layers leave is the layer, and nothing more", findings
+)

@@ -1,0 +1,144 @@
+"""C220: what centres a cup on its plinth bears on three faces or more, as deep as is asked for, and stays off the seat.
+
+Measured on the meshes: the patches in which cup and base overlap halfway up the ribs' crests. A patch's narrowest
+extent is the interference, and its direction that of the face that the rib bears on. Where the directions leave less
+than half a turn between any two neighbours, no way is left for the cup to slip aside. Ribs of resin stand on leaves:
+these must bend without breaking, and into the slot behind them. A cup without ribs has a play.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from manifold3d import CrossSection, Manifold
+
+from unitcad.checks.check import MouldCheck
+from unitcad.checks.finding import MouldFinding, at_least, at_most
+from unitcad.checks.leaves import thickest_leaf
+from unitcad.designs.rib_leaves import MOST_STRAIN, farthest_push, leaf_mm, leaf_strain
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.ribs import SQUARE, ribs
+from unitcad.shape.profile import GRID_PER_MM
+from unitcad.spec import printer_of
+
+FACES = 3
+"""Faces that ribs bear on, at least: fewer leave a way to slip aside."""
+WIDEST_DEG = 150.0
+"""Angle between neighbouring directions that a cup is held from, at most: at 180 nothing holds it between them."""
+SAME_DEG = 20.0
+"""Directions nearer than this are those of one face."""
+GRID = 3 / GRID_PER_MM
+"""What snapping crest and face to the grid may add to the interference or take from it, mm."""
+FARTHEST, NEAR = 4.0, 1e-4
+"""How far a play is looked for, and how finely, mm."""
+SLIVER = 1e-5
+"""Area of a patch that is what rounding leaves, mm2."""
+
+
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
+    """Measure what centres each cup."""
+    lengths = moulds.spec.moulds
+    standing = ribs(moulds.spec, moulds.plan.layout)
+    for step in moulds.plan.steps:
+        where = step.lid if step.pins and step.lid else step.cup
+        if where not in moulds.solids:
+            continue
+        cup, base = moulds.solids[where], moulds.solids[moulds.plan.base_of(step)]
+        if not standing:
+            pins = step.pins or moulds.plan.pins
+            level = pins.seat + pins.height / 2 if pins else -(lengths.plinth_height_mm - lengths.seat_relief_mm) / 2
+            on = "pins" if pins else "plinth, no ribs"
+            limit = lengths.plinth_clearance_mm * SQUARE + GRID
+            advice = "it slips aside by more than the clearance asked for"
+            yield at_most("C220", f"{where}: play on the {on}", _play(cup, base, level), limit, "mm", advice)
+            continue
+        held = _patches(cup, base, (standing[0].bottom + standing[0].top) / 2)
+        directions = _faces(direction for _, direction in held)
+        yield at_least("C220", f"{where}: faces that ribs bear on", len(directions), FACES, "")
+        gap = max((b - a for a, b in pairwise([*directions, *(d + 360 for d in directions[:1])])), default=360.0)
+        advice = "on that side nothing holds the cup: a rib is missing or too low"
+        yield at_most("C220", f"{where}: widest angle between them", gap, WIDEST_DEG, "deg", advice)
+        depths = [depth for depth, _ in held] or [0.0]
+        asked = lengths.rib_interference_mm
+        yield at_least("C220", f"{where}: least interference of a rib", min(depths), asked - GRID, "mm")
+        yield at_most("C220", f"{where}: greatest interference of a rib", max(depths), asked + GRID, "mm")
+        shared = cup ^ moulds.crushing
+        room = -shared.bounding_box()[5] if not shared.is_empty() else -standing[0].head
+        advice = "what is crushed there lifts the cup off its seat"
+        yield at_least("C220", f"{where}: from the seat down to a rib", room, -standing[0].head - GRID, "mm", advice)
+        if leaf_mm(printer_of(moulds.spec)):
+            yield from _bending(moulds, step.cup, max(depths), -room)
+
+
+def _bending(moulds: MouldSet, cup: str, depth: float, contact: float) -> Iterator[MouldFinding]:
+    """Measure how far a cup's leaves are strained, and whether they find room, where ribs bear up to z = `contact`."""
+    lengths, standing = moulds.spec.moulds, ribs(moulds.spec, moulds.plan.layout)
+    leaf = thickest_leaf(moulds.solids[cup], standing, lengths.plinth_clearance_mm)
+    pushed, arm = farthest_push(depth, lengths.xy_play_mm, lengths.plinth_clearance_mm), leaf.root - contact
+    strain = leaf_strain(leaf.thickness, pushed, arm) if arm > 0 else math.inf
+    advice = "the leaf under a rib breaks: it is too thick, or its slot too short"
+    yield at_most("C220", f"{cup}: strain at the root of a rib's leaf", 100 * strain, 100 * MOST_STRAIN, "%", advice)
+    # The straight part below the contact turns with it.
+    end = pushed * (1 + 1.5 * (contact - standing[0].foot) / arm) if arm > 0 else math.inf
+    yield at_least("C220", f"{cup}: room behind a rib's leaf", leaf.room, end, "mm")
+
+
+def _patches(cup: Manifold, base: Manifold, level: float) -> list[tuple[float, float]]:
+    """Return depth (mm, square to the face) and direction (degrees, outwards) of every patch of both at a level."""
+    shared, plinth = cup.slice(level) ^ base.slice(level), base.slice(level).bounds()
+    middle = np.array([plinth[0] + plinth[2], plinth[1] + plinth[3]]) / 2
+    found = []
+    for patch in shared.decompose():
+        if patch.area() > SLIVER:
+            depth, normal = _narrowest(patch)
+            outwards = normal if float(normal @ (_middle(patch) - middle)) > 0 else -normal
+            found.append((depth / SQUARE, math.degrees(math.atan2(outwards[1], outwards[0])) % 360))
+    return found
+
+
+def _narrowest(patch: CrossSection) -> tuple[float, np.ndarray]:
+    """Return the least extent of a patch over its hull's sides, mm, and the direction in which it is that narrow."""
+    (hull,) = patch.hull().to_polygons()
+    sides = np.roll(hull, -1, axis=0) - hull
+    sides = sides[np.hypot(*sides.T) > 1e-6]
+    normals = np.stack([sides[:, 1], -sides[:, 0]], axis=1) / np.hypot(*sides.T)[:, None]
+    along = hull @ normals.T
+    extents = along.max(axis=0) - along.min(axis=0)
+    return float(extents.min()), normals[int(extents.argmin())]
+
+
+def _middle(patch: CrossSection) -> np.ndarray:
+    x0, y0, x1, y1 = patch.bounds()
+    return np.array([x0 + x1, y0 + y1]) / 2
+
+
+def _faces(directions: Iterator[float]) -> list[float]:
+    """Return the directions in their order, one for each face."""
+    faces: list[float] = []
+    for direction in sorted(directions):
+        if not faces or min(direction - faces[-1], 360 + faces[0] - direction) > SAME_DEG:
+            faces.append(direction)
+    return faces
+
+
+def _play(cup: Manifold, base: Manifold, level: float) -> float:
+    """Return how far the plinth's section at a level moves along x or y before it meets the cup's, mm."""
+    wall, plinth = cup.slice(level), base.slice(level)
+    return max(_travel(wall, plinth, way) for way in ((1, 0), (-1, 0), (0, 1), (0, -1)))
+
+
+def _travel(wall: CrossSection, plinth: CrossSection, way: tuple[int, int]) -> float:
+    free, meets = 0.0, FARTHEST
+    while meets - free > NEAR:
+        middle = (free + meets) / 2
+        shared = (wall ^ plinth.translate((middle * way[0], middle * way[1]))).area()
+        free, meets = (free, middle) if shared > SLIVER else (middle, meets)
+    return free
+
+
+CHECK = MouldCheck(
+    "C220", "centring: ribs bear on three faces, as deep as asked for, stay off the seat and break no leaf", findings
+)

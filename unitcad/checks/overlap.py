@@ -1,0 +1,184 @@
+"""C200: no two solids of the unit, of a patch, or of an assembled pour, share volume.
+
+Ribs count as crushed: C220 looks at them. A pocket counts as stretched round its unit: C310 looks at its strain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+
+import numpy as np
+from manifold3d import Manifold
+
+from unitcad.checks.check import MouldCheck
+from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.moulds.congruence import MARGIN, column_round
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
+from unitcad.shape import Shape, union
+
+OVERLAP = 1e-6
+"""Largest volume two pieces may share, mm3: what rounding leaves where faces touch."""
+
+
+def findings(moulds: MouldSet) -> list[MouldFinding]:
+    """Look at the unit, then at each assembled pour: tools, cured layers, what is laid in, and the one being cast.
+
+    The cells of a layer are compared with each other, then count as one solid.
+    """
+    return moulds.once("C200", lambda: _of_all(moulds))
+
+
+def _of_all(moulds: MouldSet) -> list[MouldFinding]:
+    volumes = _Volumes()
+    pours = [*_of_pours(moulds, volumes)]
+    return [*of_unit(moulds, _Volumes(_of_layers(moulds, volumes))), *pours]
+
+
+def _of_layers(moulds: MouldSet, volumes: _Volumes) -> dict[tuple[str, str], float]:
+    """Return what layers of the unit share by their names, as known from the last pour, where they lie in it so."""
+    last = moulds.plan.steps[-1]
+    cast = [*_earlier(moulds, last), (last.name, last.layer)]
+    bodies = {name: body.name for name, shapes in cast for body in moulds.unit if body.shape == union(shapes)}
+    known = volumes.of_names.items()
+    return {(bodies[a], bodies[b]): volume for (a, b), volume in known if a in bodies and b in bodies}
+
+
+def of_unit(moulds: MouldSet, volumes: _Volumes | None = None) -> list[MouldFinding]:
+    """Look at the unit, or the patch, alone; `volumes` keeps what its pairs share."""
+    there = [(name, moulds.meshes(shapes)) for name, shapes in moulds.together]
+    return _findings("unit", there, volumes or _Volumes())
+
+
+_There = Sequence[tuple[str, Sequence[Manifold]]]
+"""What stands in a pour by name: a layer has a part in every cell."""
+
+
+def _of_pours(moulds: MouldSet, volumes: _Volumes) -> Iterator[MouldFinding]:
+    for step in moulds.plan.steps:
+        volumes.alike = _alike(moulds, step)
+        cells = moulds.meshes(step.layer)
+        alone = [(f"{step.name}.{i + 1}", [cell]) for i, cell in enumerate(cells)]
+        yield from _findings(f"pour {step.index}", alone, volumes)
+        cast = [*((name, moulds.meshes(shapes)) for name, shapes in _earlier(moulds, step)), (step.name, cells)]
+        laid = [(body.name, [moulds.mesh(body)]) for body in step.inserts]
+        tools = [(name, [moulds.pressed[name]]) for name in step.tools]
+        yield from _findings(f"pour {step.index}", [*tools, *cast, *laid], volumes)
+
+
+def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, tuple[Shape, ...]]]:
+    """Yield the cured layers of a pour by name, where they lie in it: a layer that was laid in is another solid."""
+    start = 0
+    for before in moulds.plan.steps[: step.index - 1]:
+        there = step.earlier[start : start + len(before.layer)]
+        start += len(before.layer)
+        yield before.name if there == before.layer else f"{before.name} laid in", there
+
+
+def _alike(moulds: MouldSet, step: Step) -> dict[int, Hashable]:
+    """Return for the small solids of a pour, by identity, a value that is the same for those in like surroundings."""
+    around, count = moulds.surroundings[step.index - 1], len(moulds.plan.layout.cells)
+    if count == 1:
+        return {}
+    pours, cast = around.steps[0].index, (*step.earlier, *step.layer)
+    alike: dict[int, Hashable] = {
+        id(solid): (pours, start, cell)
+        for start in range(0, len(cast) - count + 1, count)
+        for solid, cell in zip(moulds.meshes(cast[start : start + count]), moulds.cells[step.index - 1], strict=True)
+    }
+    whole = _reach(moulds.pressed["base"])
+    for name in step.tools:
+        solid = moulds.pressed[name]
+        if _reach(solid) < whole / 2:
+            number = moulds.once(
+                f"surroundings of {name} in pour {pours}",
+                lambda solid=solid: around.congruence.number(column_round([solid], MARGIN)),
+            )
+            alike[id(solid)] = pours, number
+    return alike
+
+
+def _findings(where: str, there: _There, volumes: _Volumes) -> list[MouldFinding]:
+    """Return the pair that shares most, and every pair that shares too much."""
+    pairs = []
+    boxes = np.array([volumes.box(parts) for _, parts in there]).reshape(-1, 6)
+    for i, k in np.argwhere(np.triu(_meet(boxes, boxes), 1)):
+        volume = volumes.shared(there[i], there[k])
+        if volume is not None:
+            pairs.append(at_most("C200", f"{where}: {there[i][0]} and {there[k][0]}", volume, OVERLAP, "mm3"))
+    return [f for f in pairs if not f.ok] or sorted(pairs, key=lambda f: -f.value)[:1]
+
+
+def common_volume(one: Manifold, other: Manifold) -> float:
+    """Return the volume that two solids share, mm3.
+
+    Where faces coincide the mesh kernel now and then keeps a part that is not shared, in one order of the two alone:
+    what is found is found in both orders. `other` is cut first: a cup and then the base take half as long that way.
+    """
+    volume = float((other ^ one).volume())
+    return volume if volume <= OVERLAP else min(volume, float((one ^ other).volume()))
+
+
+class _Volumes:
+    """The volumes that pairs share: a pair that stands together in several pours, or in like places, is cut once.
+
+    `alike` has, for small solids of a pour by identity, a value that is the same for those in like surroundings;
+    `known` and `of_names` hold volumes by names.
+    """
+
+    def __init__(self, known: Mapping[tuple[str, str], float] | None = None) -> None:
+        self.alike: Mapping[int, Hashable] = {}
+        self.of_names = dict(known or {})
+        self._of_places: dict[Hashable, float] = {}
+        self._boxes: dict[int, tuple[float, ...]] = {}
+        self._kept: list[Manifold] = []
+
+    def shared(self, one: tuple[str, Sequence[Manifold]], other: tuple[str, Sequence[Manifold]]) -> float | None:
+        """Return the volume that two named pieces share, mm3; None where no boxes of theirs meet."""
+        (a, parts), (b, others) = one, other
+        boxes, beside = (np.array([self._box(part) for part in each]) for each in (parts, others))
+        meeting = np.argwhere(_meet(boxes, beside))
+        if not len(meeting):
+            return None
+        if (a, b) not in self.of_names:
+            self.of_names[a, b] = sum(self._cut(parts[i], a, others[k], b) for i, k in meeting)
+        return self.of_names[a, b]
+
+    def _cut(self, part: Manifold, a: str, beside: Manifold, b: str) -> float:
+        if id(part) not in self.alike:
+            part, a, beside, b = beside, b, part, a
+        if id(part) not in self.alike:
+            return common_volume(part, beside)
+        # Of the large pieces there is one of each name; a small one is known by its place beside the first.
+        own, box = self._box(part), self._box(beside)
+        place = tuple(round(y - x, 6) for x, y in zip(own, box, strict=True)) if id(beside) in self.alike else b
+        key = self.alike[id(part)], place
+        if key not in self._of_places:
+            self._of_places[key] = common_volume(part, beside)
+        return self._of_places[key]
+
+    def box(self, parts: Sequence[Manifold]) -> np.ndarray:
+        """Return the box round several solids: its low corner, then the high one, mm."""
+        boxes = np.array([self._box(part) for part in parts])
+        return np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
+
+    def _box(self, solid: Manifold) -> tuple[float, ...]:
+        if id(solid) not in self._boxes:
+            self._boxes[id(solid)] = solid.bounding_box()
+            self._kept.append(solid)  # or its identity could become another's
+        return self._boxes[id(solid)]
+
+
+def _meet(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Tell for every two of two sets of boxes (n, 6) and (m, 6) whether they touch."""
+    low, high = boxes[:, None, :3], boxes[:, None, 3:]
+    return np.all((low <= others[None, :, 3:]) & (others[None, :, :3] <= high), axis=2)
+
+
+def _reach(solid: Manifold) -> float:
+    x0, y0, _, x1, y1, _ = solid.bounding_box()
+    return math.hypot(x1 - x0, y1 - y0) / 2
+
+
+CHECK = MouldCheck("C200", "overlap: no two solids of an assembled step share volume", findings)

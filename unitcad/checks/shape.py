@@ -1,0 +1,50 @@
+"""C000: every solid has volume, one component, and the genus that its drawing means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from unitcad.checks.check import MouldCheck
+from unitcad.checks.finding import MouldFinding, exactly
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Plan
+
+
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
+    """Look at every body of unit and tooling and the pieces of split tools; genus only where the drawing means one."""
+    genus = expected_genus(moulds.plan)
+    for name, solid in moulds.solids.items():
+        yield exactly("C000", f"{name} components", len(solid.decompose()), moulds.pieces(name), "")
+        yield MouldFinding("C000", f"{name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3")
+        if name in genus:
+            yield exactly("C000", f"{name} genus", solid.genus(), genus[name], "")
+    for split in moulds.plan.splits:
+        pieces = {piece.name: moulds.mesh(piece) for piece in split.pieces}
+        for name, solid in pieces.items():
+            yield exactly("C000", f"{name} components", len(solid.decompose()), 1, "")
+            yield MouldFinding("C000", f"{name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3")
+        # A seam that meets no hole leaves as many of them.
+        holes, whole = sum(solid.genus() for solid in pieces.values()), moulds.solids[split.tool].genus()
+        yield exactly("C000", f"{split.tool} genus, all pieces", holes, whole, "")
+
+
+def expected_genus(plan: Plan) -> dict[str, int]:
+    """Return the number of through holes of each tool.
+
+    A base has a filament hole a core; a cup a bore a cell and a closed window a tail; a lid a sprue and its vents. Of
+    moulds by complement only the blade's is known; a plan may state others.
+    """
+    if not plan.concentric:
+        return {tool.name: 0 for tool in plan.of_kind("blade")} | dict(plan.genus)
+    genus = {tool.name: 0 for tool in plan.tools}
+    genus["base"] = len(plan.of_kind("stub"))
+    for step in plan.steps:
+        genus[step.cup] = len(plan.layout.cells) + step.windows
+        if step.lid:
+            genus[step.lid] = len(step.channels)
+    return genus
+
+
+CHECK = MouldCheck(
+    "C000", "shape: every solid has volume, one component and the genus that its drawing means", findings
+)

@@ -1,0 +1,47 @@
+"""C240: between any two hollows of a cup stands a wall: bores, grooves, windows and holes for pins keep apart.
+
+Measured on the meshes. Engraved letters don't count: nothing flows through them, and their strokes lie closer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from manifold3d import Manifold
+
+from unitcad.checks.check import MouldCheck
+from unitcad.checks.finding import MouldFinding, at_least
+from unitcad.checks.hollows import GRID, hollows, wall_limit
+from unitcad.moulds.mould_set import MouldSet
+
+SHOWN = 2.0
+"""Walls thicker than this times the limit are not told apart."""
+
+
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
+    """Measure the thinnest wall between two hollows of every cup."""
+    letters = moulds.spec.moulds.engraving_depth_mm + GRID
+    for step in moulds.plan.steps:
+        limit = wall_limit(moulds, step)
+        farthest = SHOWN * limit
+        pieces = hollows(moulds, moulds.plan.walled(step))
+        deep = [piece for piece in pieces if (box := piece.bounding_box())[5] - box[2] > letters]
+        thinnest = farthest
+        for i, k in near(deep, farthest):
+            thinnest = min(thinnest, float(deep[i].min_gap(deep[k], thinnest)))
+        yield at_least(
+            "C240", f"{moulds.plan.walled(step)}: wall between two hollows", thinnest, limit, "mm", "move them apart"
+        )
+
+
+def near(pieces: Sequence[Manifold], gap: float) -> list[tuple[int, int]]:
+    """Return every two of the pieces, by their places, whose boxes are `gap` (mm) apart at most."""
+    boxes = np.array([piece.bounding_box() for piece in pieces]).reshape(-1, 6)
+    low, high = boxes[:, None, :3], boxes[None, :, 3:]
+    reaches = np.all(low <= high + gap, axis=2)
+    first, second = np.nonzero(np.triu(reaches & reaches.T, 1))
+    return list(zip(first.tolist(), second.tolist(), strict=True))
+
+
+CHECK = MouldCheck("C240", "walls: between any two hollows of a cup stands the least wall or more", findings)

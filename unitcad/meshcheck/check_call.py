@@ -1,0 +1,130 @@
+"""`unitcad.check` as a function, and what it returns."""
+
+# pyright: strict
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from unitcad.arguments import check_number, path, texts
+from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.meshcheck.findings import FileReport, Finding
+from unitcad.meshcheck.options import Options
+from unitcad.meshcheck.rules.f_limits import Limits
+from unitcad.meshcheck.units import unit_named
+
+if TYPE_CHECKING:
+    from unitcad.catalogue import Printer
+
+    StrPath = str | os.PathLike[str]
+
+_MOST = 1e9
+"""What a limit is below: faces, seconds, processes."""
+_MOST_CODES = 5
+"""Codes that a result's repr lists."""
+
+
+@dataclass(frozen=True, repr=False)
+class CheckResult:
+    """The reports of some files, one a file, in order."""
+
+    reports: tuple[FileReport, ...]
+
+    @property
+    def verdict(self) -> str:
+        """The worst verdict of a file: "error", "warning" or "pass"."""
+        verdicts = {report.verdict for report in self.reports}
+        return next((severity for severity in ("error", "warning") if severity in verdicts), "pass")
+
+    @property
+    def ok(self) -> bool:
+        """Whether no file has an error; warnings do not count."""
+        return self.verdict != "error"
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings of all files, in the order of the files."""
+        return tuple(finding for report in self.reports for finding in report.findings)
+
+    def __repr__(self) -> str:
+        files, codes = len(self.reports), Counter(finding.code for finding in self.findings)
+        listed = ", ".join(f"{code} x {count}" for code, count in sorted(codes.items())[:_MOST_CODES])
+        more = f" and {len(codes) - _MOST_CODES} more codes" if len(codes) > _MOST_CODES else ""
+        counted = f"; {listed}{more}" if codes else ""
+        return f"CheckResult({files} {'file' if files == 1 else 'files'}: {self.verdict}{counted})"
+
+    def _repr_html_(self) -> str:
+        from unitcad import notebook
+
+        rows: list[tuple[object, ...]] = []
+        for report in self.reports:
+            if not report.findings:
+                rows.append((report.path, report.verdict, "", ""))
+            rows += [(report.path, finding.severity, finding.code, finding.message) for finding in report.findings]
+        return notebook.table(("file", "verdict", "code", "finding"), rows)
+
+
+def check(
+    *files: StrPath,
+    printer: str | Printer | None = None,
+    unit: str | None = None,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    shells: int | None = None,
+    strict: bool = False,
+    strict_3mf: bool = False,
+    max_faces: int | None = None,
+    timeout: float | None = None,
+    jobs: int = 1,
+) -> CheckResult:
+    """Check mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB, and STEP with an extra.
+
+    `files` are files, folders or globs. `printer`, a name of the catalogue or an entry, asks for the rules of fit and
+    printability. `unit` ("mm", "in" and so on) is that of formats that have none. `select` and `ignore` are prefixes
+    of codes; `shells` is the number expected; with `strict`, crossings too shallow for any printer are errors.
+    `timeout` is in seconds a file. With `jobs` above 1 worker processes check the files. What is wrong with a file, or
+    that it is missing, is in the result; lengths in mm. Raises Refusal or UnitcadError for an invalid argument.
+    """
+    from unitcad.meshcheck import many_files
+    from unitcad.meshcheck.rules.registry import check_prefixes
+
+    if printer is not None:
+        from unitcad.catalogue import Printer, choose, printers
+
+        if isinstance(printer, str):
+            printer = choose("printer", printer, printers())
+        elif not isinstance(printer, Printer):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise WrongArgument("printer", printer, "takes a printer's name or its entry")
+    if not files:
+        raise UnitcadError("check needs a file, a folder or a glob")
+    names = [path("files", file) for file in files]
+    for field, value, least in (("max_faces", max_faces, 1), ("jobs", jobs, 1), ("shells", shells, 0)):
+        check_number(field, value, least, _MOST, whole=True)
+    check_number("timeout", timeout, 0.001, _MOST)
+    default = Limits()
+    options = Options(
+        select=check_prefixes("select", _listed("select", select)),
+        ignore=check_prefixes("ignore", _listed("ignore", ignore)),
+        unit=unit_named("unit", unit),
+        printer=printer,
+        shells=shells,
+        strict=strict,
+        strict_3mf=strict_3mf,
+        limits=replace(
+            default,
+            max_faces=default.max_faces if max_faces is None else max_faces,
+            seconds=default.seconds if timeout is None else timeout,
+        ),
+    )
+    paths, missing = many_files.expand(names)
+    work = [(path, options) for path in paths]
+    return CheckResult((*missing, *many_files.check_files(work, jobs=jobs)))
+
+
+def _listed(name: str, codes: Sequence[str]) -> list[str]:
+    """Return prefixes given as a list or as one text with commas."""
+    parts = codes.split(",") if isinstance(codes, str) else texts(name, codes)
+    return [part for part in parts if part.strip()]

@@ -1,0 +1,165 @@
+"""A mesh as the rules see it: vertices in mm, faces as indices, and what else the file has.
+
+Readers give a triangle soup or an indexed mesh; `weld_exact` makes the one into the other without moving a vertex.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unitcad.geometry.arrays import Floats, Ints, by_appearance, distinct, order_of_packed
+from unitcad.meshcheck.geometry.source import Source
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+LARGEST = float(np.finfo(np.float32).max)
+"""Coordinates beyond this, and NaN, are no numbers of a mesh (V001), in whatever precision a file has them."""
+
+SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
+"""Coordinates below this are 0 as float32, and are taken for it: even doubles do not hold their products."""
+
+MANY = 50_000
+"""Faces from which a second core is worth its while."""
+
+_BLOCK = 1 << 15  # points that stay in the processor's cache
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Vertices (n, 3) float64 mm, faces (m, 3) int32 into them; `normals` (m, 3) as stored, where the format has them.
+
+    `name` says which object of the file this is, `source` where its triangles stand in the file. `indexed` is false
+    where vertices were shared by their place alone. `single` is true where coordinates were stored as float32.
+    """
+
+    vertices: Floats
+    faces: Ints
+    normals: Floats | None = None
+    name: str | None = None
+    indexed: bool = True
+    single: bool = False
+    source: Source | None = None
+
+
+def representable(points: Floats) -> Floats:
+    """Return the points with 0 for each coordinate below SMALLEST; the same array where there is none."""
+    size = np.abs(points)
+    tiny = (size < SMALLEST) & (size > 0)
+    return np.where(tiny, 0.0, points) if tiny.any() else points
+
+
+def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
+    """Return distinct points as float64 (v, 3), and for each of the corners (m, k, 3) which of them it is, (m, k).
+
+    Points with the same three numbers are one; -0.0 is 0.0. They are in the order in which they first appear: those of
+    a face are mostly near each other then, which the processor's cache needs. By blocks, since memory that is used for
+    the first time takes longer than what is done with it.
+    """
+    if corners.dtype != np.float32:
+        corners = representable(corners)
+    sides, n = corners.shape[1], corners.shape[0] * corners.shape[1]
+    rows = max(_BLOCK // sides, 1)
+    blocks = [slice(start, start + rows) for start in range(0, len(corners), rows)]
+    room = max(n - 1, 1).bit_length()
+    key, at = np.empty(n, np.uint64), 0
+    for block in blocks:
+        mixed = _mix(_bits(corners[block]))
+        np.bitwise_and(mixed, ~np.uint64((1 << room) - 1), out=key[at : at + len(mixed)])
+        at += len(mixed)
+    order = order_of_packed(key, room)
+    fresh = distinct(key)
+    places, number = by_appearance(order[fresh], n)
+    index, before = np.empty(n, np.int32), -1
+    for start in range(0, n, _BLOCK):
+        rank = np.cumsum(fresh[start : start + _BLOCK], dtype=np.int32)
+        rank += before
+        index[order[start : start + _BLOCK]] = number.take(rank)
+        before = rank[-1]
+    index = index.reshape(-1, sides)
+    vertices = corners[places // sides, places % sides]
+    if not all(
+        np.array_equal(vertices.take(index[block], axis=0), np.ascontiguousarray(corners[block])) for block in blocks
+    ):
+        # Two places have one hash.
+        values = _bits(corners).view(corners.dtype)
+        _, first, rank = np.unique(values, axis=0, return_index=True, return_inverse=True)
+        places, number = by_appearance(first, n)
+        vertices, index = values[places], number.take(rank.reshape(-1, sides))
+    return vertices.astype(np.float64), index
+
+
+def weld_points(points: Floats) -> tuple[Floats, Ints]:
+    """Return what `weld_exact` does of points (n, 3): distinct ones, and for each which of them it is, (n,)."""
+    vertices, index = weld_exact(points[:, None])
+    return vertices, index.reshape(-1)
+
+
+def _bits(corners: Floats) -> NDArray[np.unsignedinteger]:
+    """Return the numbers of corners (m, k, 3) as integers, (m k, 3); -0.0 as 0.0."""
+    # A record of a file is copied first: sums of a few numbers each, apart in memory, take three times as long.
+    values = (np.ascontiguousarray(corners) + np.zeros(1, corners.dtype)).reshape(-1, 3)
+    return values.view(np.uint32 if corners.dtype == np.float32 else np.uint64)
+
+
+def same_place(points: Floats) -> Ints:
+    """Return for each of (n, 3) points the first one that is in the same place."""
+    places, index = weld_points(points)
+    if len(places) == len(points):
+        return np.arange(len(points), dtype=np.int32)
+    first = np.flatnonzero(np.diff(np.maximum.accumulate(index), prepend=np.int32(-1)))
+    return first[index].astype(np.int32)
+
+
+def _mix(bits: NDArray[np.unsignedinteger]) -> NDArray[np.uint64]:
+    """Return a 64-bit hash of each row of three integers (multiply and xor-shift, as in splitmix64)."""
+    key = np.zeros(len(bits), np.uint64)
+    for column in bits.T:
+        key += column
+        key *= np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(29)
+        key *= np.uint64(0xBF58476D1CE4E5B9)
+        key ^= key >> np.uint64(32)
+    return key
+
+
+def float32_step(vertices: Floats) -> float:
+    """Return the distance between neighbouring float32 numbers at the largest coordinate, mm."""
+    if not len(vertices):
+        return 0.0
+    largest = max(abs(float(vertices.min())), abs(float(vertices.max())))
+    return float(np.spacing(np.float32(min(largest, 1e38))))
+
+
+def float32_steps(places: Floats) -> Floats:
+    """Return the distance between neighbouring float32 numbers at the largest coordinate of each of n places, mm."""
+    largest = np.abs(places).max(axis=tuple(range(1, places.ndim)), initial=0)
+    return np.spacing(np.minimum(largest, 1e38).astype(np.float32)).astype(np.float64)
+
+
+def solid_of(vertices: Floats, faces: Ints) -> Manifold:
+    """Make manifold3d's solid of a mesh, vertices (n, 3) mm and faces (m, 3); empty where it refuses the mesh."""
+    from manifold3d import Manifold, Mesh64
+
+    return Manifold(Mesh64(vert_properties=vertices, tri_verts=faces.astype(np.uint64)))
+
+
+def area_vectors(vertices: Floats, faces: Ints) -> Floats:
+    """Return twice the area of each face along its normal (right-hand rule), (m, 3) mm2."""
+    columns, areas = np.ascontiguousarray(vertices.T), np.empty((len(faces), 3))
+    for start in range(0, len(faces), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        one, two, three = (corner.astype(np.intp) for corner in faces[block].T)
+        first, second = [], []
+        for column in columns:
+            origin = column.take(one)
+            first.append(column.take(two) - origin)
+            second.append(column.take(three) - origin)
+        for axis in range(3):
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            np.subtract(first[i] * second[j], first[j] * second[i], out=areas[block, axis])
+    return areas

@@ -1,0 +1,141 @@
+"""A build's manifest.json against the files beside it: M001 to M005, and which parts are tools (D and S rules)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PureWindowsPath
+
+import msgspec
+
+from unitcad import catalogue, files
+from unitcad.errors import UnitcadError, misfit
+from unitcad.meshcheck.findings import FileReport, counted, merge
+from unitcad.meshcheck.options import Options
+from unitcad.meshcheck.rules.m_manifest import M004, M005, ListedFile, check_listed
+
+_MESHES = ("stl", "3mf")
+Choice = Callable[[str], Options]
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Files of a manifest by absolute path, the printer it names, if any, and listed paths that are not to be followed.
+
+    `path` is the manifest's own.
+    """
+
+    path: Path
+    files: dict[str, ListedFile]
+    printer: str | None
+    outside: tuple[str, ...] = ()
+
+
+class _File(msgspec.Struct):
+    path: str
+    sha256: str | None = None
+
+
+class _Part(msgspec.Struct):
+    name: str
+    role: str
+    files: dict[str, _File]
+    volume_mm3: float | None = None
+    solids: int = 1
+
+
+class _Manifest(msgspec.Struct):
+    """The part of a build's manifest that is read."""
+
+    parts: list[_Part]
+    printer: object = None
+
+
+def read(where: str) -> Listing:
+    """Read a manifest (its path or its folder). Raises `UnitcadError` if it is none."""
+    path = Path(where)
+    path = path / "manifest.json" if path.is_dir() else path
+    try:
+        manifest = msgspec.convert(files.read_json(path), _Manifest)
+    except UnitcadError as error:
+        raise UnitcadError(f"--manifest {where}: cannot be read: {error}") from error
+    except msgspec.ValidationError as error:
+        raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: {misfit(error)}") from error
+    listed: dict[str, ListedFile] = {}
+    outside: list[str] = []
+    for part in manifest.parts:
+        for file in part.files.values():
+            if leads_outside(path.parent, file.path):
+                outside.append(file.path)
+                continue
+            place = os.path.abspath(path.parent / file.path)
+            new = ListedFile((part.name,), part.role == "tool", file.sha256, part.volume_mm3, part.solids)
+            listed[place] = _together(listed[place], new) if place in listed else new
+    return Listing(path, listed, manifest.printer if isinstance(manifest.printer, str) else None, tuple(outside))
+
+
+def leads_outside(folder: Path, listed: str) -> bool:
+    """Return whether a path of a manifest is absolute, has `..` in it, or leaves the manifest's folder through a link.
+
+    What is absolute or climbs on any system is refused on all of them.
+    """
+    windows = PureWindowsPath(listed)
+    if windows.drive or windows.root or ".." in windows.parts:
+        return True
+    home = os.path.realpath(folder)
+    try:
+        real = os.path.realpath(os.path.join(home, listed))
+    except ValueError:  # a NUL or half a surrogate pair: no file has such a name
+        return True
+    return not real.startswith(os.path.join(home, ""))
+
+
+def _together(old: ListedFile, new: ListedFile) -> ListedFile:
+    volume = None if old.volume_mm3 is None or new.volume_mm3 is None else old.volume_mm3 + new.volume_mm3
+    return ListedFile(old.names + new.names, old.tool and new.tool, old.sha256, volume, old.solids + new.solids)
+
+
+def work(listing: Listing, paths: Sequence[str], options: Choice, printer_named: bool) -> list[tuple[str, Options]]:
+    """Choose what to check: the named files, or all meshes of the manifest; tools with a printer, other parts without.
+
+    `options` gives those of a path.
+    """
+    chosen = list(paths) or [files.seen_from(path) for path in listing.files if path.lower().endswith(_MESHES)]
+    known = catalogue.printers()
+    pairs = []
+    for path in chosen:
+        part = listing.files.get(os.path.abspath(path))
+        chosen_here = options(path)
+        printer = chosen_here.printer
+        if part is not None and not printer_named:
+            printer = known.get(listing.printer or "fdm-0.4") if part.tool else None
+        elif part is not None and not part.tool:
+            printer = None
+        pairs.append((path, replace(chosen_here, printer=printer)))
+    return pairs
+
+
+def compare(listing: Listing, report: FileReport, options: Options) -> FileReport:
+    """Return the report with what the manifest adds to it."""
+    part = listing.files.get(os.path.abspath(report.path))
+    unlisted = [M004.finding("the manifest does not list this file")]
+    findings = unlisted if part is None else check_listed(part, report)
+    added = [item for item in findings if options.wants(item.code)]
+    return replace(report, findings=merge([*report.findings, *added]))
+
+
+def unchecked(listing: Listing, checked: Sequence[str], options: Choice) -> list[FileReport]:
+    """Report the listed files that were not checked (STEP, drawings and others) and are gone or changed: M003, M004.
+
+    One of the manifest itself comes last where it lists paths outside its folder (M005): nothing there is read.
+    """
+    seen = {os.path.abspath(path) for path in checked}
+    left = [files.seen_from(path) for path in listing.files if path not in seen]
+    reports = [compare(listing, FileReport(path), options(path)) for path in left]
+    name = files.seen_from(listing.path)
+    if listing.outside and options(name).wants("M005"):
+        shown = ", ".join([*(repr(path[:80]) for path in listing.outside[:3]), *["..."][: len(listing.outside) > 3]])
+        text = f"{counted(len(listing.outside), 'path')} outside the manifest's folder: {shown}"
+        reports.append(FileReport(name, (M005.finding(text, len(listing.outside)),)))
+    return [report for report in reports if report.findings]

@@ -1,0 +1,134 @@
+"""The rules on one mesh, and the facts that follow on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from unitcad.geometry.arrays import distinct_values, extent
+from unitcad.geometry.ticks import Tick
+from unitcad.meshcheck.detail import detail
+from unitcad.meshcheck.findings import Facts, Finding, Location, ending, point
+from unitcad.meshcheck.geometry.arranged import arranged
+from unitcad.meshcheck.geometry.stars import stars_of
+from unitcad.meshcheck.geometry.topology import surface_of, topology_on, works_on
+from unitcad.meshcheck.geometry.triangle_mesh import Mesh, representable
+from unitcad.meshcheck.rules import registry
+from unitcad.meshcheck.rules.f_file import F001
+from unitcad.meshcheck.rules.f_limits import Deadline, keeping
+from unitcad.meshcheck.rules.inspection import Inspection
+from unitcad.meshcheck.rules.v_values import not_finite
+
+if TYPE_CHECKING:
+    from unitcad.catalogue import Printer
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedMesh:
+    """One mesh's findings and facts; `inspection` is None where the mesh could not be inspected."""
+
+    findings: tuple[Finding, ...]
+    facts: Facts
+    inspection: Inspection | None = None
+
+
+def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict: bool = False) -> CheckedMesh:
+    """Apply the rules that need no printer; `cross` and `strict` are those of `Inspection`."""
+    facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
+    points = representable(mesh.vertices)
+    # What was made 0 may be where another vertex is.
+    mesh = replace(mesh, vertices=points, indexed=mesh.indexed or points is not mesh.vertices)
+    if broken := not_finite(mesh):
+        return CheckedMesh(in_file(broken, mesh), facts)
+    if not len(mesh.faces):
+        return CheckedMesh(ending([F001.finding("the mesh has no face")]), facts)
+    low, high = extent(mesh.vertices[distinct_values(mesh.faces)] if mesh.indexed else mesh.vertices)
+    facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
+    findings: list[Finding] = []
+    with keeping((), facts, lambda kept: in_file(kept, mesh)):
+        part = replace(_inspected(mesh, deadline.tick, cross=cross), strict=strict)
+    topology = part.topology
+    area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
+    facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)
+    with keeping(findings, facts, lambda kept: in_file(kept, mesh)):
+        for module in registry.modules(registry.OF_MESHES):
+            if hasattr(module, "check_mesh"):
+                findings.extend(module.check_mesh(part))
+    if part.solid:
+        facts = replace(facts, volume_mm3=float(topology.volumes.sum()))
+    return CheckedMesh(in_file(findings, mesh), facts, part)
+
+
+def _inspected(mesh: Mesh, tick: Tick, *, cross: bool) -> Inspection:
+    """Return a mesh to inspect. Where two cores share it, all that follows from its edges is worked out together."""
+    surface = surface_of(mesh, tick)
+    cross = cross and len(surface.kept) > 0
+    ready = None
+    if cross:
+        with suppress(MemoryError):  # which comes again where it is wanted
+            ready = arranged(surface), stars_of(surface)
+    found = [work(surface, tick) for work in works_on(surface)]
+    return Inspection(mesh, topology_on(surface, found, tick), tick, cross, ready=ready)
+
+
+def check_on_bed(part: Inspection, printer: Printer) -> tuple[Finding, ...]:
+    """Apply the rules for a printer to a mesh as it stands."""
+    if not len(part.topology.mesh.faces):
+        return ()
+    part = replace(part, printer=printer)
+    findings: list[Finding] = []
+    with keeping(findings, change=lambda kept: in_file(kept, part.mesh)):
+        for module in registry.modules():
+            if hasattr(module, "check_print"):
+                findings.extend(module.check_print(part, printer))
+    return in_file(findings, part.mesh)
+
+
+def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
+    """Return the findings with each location's faces as the file has them, and their line and object where known."""
+    meshes = detail().meshes
+    if meshes is not None and not any(known is mesh for known in meshes):
+        meshes.append(mesh)
+    return tuple(
+        replace(item, locations=tuple(_located(_drawn(place, mesh), mesh) for place in item.locations))
+        for item in findings
+    )
+
+
+def _drawn(place: Location, mesh: Mesh) -> Location:
+    """Return the location with the middle of its triangles and, where findings are drawn, the number of their mesh."""
+    if place.mesh is not None or (place.centre is not None and place.region is None):
+        return place
+    whole, meshes = place.region is not None, detail().meshes
+    region = place.region if whole else np.array(place.faces, np.int64)
+    centre = place.centre or place.xyz
+    if place.centre is None and len(region) and (whole or len(region) > 1 or centre is None):
+        low, high = extent(mesh.vertices[mesh.faces[region]].reshape(-1, 3))
+        centre = point((low + high) / 2)
+    if meshes is None or (not len(region) and centre is None):
+        return replace(place, region=None, centre=centre)
+    number = next(i for i, known in enumerate(meshes) if known is mesh)
+    return replace(place, region=region, mesh=number, centre=centre)
+
+
+def _located(place: Location, mesh: Mesh) -> Location:
+    """Return the location with its triangles' faces, line, part and object as the file has them."""
+    place, source = replace(place, object=place.object or mesh.name), mesh.source
+    if source is None:
+        return place
+    place = replace(place, part=place.part or source.part)
+    if place.face is None:
+        return place
+    faces = [face if source.polygons is None else int(source.polygons[face]) for face in place.faces]
+    names = dict.fromkeys(name for face in faces if (name := source.object(face)))
+    return replace(
+        place,
+        face=faces[0],
+        faces=tuple(dict.fromkeys(faces)),
+        line=source.line(faces[0]) if place.line is None else place.line,
+        object=place.object or " and ".join(names) or None,
+    )

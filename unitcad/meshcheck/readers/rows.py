@@ -1,0 +1,237 @@
+"""Numbers of a text, row by row, in numpy: what OBJ, OFF and text PLY are read with. No Python object for a number.
+
+A text is taken in blocks of whole lines, so that what is made on the way has the size of a block.
+"""
+
+from __future__ import annotations
+
+import codecs
+import math
+import re
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.meshcheck.findings import Finding, Location, Unreadable, counted
+from unitcad.meshcheck.rules.f_file import F003, F004, F009, not_a_number
+from unitcad.meshcheck.rules.f_limits import Deadline
+
+NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
+_MICROSOFT = r"1\.#(?:(?:ind|inf|qnan|snan)\w*(?:[+-]\d+)?|(?:io|j|qo|r)\d*)"  # rounded, INF is J and QNAN is R
+NOT_FINITE = rf"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?|{_MICROSOFT})"
+"""How programs write a number that is not finite, in either case."""
+_NOT_FINITE = re.compile(NOT_FINITE.encode(), re.IGNORECASE)
+_WITH_HASH = re.compile(rf"(?<![^\s+-]){_MICROSOFT}(?!\S)".encode(), re.IGNORECASE)
+_INTEGER = re.compile(rb"[+-]?\d{1,18}")
+_WORD = re.compile(rb"\S+")
+BLOCK = 2_000_000
+UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+"""Byte order marks with which a text in UTF-16 begins."""
+NEWLINE, HASH, SLASH, SPACE = 10, 35, 47, 32
+JOINED = 11  # a vertical tab stands where a line was continued
+
+
+def table_of(characters: bytes) -> Bools:
+    """Return which of the 256 bytes are among `characters`."""
+    table = np.zeros(256, bool)
+    table[list(characters)] = True
+    return table
+
+
+BLANK = table_of(b" \t\n\v\f\r")
+_IN_NUMBERS = table_of(b"0123456789+-.eEnNaAiIfFtTyY \t\n\v\f\r")
+_IN_INTEGERS = table_of(b"0123456789+- \t\n\v\f\r")
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Numbers of the lines that have any: row r is values[starts[r] : starts[r + 1]], on line lines[r] (from 1)."""
+
+    values: Floats
+    starts: Ints
+    lines: Ints
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @property
+    def sizes(self) -> Ints:
+        """Numbers a row."""
+        return np.diff(self.starts)
+
+
+def plain(raw: bytes, findings: list[Finding]) -> bytes:
+    """Return a text in UTF-8 with LF line ends and without a byte order mark; an odd encoding is a finding.
+
+    Numbers that Microsoft's programs write with a #, which are not finite, become nan: a # begins a comment.
+    """
+    if raw.startswith(UTF16):
+        findings.append(F009.finding("UTF-16 text with a byte order mark"))
+        raw = raw.decode("utf-16", "replace").encode()
+    elif raw.startswith(codecs.BOM_UTF8):
+        findings.append(F009.finding("a UTF-8 byte order mark at the start"))
+        raw = raw[3:]
+    if b"\r" in raw:
+        if b"\n" not in raw:
+            findings.append(F009.finding("CR-only line ends"))
+        raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if b".#" in raw:
+        raw = _WITH_HASH.sub(b"nan", raw)
+    return raw.replace(b"\v", b" ")
+
+
+def blocks(raw: bytes, at: int, deadline: Deadline, line: int = 1) -> Iterator[tuple[Ints, int]]:
+    """Yield whole lines from `at` on as bytes (n,), each ending in a newline, with the number of its first line."""
+    while at < len(raw):
+        deadline.tick()
+        cut = raw.find(b"\n", min(at + BLOCK, len(raw)))
+        cut = len(raw) if cut < 0 else cut + 1
+        piece = raw[at:cut]
+        block = np.frombuffer(piece if piece.endswith(b"\n") else piece + b"\n", np.uint8)
+        yield block, line
+        line += int(np.count_nonzero((block == NEWLINE) | (block == JOINED)))
+        at = cut
+
+
+def between(block: Ints, mark: int, stop: Bools) -> Bools:
+    """Return which bytes stand behind a `mark`, itself included, with no `stop` in between."""
+    marked = block == mark
+    if not marked.any():
+        return marked
+    places = np.arange(1, len(block) + 1, dtype=np.int32)
+    last = np.maximum.accumulate(np.where(marked, places, 0))
+    return last > np.maximum.accumulate(np.where(stop, places, 0))
+
+
+def words(block: Ints) -> tuple[Ints, Ints]:
+    """Return where words begin, and how many of them began before each line's end."""
+    blank = BLANK[block]
+    first = ~blank
+    first[1:] &= blank[:-1]
+    starts = np.flatnonzero(first)
+    return starts, np.searchsorted(starts, np.flatnonzero(block == NEWLINE))
+
+
+def rows_of(block: Ints, line: int, *, integers: bool = False, which: Ints | None = None) -> Rows:
+    """Return the numbers of a block that begins on `line`: a row for each line that has any, or for the lines `which`.
+
+    Raises `Unreadable` (F004) for a word that is no number.
+    """
+    starts, ends = words(block)
+    values = _parsed(block, len(starts), integers)
+    if values is None:
+        values = _slowly(block, line, integers)
+    used = np.flatnonzero(np.diff(ends, prepend=0)) if which is None else which
+    lines = line + used
+    joined = np.flatnonzero(block == JOINED)
+    if len(joined):
+        begins = np.concatenate([[0], np.flatnonzero(block == NEWLINE)])[used]
+        lines = lines + np.searchsorted(joined, begins)
+    return Rows(values, np.concatenate([[0], ends[used]]), lines)
+
+
+def all_rows(raw: bytes, at: int, line: int, deadline: Deadline, *, comments: bool) -> Rows:
+    """Return the numbers of a text from `at`, which stands on `line`; with `comments` a # begins one."""
+    return joined(
+        [
+            rows_of(without_comments(block) if comments else block, first)
+            for block, first in blocks(raw, at, deadline, line)
+        ]
+    )
+
+
+def without_comments(block: Ints) -> Ints:
+    """Return the block with blanks from each # to the end of its line."""
+    return np.where(between(block, HASH, block == NEWLINE), np.uint8(SPACE), block)
+
+
+def spread(firsts: Ints, counts: Ints, step: int = 1) -> Ints:
+    """Return the places firsts[i], firsts[i] + step ... of all runs, counts[i] each."""
+    ends = np.cumsum(counts)
+    places = np.arange(int(ends[-1]) if len(ends) else 0) - np.repeat(ends - counts, counts)
+    places *= step
+    places += np.repeat(firsts, counts)
+    return places
+
+
+def columns(table: Rows, which: slice, most: int) -> Floats:
+    """Return the first `most` numbers of each row. Raises `Unreadable` (F003) for a row that has fewer."""
+    sizes, lines = table.sizes[which], table.lines[which]
+    short = np.flatnonzero(sizes < most)
+    if len(short):
+        text = f"a vertex with {counted(int(sizes[short[0]]), 'number')}"
+        raise F003.unreadable(text, len(short), [Location(line=int(lines[short[0]]))])
+    return table.values[table.starts[:-1][which, None] + np.arange(most)]
+
+
+def lengths(counts: Floats, room: Ints, lines: Ints, what: str = "face") -> Ints:
+    """Return the lengths of lists whose rows have `room` numbers for them.
+
+    Raises `Unreadable` (F003) where one is longer.
+    """
+    bad = np.flatnonzero(~((counts >= 0) & (counts <= room) & (counts == np.floor(counts))))
+    if len(bad):
+        row = int(bad[0])
+        of = f"{counts[row]:.15g}"
+        text = f"a {what} of {of} {'vertex' if of == '1' else 'vertices'} names {max(int(room[row]), 0)}"
+        raise F003.unreadable(text, len(bad), [Location(line=int(lines[row]))])
+    return counts.astype(np.int64)
+
+
+def integers(values: Floats) -> Ints:
+    """Return indices from numbers. Raises `Unreadable` (F004) for one that is no integer."""
+    bad = np.flatnonzero(~((values == np.floor(values)) & (np.abs(values) < 2**53)))
+    if len(bad):
+        raise F004.unreadable(f"'{values[bad[0]]:.15g}' is not a vertex's index", len(bad))
+    return values.astype(np.int64)
+
+
+def joined(parts: list[Rows]) -> Rows:
+    """Return rows after each other."""
+    if not parts:
+        return Rows(np.empty(0), np.zeros(1, np.int64), np.empty(0, np.int64))
+    ends = np.cumsum([len(part.values) for part in parts])
+    starts = [part.starts[1:] + end - len(part.values) for part, end in zip(parts, ends, strict=True)]
+    return Rows(
+        np.concatenate([part.values for part in parts]),
+        np.concatenate([[0], *starts]),
+        np.concatenate([part.lines for part in parts]),
+    )
+
+
+def _parsed(block: Ints, count: int, integers: bool) -> Floats | None:
+    """Return the numbers where all words of the block are some; None where one may be none."""
+    if not (_IN_INTEGERS if integers else _IN_NUMBERS)[block].all():
+        return None
+    return numbers_of(block.tobytes(), count, integers=integers)
+
+
+def numbers_of(words: bytes, count: int, *, integers: bool) -> Floats | Ints | None:
+    """Return the numbers of `count` words, all of characters that numbers have; None where one word is none."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            values = np.fromstring(words, np.int64 if integers else np.float64, sep=" ")
+        except (DeprecationWarning, ValueError):
+            return None
+    return values if len(values) == count else None  # "1-2" is two numbers to numpy
+
+
+def _slowly(block: Ints, line: int, integers: bool) -> Floats:
+    """Return the numbers word by word. Raises `Unreadable` for the first word that is none."""
+    text = block.tobytes()
+    values = []
+    for match in _WORD.finditer(text):
+        word = match.group()
+        finite = (_INTEGER if integers else NUMBER).fullmatch(word)
+        if not finite and (integers or not _NOT_FINITE.fullmatch(word)):
+            place = [Location(line=line + sum(text.count(mark, 0, match.start()) for mark in (b"\n", b"\v")))]
+            if integers:
+                shown = word[:30].decode("utf-8", "replace")
+                raise F004.unreadable(f"{shown!r} is not a vertex's index", places=place)
+            raise Unreadable(not_a_number(word, place))
+        values.append(math.nan if not finite else int(word) if integers else float(word))
+    return np.array(values, np.int64 if integers else np.float64)

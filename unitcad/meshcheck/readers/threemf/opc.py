@@ -1,0 +1,251 @@
+"""A 3MF file as an OPC package: zip entries, part names, content types, relationships. Nothing is unpacked to disk.
+
+Rules from ECMA-376 part 2 (Open Packaging Conventions) and the 3MF core specification, chapter 2.
+"""
+
+from __future__ import annotations
+
+import io
+import posixpath
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from urllib.parse import unquote
+
+from unitcad.meshcheck.findings import Finding, Location, counted
+from unitcad.meshcheck.readers.threemf.xml_stream import Element, read_small
+from unitcad.meshcheck.rules.f_file import F003, F006
+from unitcad.meshcheck.rules.f_limits import F011, Deadline, Limits, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.p_package import P001, P002, P003, P004, P005, P007, P008
+from unitcad.meshcheck.rules.rule import Rule
+
+CONTENT_TYPES = "[Content_Types].xml"
+_PACKAGE = "http://schemas.openxmlformats.org/package/2006/"
+_MS = "http://schemas.microsoft.com/3dmanufacturing/2013/01/"
+START = _MS + "3dmodel"
+TEXTURE = _MS + "3dtexture"
+TICKET = _MS + "printticket"
+THUMBNAIL = _PACKAGE + "relationships/metadata/thumbnail"
+PROPERTIES = _PACKAGE + "relationships/metadata/core-properties"
+PRESERVE = _PACKAGE + "relationships/mustpreserve"
+KNOWN = {START, TEXTURE, TICKET, THUMBNAIL, PROPERTIES, PRESERVE}
+MODEL_TYPE = "application/vnd.ms-package.3dmanufacturing-3dmodel+xml"
+RELS_TYPE = "application/vnd.openxmlformats-package.relationships+xml"
+_CHUNK = 1 << 20
+_FREE = 1_000_000  # bytes that may inflate at any ratio
+_MEDIA = re.compile(r"^[!#$%&'*+\-.^_`|~\w]+/[!#$%&'*+\-.^_`|~\w]+(\s*;.*)?$", re.ASCII)
+_SCHEME = re.compile(r"^[A-Za-z][A-Za-z0-9+.\-]*:")
+
+
+@dataclass(frozen=True)
+class Relation:
+    """One relationship: `target` is a part name (lower case, no leading slash)."""
+
+    kind: str
+    target: str
+    shown: str
+
+
+@dataclass
+class Package:
+    """The parts of a package by lower-case name, and what is wrong with it so far."""
+
+    archive: zipfile.ZipFile
+    limits: Limits
+    deadline: Deadline
+    parts: dict[str, zipfile.ZipInfo] = field(default_factory=dict)
+    findings: list[Finding] = field(default_factory=list)
+    defaults: dict[str, str] = field(default_factory=dict)
+    overrides: dict[str, str] = field(default_factory=dict)
+    spent: int = 0
+    strict: bool = False
+
+    def add(self, rule: Rule, message: str, part: str | None = None, severity: str | None = None) -> None:
+        """Add a finding about a part."""
+        places = [Location(part=self.shown(part))] if part else ()
+        self.findings.append(rule.finding(message, places=places, severity=severity))
+
+    def add_lenient(self, rule: Rule, message: str, part: str | None = None) -> None:
+        """Add a finding that real programs' files have: a warning unless the package is checked strictly."""
+        self.add(rule, message, part, None if self.strict else "warning")
+
+    def chunks(self, name: str) -> Iterator[bytes]:
+        """Return a part's bytes, inflated piece by piece within the limits. Raises `Unreadable`."""
+        info = self.parts[name]
+        if info.flag_bits & 1 or info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            what = "encrypted" if info.flag_bits & 1 else f"packed with method {info.compress_type}"
+            raise P008.unreadable(f"{info.filename} is {what}", places=[Location(part=info.filename)])
+        try:
+            with self.archive.open(info) as stream:
+                while piece := stream.read(_CHUNK):
+                    self.spent += len(piece)
+                    if self.spent > self.limits.max_package_bytes:
+                        raise F011.unreadable(f"the package inflates beyond {self.limits.max_package_bytes} bytes")
+                    self.deadline.tick()
+                    yield piece
+        except (
+            zipfile.BadZipFile,
+            zlib.error,
+            EOFError,
+            OSError,
+            NotImplementedError,
+            RuntimeError,
+            ValueError,
+        ) as error:
+            text = f"{info.filename} cannot be unpacked: {error}"
+            raise F003.unreadable(text, places=[Location(part=info.filename)]) from error
+
+    def shown(self, name: str) -> str:
+        """Return a part's name as the package writes it; `parts` has it in lower case, since OPC compares names so."""
+        return self.parts[name].filename.lstrip("/") if name in self.parts else name
+
+    def content_type(self, name: str) -> str | None:
+        """Return the part's content type by override or default, without parameters, in lower case."""
+        content_type = self.overrides.get(name) or self.defaults.get(posixpath.splitext(name)[1][1:])
+        return content_type.split(";")[0].strip().lower() if content_type else None
+
+    def relations(self, name: str) -> list[Relation]:
+        """Return the relationships of a part ("" for the package), their faults added to the findings."""
+        folder, base = posixpath.split(name)
+        rels = posixpath.join(folder, "_rels", f"{base}.rels")
+        if rels not in self.parts:
+            return []
+        root = self.xml(rels, P002)
+        if root is None:
+            return []
+        if root.name != f"{_PACKAGE}relationships Relationships":
+            self.add(P002, "the root is not Relationships", rels)
+            return []
+        return list(self._read_relations(root, folder, rels))
+
+    def xml(self, name: str, rule: Rule) -> Element | None:
+        """Return a small XML part as a tree, or None with a finding (of `rule`, or what the XML itself breaks)."""
+        try:
+            return read_small(self.chunks(name), self.shown(name))
+        except OutOfTime:
+            raise
+        except Unreadable as stop:
+            self.findings += [
+                rule.finding(item.message, places=item.locations) if item.code == F003.code else item
+                for item in stop.findings
+            ]
+            return None
+
+    def _read_relations(self, root: Element, folder: str, rels: str) -> Iterator[Relation]:
+        ids: set[str] = set()
+        for child in root.children:
+            attributes = child.attributes
+            kind, target, id_ = (attributes.get(key, "") for key in ("Type", "Target", "Id"))
+            if child.name != f"{_PACKAGE}relationships Relationship" or not (kind and target and id_):
+                self.add(P002, "a relationship needs Id, Type and Target", rels)
+                continue
+            if id_ in ids:
+                self.add(P002, f"relationship Id {id_!r} twice", rels)
+            ids.add(id_)
+            if attributes.get("TargetMode", "Internal") != "Internal" or _SCHEME.match(target) or target[:2] == "//":
+                self.add(P007, f"target {target!r}", rels)
+                continue
+            path = target if target.startswith("/") else posixpath.join("/", folder, target)
+            part = posixpath.normpath(unquote(path)).lstrip("/").lower()
+            if kind in KNOWN and part not in self.parts:
+                rule = P003 if kind == START and rels == "_rels/.rels" else P002
+                add = self.add_lenient if kind == THUMBNAIL else self.add
+                add(rule, f"target {target!r} is not in the package", rels)
+                continue
+            yield Relation(kind, part, target)
+
+
+def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict: bool = False) -> Package:
+    """Open a package and check its entries, names and content types. Raises `Unreadable` if it is no zip."""
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError) as error:
+        raise F003.unreadable(f"the zip cannot be read: {error}") from error
+    package = Package(archive, limits, deadline, strict=strict)
+    if extra := _after_the_end(data):
+        package.findings.append(F006.finding(f"{counted(extra, 'byte')} after the zip's end record", extra))
+    entries = archive.infolist()
+    if len(entries) > limits.max_entries:
+        raise F011.unreadable(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
+    bombs = []
+    for info in entries:
+        if why := _unsafe(info.filename):
+            package.add(P005, f"{info.filename!r} {why}", info.filename)
+        if not info.filename or info.is_dir():
+            continue
+        key = unquote(info.filename).lower().lstrip("/")
+        if key in package.parts:
+            package.add(P004, f"{info.filename!r} is there twice", info.filename)
+            continue
+        package.parts[key] = info
+        if info.file_size > _FREE and info.file_size > limits.ratio * max(info.compress_size, 1):
+            bombs.append(f"{info.filename} inflates {info.file_size / max(info.compress_size, 1):.0f} to one")
+    if bombs:
+        raise Unreadable(*package.findings, P008.finding(bombs[0], len(bombs)))
+    _content_types(package)
+    return package
+
+
+def _after_the_end(data: memoryview) -> int:
+    """Return bytes after the end record and its comment, which zipfile skips in silence (APPNOTE 4.3.16)."""
+    tail = bytes(data[-(1 << 16) - 22 :])
+    at = tail.rfind(b"PK\x05\x06")
+    return max(0, len(tail) - at - 22 - int.from_bytes(tail[at + 20 : at + 22], "little")) if at >= 0 else 0
+
+
+def _unsafe(name: str) -> str | None:
+    """Return why a zip entry's name may not be a part's, or None."""
+    if name.startswith("/") or _SCHEME.match(name):
+        return "is absolute"
+    if "\\" in name:
+        return "has a backslash"
+    if any(ord(c) < 32 or ord(c) == 127 for c in name):
+        return "has a control character"
+    segments = (name[:-1] if name.endswith("/") else name).split("/")
+    decoded = [unquote(segment) for segment in segments]
+    if ".." in decoded:
+        return "climbs out of the package"
+    if any(not segment or segment.strip(".") == "" for segment in decoded):
+        return "has an empty segment"
+    if any(segment.endswith(".") for segment in decoded):
+        return "has a segment that ends with a dot"
+    if re.search(r"%(2f|5c)", name, re.IGNORECASE):
+        return "has an escaped slash"
+    return None
+
+
+def _content_types(package: Package) -> None:
+    key = CONTENT_TYPES.lower()
+    if key not in package.parts:
+        package.add(P001, f"{CONTENT_TYPES} is missing")
+        return
+    root = package.xml(key, P001)
+    if root is None:
+        return
+    space = f"{_PACKAGE}content-types "
+    if root.name != f"{space}Types":
+        package.add(P001, "the root is not Types", CONTENT_TYPES)
+        return
+    for child in root.children:
+        kind = child.attributes.get("ContentType", "")
+        if not _MEDIA.match(kind):
+            package.add(P001, f"content type {kind!r} is none", CONTENT_TYPES)
+        if child.name == f"{space}Default":
+            name, table = child.attributes.get("Extension", "").lower(), package.defaults
+        elif child.name == f"{space}Override":
+            name, table = unquote(child.attributes.get("PartName", "")).lower(), package.overrides
+            if not name.startswith("/"):
+                package.add(P001, f"part name {name!r} does not begin with a slash", CONTENT_TYPES)
+            name = name.lstrip("/")
+        else:
+            package.add(P001, f"unknown element {child.name.split()[-1]!r}", CONTENT_TYPES)
+            continue
+        if not name:
+            package.add(P001, "an entry without Extension or PartName", CONTENT_TYPES)
+        elif name in table:
+            package.add(P001, f"{name!r} has a type twice", CONTENT_TYPES)
+        table[name] = kind
+    if "_rels/.rels" in package.parts and package.content_type("_rels/.rels") not in (RELS_TYPE, None):
+        package.add(P001, "the extension rels has another type than relationships", CONTENT_TYPES)

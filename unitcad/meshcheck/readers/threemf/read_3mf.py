@@ -1,0 +1,158 @@
+"""3MF: the package, its model parts, and the instances of its build."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from unitcad.meshcheck.findings import counted
+from unitcad.meshcheck.readers.threemf import opc, references
+from unitcad.meshcheck.readers.threemf.images import image_kind
+from unitcad.meshcheck.readers.threemf.model_data import Model
+from unitcad.meshcheck.readers.threemf.model_part import read_model
+from unitcad.meshcheck.readers.threemf.opc import Package, Relation
+from unitcad.meshcheck.readers.threemf.placement import Instance, expand
+from unitcad.meshcheck.rules.f_file import F003
+from unitcad.meshcheck.rules.f_limits import Limits, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.p_package import P001, P002, P003, P012, P014, P019, P020
+from unitcad.meshcheck.rules.rule import Rule
+
+_IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
+_TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
+
+
+@dataclass(frozen=True)
+class Build:
+    """Print job of a 3MF file: the instances, and the unit that its start part names."""
+
+    unit: str
+    instances: list[Instance]
+
+
+def read_build(package: Package, limits: Limits) -> Build | None:
+    """Read the model parts and place the objects of the build; what is wrong is added to the package's findings.
+
+    None where no start part can be read. Raises `Unreadable` where components nest without end or a limit is reached.
+    """
+    models = _models(package, limits)
+    for model in models.values():
+        references.check_references(model)
+        package.findings += model.findings
+    if not models:
+        return None
+    root = next(iter(models.values()))
+    if not root.items and root.has_build:
+        package.findings.append(replace(P014.finding("the build has no item"), ends=True))
+    return Build(root.unit, expand(models, root, limits, package.findings))
+
+
+def _models(package: Package, limits: Limits) -> dict[str, Model]:
+    """Return the start part's model first, then those that it reaches by path, each with its relationships checked."""
+    relations = package.relations("")
+    if "_rels/.rels" not in package.parts:
+        package.add(P002, "_rels/.rels is missing")
+    starts = [relation for relation in relations if relation.kind == opc.START]
+    _singletons(package, relations, "the package", (opc.THUMBNAIL, opc.PROPERTIES))
+    if len(starts) != 1:
+        if not any(item.code in ("P003", "F003", "P007") for item in package.findings):
+            package.add(P003, counted(len(starts), "start part"))
+        if not starts:
+            return {}
+    models: dict[str, Model] = {}
+    wanted, faces = [starts[0].target], 0
+    while wanted:
+        part = wanted.pop(0)
+        if part in models:
+            continue
+        if package.content_type(part) != opc.MODEL_TYPE:
+            package.add(P001, f"{package.shown(part)} has type {package.content_type(part)!r}, not the model's", part)
+        try:
+            model = read_model(package.chunks(part), part, limits, faces, strict=package.strict)
+        except OutOfTime:
+            raise
+        except Unreadable as stop:
+            package.findings += stop.findings
+            continue
+        faces += sum(len(one.mesh.rows) for one in model.objects().values() if one.mesh is not None)
+        models[part] = model
+        related = package.relations(part)
+        _singletons(package, related, part, (opc.TICKET,))
+        _paths(package, model, related, is_root=len(models) == 1)
+        reached = {path for path in _reached(model) if path in package.parts}
+        wanted += sorted(reached)
+    return models
+
+
+def _reached(model: Model) -> dict[str, str]:
+    """Return the parts that a model names by path, each as it is written there."""
+    uses = [*model.items, *(use for resource in model.objects().values() for use in resource.components)]
+    paths = {use.path for use in uses if use.path}
+    for resource in model.resources.values():
+        paths |= {member["slicepath"] for member in resource.members if "slicepath" in member}
+    return {path.lower().lstrip("/"): path.lstrip("/") for path in sorted(paths)}
+
+
+def _singletons(package: Package, relations: list[Relation], who: str, kinds: tuple[str, ...]) -> None:
+    """Apply P020: one thumbnail, ticket and set of properties at most, each of the type that it must have."""
+    for kind in kinds:
+        of = [relation for relation in relations if relation.kind == kind]
+        name = kind.rsplit("/", 1)[-1]
+        if len(of) > 1:
+            package.add(P020, f"{len(of)} parts of type {name} for {who}")
+        for relation in of:
+            content_type = package.content_type(relation.target)
+            if kind == opc.THUMBNAIL:
+                _image(package, relation.target, P020)
+            elif kind == opc.TICKET and content_type != _TICKET_TYPE:
+                text = f"{package.shown(relation.target)} has type {content_type!r}, not a print ticket's"
+                package.add(P020, text, relation.target)
+            elif kind == opc.PROPERTIES:
+                package.xml(relation.target, F003)
+
+
+def _image(package: Package, part: str, rule: Rule) -> None:
+    content_type = package.content_type(part)
+    if content_type is None:
+        package.add(P001, f"{package.shown(part)} has no content type", part)
+        return
+    if content_type not in _IMAGES and not (
+        rule is P019 and content_type == "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
+    ):
+        package.add(rule, f"{package.shown(part)} has type {content_type!r}, not PNG's or JPEG's", part)
+        return
+    try:
+        kind, why = image_kind(package.chunks(part))
+    except OutOfTime:
+        raise
+    except Unreadable as stop:
+        package.findings += stop.findings
+        return
+    if why:
+        package.add(rule, f"{package.shown(part)}: {why}", part)
+    elif content_type in _IMAGES and kind != _IMAGES[content_type]:
+        package.add(rule, f"{package.shown(part)} is {kind or 'no image'}, its type says {content_type}", part)
+
+
+def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
+    """Return what a model part names by path exists, and is the target of a relationship of the right type."""
+    by_kind = {kind: {r.target for r in related if r.kind == kind} for kind in opc.KNOWN}
+    images = by_kind[opc.THUMBNAIL] | by_kind[opc.TEXTURE]
+    for resource in model.resources.values():
+        path = resource.attributes.get("path" if resource.kind == "texture2d" else "thumbnail")
+        if path is None or resource.kind not in ("texture2d", "object"):
+            continue
+        part = path.lower().lstrip("/")
+        if part not in package.parts:
+            rule, add = (P019, package.add) if resource.kind == "texture2d" else (P002, package.add_lenient)
+            add(rule, f"{path} of {resource.kind} {resource.id} is not in the package", model.part)
+        elif part not in (by_kind[opc.TEXTURE] if resource.kind == "texture2d" else images):
+            add = package.add if resource.kind == "texture2d" else package.add_lenient
+            add(P002, f"{path} of {resource.kind} {resource.id} has no relationship", model.part)
+        else:
+            _image(package, part, P019 if resource.kind == "texture2d" else P020)
+    for part, written in sorted(_reached(model).items()):
+        if part not in package.parts:
+            package.add(P012, f"{written} is not in the package", model.part)
+        elif part not in by_kind[opc.START]:
+            package.add(P002, f"{written} has no relationship of the model type", model.part)
+        elif not is_root and any(use.path for resource in model.objects().values() for use in resource.components):
+            package.add(P012, "a part other than the root one refers to objects by path", model.part)

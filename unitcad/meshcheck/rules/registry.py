@@ -1,0 +1,75 @@
+"""All rules, found in the files of this folder: for --explain, docs/checks.md and SARIF's list."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
+
+from unitcad.errors import Refusal
+from unitcad.meshcheck import rules as folder
+from unitcad.meshcheck.rules.rule import Rule
+
+FAMILIES = {
+    "F": "File",
+    "P": "3MF package",
+    "V": "Values",
+    "T": "Topology",
+    "G": "Geometry",
+    "S": "Scale",
+    "D": "Printability",
+    "M": "Manifest",
+}
+OF_MESHES = "VTG"
+"""Families whose files have a `check_mesh`, which needs a mesh alone."""
+_FAMILY_FILE = re.compile(f"[{''.join(FAMILIES).lower()}]_")
+
+
+@cache
+def modules(families: str = "".join(FAMILIES)) -> tuple[ModuleType, ...]:
+    """Return the files of rules of some families, one after the other; a file's name begins with its family's letter.
+
+    Others are not loaded.
+    """
+    names = sorted(name for _, name, _ in iter_modules(folder.__path__) if _FAMILY_FILE.match(name))
+    names = [name for name in names if name[0].upper() in families]
+    names.sort(key=lambda name: list(FAMILIES).index(name[0].upper()))
+    return tuple(import_module(f"{folder.__name__}.{name}") for name in names)
+
+
+@cache
+def rules() -> dict[str, Rule]:
+    """Return all rules by code, family by family. Raises ValueError where two have one code."""
+    every: dict[str, Rule] = {}
+    for rule in (value for module in modules() for value in vars(module).values() if isinstance(value, Rule)):
+        if every.setdefault(rule.code, rule) is not rule:
+            raise ValueError(f"two rules have the code {rule.code}")
+    return dict(sorted(every.items(), key=lambda item: (list(FAMILIES).index(item[0][0]), item[0])))
+
+
+def explain(codes: str) -> str:
+    """Explain rules: codes or prefixes of codes, split by commas. Raises `Refusal` for one that begins no code."""
+    chosen = check_prefixes("--explain", [part for part in codes.split(",") if part.strip()] or [codes])
+    return "\n\n".join(
+        f"{rule.code} {rule.title} ({rule.severity})\n\n"
+        f"Cause:   {rule.cause}\nExample: {rule.example}\nFix:     {rule.fix}"
+        for rule in rules().values()
+        if rule.code.startswith(chosen)
+    )
+
+
+def check_prefixes(option: str, prefixes: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the prefixes in capitals. Raises `Refusal` for one that begins no code."""
+    kept = []
+    for prefix in prefixes or ():
+        wanted = prefix.strip().upper()
+        if not wanted or not any(code.startswith(wanted) for code in rules()):
+            from difflib import get_close_matches  # which takes a millisecond to load, for a mistake alone
+
+            near = get_close_matches(wanted, rules(), n=1, cutoff=0.5)
+            raise Refusal(option, prefix, "begins no rule's code", near[0] if near else None)
+        kept.append(wanted)
+    return tuple(kept)

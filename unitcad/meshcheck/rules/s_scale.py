@@ -1,0 +1,63 @@
+"""The size of what a file holds: S001, and S002 for a printer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from unitcad.geometry.arrays import distinct_values, extent
+from unitcad.meshcheck.findings import Facts, Finding, number
+from unitcad.meshcheck.rules.inspection import Inspection
+from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.units import UNITS_MM
+
+if TYPE_CHECKING:
+    from unitcad.catalogue import Printer
+
+S001 = Rule("""
+    S001 warning: size suggests another unit
+    The largest side is under 1 mm or over 2 m as read: metres or inches were taken for millimetres, or the other way
+    round.
+    Example: A bracket of 40 mm was exported in metres, so that its largest side is 0.04.
+    Fix: Export in millimetres, or say the unit with --unit.
+""")
+
+S002 = Rule("""
+    S002 error: does not fit the printer
+    The part is larger than the bed in every attitude about the vertical axis by quarter turns.
+    Example: A plate of 300 mm for a bed of 210 mm.
+    Fix: Turn it, cut it, or choose another printer.
+""")
+
+SMALL, LARGE = 1.0, 2000.0  # mm; a printed part lies between
+
+
+def likely_unit(facts: Facts, unit: str | None) -> Iterator[Finding]:
+    """Apply S001 to the largest side; `unit` is the one that the file or the caller named, as in UNITS_MM."""
+    if facts.bbox_mm is None:
+        return
+    side = max(high - low for low, high in zip(*facts.bbox_mm, strict=True))
+    if SMALL <= side <= LARGE or side == 0:
+        return
+    factor = UNITS_MM.get(unit or "millimeter", 1.0)
+    if factor != 1.0:
+        guess = f"{number(side / factor)} mm if the numbers are millimetres"
+    elif side < SMALL:
+        guess = f"{number(side * 1000, 3)} mm if it was metres, {number(side * 25.4, 3)} mm if inches"
+    else:
+        guess = f"{number(side / 1000, 3)} mm if it was microns"
+    named = f"with the unit {unit} that is named" if unit else "as millimetres"
+    yield S001.finding(f"largest side {number(side)} mm {named}; {guess}")
+
+
+def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
+    """Apply S002 to the box of the mesh as it stands."""
+    mesh = part.topology.mesh
+    low, high = extent(mesh.vertices[distinct_values(mesh.faces)])
+    size = high - low
+    x, y, z = float(printer.bed_x_mm), float(printer.bed_y_mm), float(printer.bed_z_mm)
+    upright = size[2] <= z
+    if upright and ((size[0] <= x and size[1] <= y) or (size[0] <= y and size[1] <= x)):
+        return
+    shown = " x ".join(number(side, 4) for side in size)
+    yield S002.finding(f"{shown} mm does not fit {printer.name}: {number(x)} x {number(y)} x {number(z)}")

@@ -1,0 +1,187 @@
+"""The geometry rules on a 3MF: each object that is built, and its instances in their places and against each other.
+
+Solids may share volume though each is sound by itself (G002). 3MF's core specification (4.1, 4.1.1) lets overlapping
+components and objects be, and says what is filled, so this is a warning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import compress
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from unitcad.geometry.arrays import Floats, cross, distinct_values, extent
+from unitcad.meshcheck.findings import Facts, Finding, ending, point
+from unitcad.meshcheck.geometry.topology import diagonals, topology_of
+from unitcad.meshcheck.geometry.triangle_mesh import LARGEST
+from unitcad.meshcheck.one_mesh import CheckedMesh, check_on_bed, check_surface
+from unitcad.meshcheck.options import Options
+from unitcad.meshcheck.overlaps import Solid, overlapping
+from unitcad.meshcheck.readers.threemf import elements
+from unitcad.meshcheck.readers.threemf.opc import Package, open_package
+from unitcad.meshcheck.readers.threemf.placement import Instance, Key
+from unitcad.meshcheck.readers.threemf.read_3mf import Build, read_build
+from unitcad.meshcheck.readers.threemf.references import SOLID
+from unitcad.meshcheck.rules import g_shells, s_scale, v_values
+from unitcad.meshcheck.rules.f_limits import Deadline, Unreadable, keeping
+from unitcad.meshcheck.rules.inspection import Inspection
+from unitcad.meshcheck.rules.v_values import V001
+
+if TYPE_CHECKING:
+    from unitcad.catalogue import Printer
+
+# The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
+_FILLED = {"G001", "G002", "G008"}
+# It asks for two faces at each edge, by the indices of vertices.
+_MANIFOLD = {"T003", "T006"}
+
+
+def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
+    """Return all findings about a 3MF file and the facts of what it builds."""
+    package = open_package(data, options.limits, deadline, strict=options.strict_3mf)
+    try:
+        with keeping(package.findings):
+            build = read_build(package, options.limits)
+            findings, facts = _geometry(build, options, deadline, package.findings)
+    except Unreadable as stop:  # its facts are one object's
+        findings, facts = list(stop.findings), Facts()
+    return [_named(package, item) for item in findings], facts
+
+
+def _named(package: Package, item: Finding) -> Finding:
+    """Return the finding with its places' parts as the package writes them."""
+    return replace(
+        item,
+        locations=tuple(
+            replace(place, part=package.shown(place.part)) if place.part else place for place in item.locations
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class _Turned:
+    """An object under the linear part of a transform: its box (2, 3) mm, area mm2, and the factor on its volume."""
+
+    box: Floats
+    area: float
+    scale: float
+
+
+def _turned(instance: Instance) -> _Turned:
+    """Measure once for all instances that differ by a shift: adding it to the box rounds as it does every vertex."""
+    linear = instance.matrix[:3]
+    with np.errstate(all="ignore"):
+        points = (instance.triangles.vertices @ linear) * instance.unit_mm
+        corners = instance.triangles.rows[:, :3]
+        a, b, c = (points[corner] for corner in corners.T)
+        area = float(np.linalg.norm(cross(b - a, c - a), axis=1).sum()) / 2
+        return _Turned(np.stack(extent(points[distinct_values(corners)])), area, abs(float(np.linalg.det(linear))))
+
+
+def _geometry(
+    build: Build | None, options: Options, deadline: Deadline, findings: list[Finding]
+) -> tuple[Sequence[Finding], Facts]:
+    """Add what the geometry rules find in the objects that are built, and in their instances beside each other."""
+    if build is None or any(item.code in ("P011", "V001", "F004") for item in findings):
+        return ending(findings), Facts()
+    instances = [instance for instance in build.instances if len(instance.triangles.rows)]
+    if not instances:
+        return ending(findings), Facts(triangles=0, vertices=0, shells=0)
+    checked: dict[Key, CheckedMesh] = {}
+    turned: dict[tuple[Key, bytes], _Turned] = {}
+    for instance in instances:
+        if instance.key not in checked:
+            checked[instance.key] = _check_object(instance, options, deadline)
+            findings += checked[instance.key].findings
+        if instance.linear not in turned:
+            turned[instance.linear] = _turned(instance)
+        deadline.tick()
+    each = [(checked[instance.key].facts, turned[instance.linear]) for instance in instances]
+    boxes = np.stack([one.box for _, one in each])
+    with np.errstate(all="ignore"):
+        corners = boxes + np.stack([instance.shift for instance in instances])[:, None]
+    beyond = ~(np.abs(corners) <= LARGEST).all(axis=(1, 2))
+    if beyond.any():
+        worst = instances[int(beyond.argmax())].object.id
+        findings.append(V001.finding(f"an instance of object {worst} reaches beyond the float32 numbers"))
+        return ending(findings), Facts()
+    findings += v_values.too_far(corners, diagonals(boxes[:, 0], boxes[:, 1]))
+    findings += g_shells.specks(corners[:, 0], corners[:, 1], np.ones(len(corners), bool))
+    volumes = [(facts.volume_mm3 or 0.0) * one.scale for facts, one in each]
+    whole = Facts(
+        triangles=sum(facts.triangles or 0 for facts, _ in each),
+        vertices=sum(facts.vertices or 0 for facts, _ in each),
+        shells=sum(facts.shells or 0 for facts, _ in each),
+        volume_mm3=sum(volumes) if all(facts.volume_mm3 is not None for facts, _ in each) else None,
+        area_mm2=sum(one.area for _, one in each),
+        bbox_mm=(point(corners[:, 0].min(axis=0)), point(corners[:, 1].max(axis=0))),
+        watertight=all(facts.watertight for facts, _ in each),
+    )
+    if options.cross:
+        solids = ((facts.watertight and volume > 0) for (facts, _), volume in zip(each, volumes, strict=True))
+        sound = (
+            Solid(instance.mesh(placed=True), volume, str(instance.object.id))
+            for instance, volume in compress(zip(instances, volumes, strict=True), solids)
+        )
+        with keeping(change=_filled):
+            findings += _filled(overlapping(sound, "instances", deadline))
+    findings += s_scale.likely_unit(whole, build.unit)
+    findings += g_shells.expected(whole.shells, options.shells)
+    if options.printer is not None:
+        findings += printed(instances, options.printer, deadline)
+    return findings, whole
+
+
+def _check_object(instance: Instance, options: Options, deadline: Deadline) -> CheckedMesh:
+    """Apply the geometry rules to one object, if it must be a solid and no slices stand in for its mesh."""
+    mesh, one = instance.mesh(placed=False), instance.object
+    if one.type not in SOLID or one.attributes.get(f"{elements.SLICE} meshresolution") == "lowres":
+        return CheckedMesh((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)))
+    judged = partial(_filled, strict=options.strict_3mf)
+    with keeping(change=judged):
+        checked = check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
+    return replace(checked, findings=tuple(judged(checked.findings)))
+
+
+def _filled(findings: Iterable[Finding], strict: bool = False) -> Iterator[Finding]:
+    """Return the findings, as warnings those that 3MF settles by its fill rule; `strict`: what it forbids as errors."""
+    for item in findings:
+        if strict and item.code in _MANIFOLD:
+            yield replace(item, severity="error", message=f"{item.message} (3MF's core specification, 4.1, forbids it)")
+            continue
+        if item.code in _FILLED:
+            yield replace(item, severity="warning", message=f"{item.message} (3MF's fill rule says what is solid)")
+        else:
+            yield item
+
+
+def printed(instances: Sequence[Instance], printer: Printer, deadline: Deadline) -> list[Finding]:
+    """Apply the printer's rules to instances; those that differ by their place on the bed alone are checked once."""
+    findings: list[Finding] = []
+    checked: dict[tuple[Key, bytes, float], tuple[Floats, tuple[Finding, ...]]] = {}
+    for instance in instances:
+        if instance.object.type != "model":
+            continue
+        alike = *instance.linear, float(instance.matrix[3, 2])
+        if alike not in checked:
+            mesh = instance.mesh(placed=True)
+            with keeping(findings):
+                part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick)
+                checked[alike] = instance.shift, check_on_bed(part, printer)
+        begin, of = checked[alike]
+        findings += _shifted(of, instance.shift - begin)
+    return findings
+
+
+def _shifted(findings: Sequence[Finding], by: Floats) -> Iterator[Finding]:
+    """Return the findings of an instance that lies elsewhere on the bed."""
+    if not by.any():
+        yield from findings
+        return
+    for item in findings:
+        places = (replace(place, xyz=point(place.xyz + by)) if place.xyz else place for place in item.locations)
+        yield replace(item, locations=tuple(places))

@@ -1,0 +1,268 @@
+"""The record of finished variants: one line a variant, appended as it ends, so that a kill loses nothing.
+
+<out>/batch.lock      held while a batch runs: a second one in the same folder is refused
+<out>/journal.jsonl   a head that says which batch this is, then a line a finished variant; the last one counts
+
+Each line ends with a checksum over itself and over what the batch is. A line that was damaged, or that belongs to
+another batch, is left out, and its variant is checked again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import zlib
+from array import array
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from filelock import FileLock, Timeout
+from msgspec import ValidationError, convert, structs, to_builtins
+
+from unitcad import files
+from unitcad.errors import UnitcadError
+from unitcad.pipeline.plan import code_version
+from unitcad.sweeps.batch_records import BatchHead, JournalEntry
+
+JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
+SHARDS = "shard-*-of-*"
+"""Folders of shards below that of their batch."""
+NOT_THERE = -1
+FORMAT = 2
+"""Version of the lines. A journal of version 1, which had no checksums, is replaced."""
+LONGEST = 1 << 26
+"""Bytes of a line, at most; a longer one is damaged."""
+
+
+class Journal:
+    """The journal of one output folder, open and locked; `damaged` counts the lines that were left out.
+
+    `first` is the least index that there may be; `beside` are names that the folder may have from before.
+    Raises UnitcadError for a folder that isn't ours, that holds another batch, or in which a batch is running.
+    """
+
+    def __init__(
+        self, out: Path, head: BatchHead, code: str | None = None, *, first: int = 0, beside: Collection[str] = ()
+    ) -> None:
+        self.out, self._first = out, first
+        self.head = {"format": FORMAT, **to_builtins(head), "code": code or code_version()}
+        self._seed = zlib.crc32(_text(self.head))
+        self._lines = array("q")
+        self.damaged = 0
+        self._begun = [path for path in (out / JOURNAL, out / LOCK, out) if not os.path.lexists(path)]
+        self._lock = _lock(out, head, beside)
+        try:
+            self._file = self._open(out / JOURNAL)
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def add(self, entry: JournalEntry) -> None:
+        """Write the result of one variant. Raises OSError."""
+        start = self._file.seek(0, os.SEEK_END)
+        self._file.write(_packed(to_builtins(entry), self._seed))
+        self._file.flush()
+        self._note(entry.index, start)
+
+    def entry(self, index: int) -> JournalEntry | None:
+        """Return the last entry of a variant; a variant equal to another one gets that one's entry."""
+        own = self.own(index)
+        if own is None or own.same_as is None:
+            return own
+        other = self.own(own.same_as)
+        if other is None or other.same_as is not None:
+            return None
+        return structs.replace(other, index=index, values=own.values)
+
+    def entries(self) -> Iterator[JournalEntry]:
+        """Yield every variant's entry in the sweep's order, read one by one."""
+        indices = range(self._first, self._first + len(self._lines))
+        return (entry for index in indices if (entry := self.entry(index)) is not None)
+
+    def close(self) -> None:
+        """Let go of the folder."""
+        self._file.close()
+        self._lock.release()
+
+    def abandon(self) -> None:
+        """Let go of the folder, and remove what was begun in it: nothing was made."""
+        self.close()
+        with contextlib.suppress(OSError):
+            for path in self._begun:
+                path.rmdir() if path == self.out else path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def own(self, index: int) -> JournalEntry | None:
+        """Return the last line of a variant as it was written; None where there is none."""
+        place = index - self._first
+        if not 0 <= place < len(self._lines) or self._lines[place] == NOT_THERE:
+            return None
+        self._file.seek(self._lines[place])
+        return _entry(self._file.readline(LONGEST), self._seed)
+
+    def _note(self, index: int, offset: int) -> None:
+        place = index - self._first
+        while len(self._lines) <= place:
+            self._lines.append(NOT_THERE)
+        self._lines[place] = offset
+
+    def _open(self, path: Path) -> IO[bytes]:
+        """Open the journal's file with whole lines only: those of this batch, or just a head."""
+        continued = path.exists() and self._continues(path)
+        if not continued or self.damaged or not _ended(path):
+            with files.writing(path, sync=True) as file:
+                file.write(_packed(self.head, 0))
+                if continued:
+                    file.writelines(line for line, _ in self._entries(path))
+        file = open(path, "ab+")  # noqa: SIM115
+        file.seek(0)
+        offset = len(file.readline())
+        for line, entry in self._entries(path):
+            self._note(entry.index, offset)
+            offset += len(line)
+        return file
+
+    def _continues(self, path: Path) -> bool:
+        """Check whether a journal is this batch's, of this version of the code; count the lines that are damaged.
+
+        Raises UnitcadError where the folder holds another batch.
+        """
+        if path.is_symlink() or not path.is_file():
+            raise UnitcadError(f"{path}: is not a file; choose another folder with -o")
+        with open(path, "rb") as file:
+            first = file.readline(LONGEST)
+            whole = sum(1 for _ in self._entries(path))
+            there = _head(first)
+            torn = _packed(self.head, 0) != first
+            if there is None and whole == 0:
+                if first.strip(b"\0 \n") and not _packed(self.head, 0).startswith(first):
+                    raise UnitcadError(
+                        f"{path}: is no journal of a batch, or damaged in whole; choose another folder with -o, or "
+                        "delete the journal to have finished variants checked again"
+                    )
+                return False
+            if there is not None and there["batch"] != self.head["batch"]:
+                raise _another(path.parent, there["name"])
+            if there is not None and there != self.head:
+                return False
+            self.damaged = sum(1 for line in _lines(file)) - whole + torn
+        return True
+
+    def _entries(self, path: Path) -> Iterator[tuple[bytes, JournalEntry]]:
+        """Yield the lines below the head that are whole, and what they hold."""
+        with open(path, "rb") as file:
+            file.readline(LONGEST)
+            for line in _lines(file):
+                entry = _entry(line, self._seed)
+                if entry is not None:
+                    yield line, entry
+
+
+def batch_in(out: Path) -> str | None:
+    """Return the identity of the batch whose journal is in a folder; None where there is none, or a damaged one."""
+    try:
+        with open(out / JOURNAL, "rb") as file:
+            head = _head(file.readline(LONGEST))
+    except OSError:
+        return None
+    return None if head is None else head["batch"]
+
+
+def _lines(file: IO[bytes]) -> Iterator[bytes]:
+    """Yield the rest of a file by lines; a last one without its line end gets one."""
+    while line := file.readline(LONGEST):
+        yield line if line.endswith(b"\n") else line + b"\n"
+
+
+def _ended(path: Path) -> bool:
+    with open(path, "rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read() == b"\n"
+
+
+def _text(data: dict[str, Any]) -> bytes:
+    return json.dumps(data, ensure_ascii=False, allow_nan=False).encode()
+
+
+def _packed(data: dict[str, Any], seed: int) -> bytes:
+    """Return a line: JSON whose last key is the checksum of the keys before it."""
+    text = _text(data)[:-1]
+    return text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed)
+
+
+def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
+    """Return the data of a line; None where it is damaged or of another batch."""
+    text, _, _ = line.rpartition(b', "crc": "')
+    if line != text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed):
+        return None
+    return json.loads(text + b"}")
+
+
+def _entry(line: bytes, seed: int) -> JournalEntry | None:
+    """Return the entry in a line; None where it is damaged, or holds something else."""
+    data = _unpacked(line, seed)
+    try:
+        return None if data is None else convert(data, JournalEntry)
+    except ValidationError:
+        return None
+
+
+def _head(line: bytes) -> dict[str, Any] | None:
+    """Return a journal's head; None where the line is none. Version 1 has no checksum."""
+    head = _unpacked(line, 0)
+    if head is None:
+        try:
+            head = json.loads(line)
+            return head if head["batch"] and head["name"] and "format" not in head else None
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return None
+    return head
+
+
+def _another(out: Path, name: str) -> UnitcadError:
+    return UnitcadError(
+        f"{out}: holds another batch ({name}, or the same with other values or options); "
+        "choose another folder with -o, or delete it"
+    )
+
+
+def _lock(out: Path, head: BatchHead, beside: Collection[str]) -> FileLock:
+    lock = FileLock(out / LOCK, blocking=False, thread_local=False)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if not (out / JOURNAL).exists():
+            _check_free(out, head, beside)
+        lock.acquire()
+    except (FileExistsError, NotADirectoryError):
+        raise files.in_the_way(out) from None
+    except Timeout:
+        raise UnitcadError(
+            f"{out}: another batch is running in this folder; wait for it or choose another with -o"
+        ) from None
+    except OSError as error:
+        raise UnitcadError(f"{out}: can't be written: {error.strerror}") from None
+    return lock
+
+
+def _check_free(out: Path, head: BatchHead, beside: Collection[str]) -> None:
+    """Refuse a folder that is not empty and has no journal, unless its table says that it is this batch's."""
+    if all(path.name == LOCK or path.name in beside for path in out.iterdir()):
+        return
+    if any(out.glob(SHARDS)):
+        raise UnitcadError(f"{out}: holds shards, which unitcad batch merge joins; else choose another folder with -o")
+    if not (out / LOCK).exists():
+        raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")
+    try:
+        there = files.read_json(out / TABLE, largest=files.LARGEST_TABLE, links=False)
+        name, same = there["name"], there["batch"] == head.batch
+    except (UnitcadError, KeyError, TypeError):
+        return  # it was interrupted before there was a table
+    if not same:
+        raise _another(out, name)

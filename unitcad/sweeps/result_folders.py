@@ -1,0 +1,169 @@
+"""Which destination a batch has, and folders made from what is in a store."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache, partial
+from pathlib import Path
+
+from msgspec import MsgspecError
+from msgspec.json import decode
+
+from unitcad import files
+from unitcad.cache import DiskStore, MissingContent, SharedStore, absolute
+from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.pipeline.write import STORE, placing, whole
+from unitcad.sweeps.batch_options import BatchOptions
+from unitcad.sweeps.batch_records import JournalEntry, RecordPlace
+from unitcad.sweeps.destination import Destination, Folders, InStore, made
+from unitcad.sweeps.journal import JOURNAL
+from unitcad.sweeps.record_packs import export, read_record
+from unitcad.sweeps.remote import Receiver
+from unitcad.sweeps.store_address import note_store, store_noted
+
+FOLDERS_BELOW = 1000
+"""Variants below which each has a folder, unless asked otherwise."""
+
+
+def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskStore, remote: bool) -> Destination:
+    """Return where the results of a batch in `out` go. Raises UnitcadError for a store that can't be used.
+
+    Without folders a batch goes on in the store that an earlier run of it noted, unless another one is asked for.
+    """
+    address = options.store
+    if address is None and not folders_wanted(options, variants):
+        address = store_noted(out)
+    if address is not None:
+        address = absolute(address)
+        store = InStore(SharedStore(address), options.verify, None, apart=remote)
+        note_store(out, address)
+        return store
+    kept = lru_cache(partial(_kept, out))
+    if remote:
+        return Receiver(out, cache, options.verify, kept)
+    if folders_wanted(options, variants):
+        return Folders(out, cache, options.verify, kept)
+    return InStore(SharedStore(str((out / STORE).absolute())), options.verify, cache)
+
+
+def _kept(out: Path) -> SharedStore | None:
+    """Return the store of a batch's earlier run; None where there is none, or it can't be reached."""
+    with contextlib.suppress(UnitcadError):
+        return _store_of(out)
+    return None
+
+
+def folders_wanted(options: BatchOptions, variants: int) -> bool:
+    """Tell whether each variant of a batch has a folder: if asked for, or below FOLDERS_BELOW variants of no shard."""
+    if options.folders is not None:
+        return options.folders
+    return variants < FOLDERS_BELOW and options.shard is None
+
+
+_BATCH = "the same batch with"
+
+
+def make_folders(
+    out: Path,
+    entries: Iterable[JournalEntry],
+    store: SharedStore,
+    cache: DiskStore,
+    maker: str = _BATCH,
+    then: Callable[[Path], object] = lambda folder: None,
+) -> None:
+    """Make the folders in `out` that are not there, or not whole, of variants that are in a store; `then` gets each.
+
+    Raises UnitcadError for what the store has lost, which the `maker` makes again, OSError.
+    """
+    done: set[str] = set()
+    with files.scratch(out) as scratch:
+        for entry in entries:
+            if entry.record is None or not made(entry) or entry.folder in done:
+                continue
+            done.add(entry.folder)
+            if whole(out / entry.folder) is not None:
+                continue
+            try:
+                export(store, entry.record, out / entry.folder, cache, partial(placing, scratch=scratch))
+            except MissingContent as error:
+                raise lost(entry, error, maker) from None
+            then(out / entry.folder)
+
+
+def lost(entry: JournalEntry, error: MissingContent, maker: str = _BATCH) -> UnitcadError:
+    """Return the error for a variant whose record or content a store has lost; the `maker` makes it again."""
+    return UnitcadError(f"variant {entry.index}: {error}; {maker} --verify makes again what is missing")
+
+
+def export_variants(
+    batch: Path, hashes: Sequence[str], out: Path, cache: DiskStore, address: str | None = None
+) -> Iterator[Path]:
+    """Make the folders of some variants of a batch below `out`, by their hashes or how those begin; yield each.
+
+    All are looked up before the first one is made. The store is that of the batch, else the one at `address`. Raises
+    WrongArgument for a hash that no variant has, or several; UnitcadError for a batch without a store, and for what
+    the store has lost; OSError.
+    """
+    wanted = [_stored(batch, each) for each in hashes]
+    store = _store_of(batch, address)
+    for entry, place in wanted:
+        try:
+            export(store, place, out / entry.folder, cache)
+        except MissingContent as error:
+            raise lost(entry, error) from None
+        except (FileExistsError, NotADirectoryError):
+            raise files.in_the_way(out) from None
+        yield out / entry.folder
+
+
+def stored_spec(batch: Path, folder: str) -> str:
+    """Return the spec of a variant of a batch that has no folder for it, as text, from the batch's store.
+
+    Raises UnitcadError where no variant has a folder of that name, and for what the store has lost; OSError.
+    """
+    entry, place = _stored(batch, folder.rpartition("-")[2])
+    if entry.folder != folder:
+        raise WrongArgument("folder", folder, "no variant of the batch has it", entry.folder)
+    return read_record(_store_of(batch), place)[0].own["spec.toml"].decode()
+
+
+def _stored(batch: Path, wanted: str) -> tuple[JournalEntry, RecordPlace]:
+    """Return a variant's line of the journal, and where its record is in the store."""
+    entry = _entry_of(batch, wanted)
+    if entry.record is None:
+        raise UnitcadError(f"{batch / entry.folder}: this variant is not in a store, its folder is its result")
+    return entry, entry.record
+
+
+def _store_of(batch: Path, address: str | None = None) -> SharedStore:
+    """Return the store that a batch names, else the one at `address`, else its own."""
+    store = SharedStore(absolute(address or store_noted(batch) or str(batch / STORE)))
+    store.expect()
+    return store
+
+
+def _entry_of(batch: Path, wanted: str) -> JournalEntry:
+    digits = wanted.rpartition("-")[2].lower()  # the whole name of a folder will do
+    if not re.fullmatch(r"[0-9a-f]{4,12}", digits):
+        raise WrongArgument("hash", wanted, "needs 4 to 12 of the digits 0-9 and a-f at the end of a variant's folder")
+    begins, found = re.compile(rb'"folder": "[^"]*-' + digits.encode()), {}
+    try:
+        with open(batch / JOURNAL, "rb") as journal:
+            for line in journal:
+                if begins.search(line):
+                    with contextlib.suppress(MsgspecError):
+                        entry = decode(line, type=JournalEntry)
+                        found[entry.folder] = entry
+    except OSError as error:
+        why = (error.strerror or "unreadable").lower()
+        raise UnitcadError(f"{batch / JOURNAL}: {why}; --batch names the folder of a batch") from None
+    if not found:
+        raise WrongArgument("hash", wanted, f"no variant in {batch} has a hash that begins so")
+    if len(found) > 1:
+        several = sorted(found)
+        raise WrongArgument(
+            "hash", wanted, f"{len(found)} variants begin so, {several[0]} and {several[1]}", several[0][-12:]
+        )
+    return next(iter(found.values()))

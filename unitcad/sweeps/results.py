@@ -1,0 +1,118 @@
+"""The batch's tables: variants.csv, batch.json, variants.parquet, the same bytes however many workers made them."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+from collections.abc import Callable, Collection, Iterable, Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from msgspec import to_builtins
+
+from unitcad import files
+from unitcad.report.batch_table import CSV, JSON, PARQUET
+from unitcad.sweeps.batch_records import BatchHead, JournalEntry, Summary, Values
+from unitcad.sweeps.journal import Journal
+from unitcad.sweeps.parquet_table import can_write, write_parquet
+from unitcad.sweeps.sweep import Sweep
+from unitcad.sweeps.unread_keys import SweptEstimate
+from unitcad.text import cell
+
+TABLES = {"csv": CSV, "json": JSON, "parquet": PARQUET}
+MOST_ROWS = 10_000
+"""Rows from which on CSV and JSON are written only if asked for."""
+FIRST = ("index", "status", "reason", "folder")
+
+
+def write_results(
+    out: Path,
+    columns: list[str],
+    entries: Callable[[], Iterable[JournalEntry]],
+    head: BatchHead,
+    estimate: SweptEstimate | None,
+    asked: Collection[str] | None = None,
+    variants: int = 0,
+) -> None:
+    """Write the tables `asked` for (names of TABLES), and those that are there from before.
+
+    With None these are CSV and JSON below MOST_ROWS `variants`, else Parquet where its extra is installed. `entries`
+    gives the variants in the sweep's order, one at a time. Raises Missing for Parquet without the extra, OSError.
+    """
+    asked = tables_of(variants, asked)
+    wanted = {name for name, file in TABLES.items() if name in asked or (out / file).is_file()}
+    levels = {"estimate": to_builtins(estimate)} if estimate else {}
+    whole = {**to_builtins(head), **levels, "columns": columns}
+    if "parquet" in wanted:
+        write_parquet(out / TABLES["parquet"], whole, columns, lambda: map(flat, entries()))
+    if "csv" in wanted:
+        _write_csv(out / TABLES["csv"], columns, entries())
+    if "json" in wanted:
+        _write_json(out / TABLES["json"], whole, entries())
+
+
+def tables_of(variants: int, asked: Collection[str] | None) -> Collection[str]:
+    """Return the names of a batch's tables: those `asked` for; with None by the number of variants."""
+    if asked is not None:
+        return asked
+    return ("csv", "json") if variants < MOST_ROWS or not can_write() else ("parquet",)
+
+
+def write_timings(out: Path, summary: Summary, workers: int) -> None:
+    """Write what this run did and how fast: not part of what is the same from run to run."""
+    timings = {key: value for key, value in to_builtins(summary).items() if key not in ("failures", "warnings")}
+    fresh = summary.done - summary.resumed
+    timings["variants_per_second"] = round(fresh / summary.seconds, 2) if summary.seconds else None
+    files.write(out / "timings.json", (json.dumps({"workers": workers, **timings}, indent=1) + "\n").encode())
+
+
+def columns_of(sweep: Sweep, journal: Journal) -> list[str]:
+    """Return the columns: first those of every batch, then what was swept, then what came out as rows name it."""
+    columns: dict[str, None] = dict.fromkeys(FIRST)
+    columns.update(dict.fromkeys(path for path in sweep.paths if path != "name"))
+    for entry in journal.entries():
+        columns.update(dict.fromkeys(entry.row))
+    return list(columns)
+
+
+def flat(entry: JournalEntry) -> Values:
+    """Return one variant's values by column."""
+    return {**{key: getattr(entry, key) for key in FIRST}, **entry.row, **entry.values}
+
+
+def _write_csv(path: Path, columns: list[str], entries: Iterable[JournalEntry]) -> None:
+    with _written(path) as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(columns)
+        for entry in entries:
+            values = flat(entry)
+            table.writerow([_cell(values.get(column)) for column in columns])
+
+
+def _write_json(path: Path, head: dict[str, Any], entries: Iterable[JournalEntry]) -> None:
+    with _written(path) as file:
+        text = json.dumps(head, indent=1, ensure_ascii=False, allow_nan=False)
+        file.write(text.removesuffix("\n}") + ',\n "variants": [')
+        for i, entry in enumerate(entries):
+            file.write((",\n  " if i else "\n  ") + json.dumps(flat(entry), ensure_ascii=False, allow_nan=False))
+        file.write("\n ]\n}\n")
+
+
+@contextlib.contextmanager
+def _written(path: Path) -> Iterator[IO[str]]:
+    """Open a text file in UTF-8, line ends as written, that replaces `path` when the block ends without an error."""
+    with files.writing(path) as file:
+        text = io.TextIOWrapper(file, "utf-8", newline="")
+        yield text
+        text.flush()
+        text.detach()
+
+
+def _cell(value: Any) -> Any:
+    if value is None:
+        return ""
+    if isinstance(value, bool | list | dict):
+        return json.dumps(value, ensure_ascii=False)
+    return cell(value) if isinstance(value, str) else value

@@ -1,0 +1,376 @@
+"""Running a sweep: variants in groups of one geometry, given to an executor, recorded one by one, resumed later.
+
+The first task of a geometry makes its files; the others of that geometry wait for it and then cost a few milliseconds
+each. So no geometry is made twice, and at most WINDOW variants are held in memory, however many there are.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Executor, Future, wait
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from unitcad import __version__
+from unitcad.cache import DiskStore, absolute, collect, default_root, digest
+from unitcad.errors import Refusal, UnitcadError, WrongArgument
+from unitcad.pipeline.plan import checked_outputs, code_version, kernel_versions
+from unitcad.pipeline.write import clear_leftovers, subject
+from unitcad.sweeps import task as tasks
+from unitcad.sweeps.batch_options import BatchOptions
+from unitcad.sweeps.batch_records import BatchHead, Failure, JournalEntry, Summary
+from unitcad.sweeps.destination import Destination, InStore
+from unitcad.sweeps.journal import JOURNAL, Journal
+from unitcad.sweeps.result_folders import destination_of, folders_wanted, make_folders
+from unitcad.sweeps.results import columns_of, write_results, write_timings
+from unitcad.sweeps.shards import Shard, ShardRecord, write_shard
+from unitcad.sweeps.store_address import noted
+from unitcad.sweeps.sweep import MOST, Sweep
+from unitcad.sweeps.task import Job, Task, VariantOutcome
+from unitcad.sweeps.unread_keys import swept_estimate
+from unitcad.sweeps.unread_keys import warnings as unread_warnings
+from unitcad.workers import WorkerEnded
+
+WINDOW = 2048
+"""Variants held in memory: enough to group those that share a geometry."""
+STEP = 64
+"""Variants read between two looks at the tasks."""
+FIRST, NEXT = 4, 48
+"""Variants in the task that makes a geometry, and in those after it: variants of one task share estimates."""
+COLLECT_EVERY = 500
+"""Geometries made between two checks of the cache's size."""
+
+
+Watch = Callable[[Summary, VariantOutcome | None], None]
+MOST_FAILURES = 20
+
+
+def run(
+    sweep: Sweep,
+    out: Path,
+    options: BatchOptions,
+    executor: Executor,
+    *,
+    workers: int,
+    remote: bool = False,
+    watch: Watch = lambda summary, outcome: None,
+) -> Summary:
+    """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
+
+    `executor`, of that many `workers`, is the caller's to shut down. With `remote` its workers don't share this disk:
+    results come back as messages. What an earlier run in `out` finished is not made again. Raises UnitcadError where
+    nothing can be run; whatever happens to a variant is in the summary.
+    """
+    head = batch_head(sweep, checked_outputs(options.only), options)
+    count = counted(sweep, options.limit)
+    indices = options.shard.indices(count) if options.shard else range(count)
+    summary = Summary(len(indices))
+    cache = DiskStore(options.cache or default_root())
+    journal = Journal(out, head, first=indices.start)
+    try:
+        destination = destination_of(out, options, summary.variants, cache, remote)
+    except BaseException:
+        journal.abandon()
+        raise
+    batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, destination, summary, indices)
+    if journal.damaged:
+        summary.warnings.append(
+            f"{out / JOURNAL}: damaged in {journal.damaged} lines; their variants were checked again"
+        )
+    start = time.perf_counter()
+    try:
+        clear_leftovers(out)
+        if options.shard:
+            write_shard(out, shard_record(out, sweep, head, options, count))
+        batch.all()
+        if batch.lost:
+            clear_leftovers(out)
+        if isinstance(destination, InStore) and folders_wanted(options, summary.variants):
+            make_folders(out, journal.entries(), destination.store, cache)
+        estimated = "estimate" in head.outputs and not options.shard  # of a shard nothing can be said
+        found = swept_estimate(sweep, summary.variants) if estimated else None
+        summary.warnings += unread_warnings(found)
+        columns = columns_of(sweep, journal)
+        write_results(out, columns, journal.entries, head, found, options.tables, count)  # those of a shard are parts
+        summary.seconds = round(time.perf_counter() - start, 3)
+        write_timings(out, summary, workers)
+        watch(summary, None)
+    except OSError as error:
+        raise _ended(tasks.failure(0, error), out, summary) from error
+    except KeyboardInterrupt:
+        for future in batch.running:
+            future.cancel()
+        raise
+    finally:
+        journal.close()
+        cache.close()
+    return summary
+
+
+def trim(options: BatchOptions) -> None:
+    """Reduce the cache to its limit. A cache that was deleted meanwhile is no error."""
+    with contextlib.suppress(UnitcadError, OSError):
+        collect(options.cache or default_root(), int(options.cache_mb * 1e6))
+
+
+def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> BatchHead:
+    """Return the batch's identity, for its journal and its tables."""
+    parts = () if options.shard is None else (options.shard, counted(sweep, options.limit))
+    return BatchHead(
+        batch=digest(repr((sweep.hash, only, options.check, *parts)).encode())[:16],
+        name=sweep.name,
+        mode=sweep.mode,
+        bases=[base for base, _ in sweep.bases],
+        outputs=list(only),
+        versions={"unitcad": __version__, **kernel_versions(("step",))},
+    )
+
+
+def counted(sweep: Sweep, limit: int | None) -> int:
+    """Count the variants to make. Raises Refusal for more than MOST without a limit, and for a limit below one."""
+    if limit is not None and limit < 1:
+        raise WrongArgument("limit", limit, "needs a number of variants from 1 on", 1)
+    if limit is None and sweep.count > MOST:
+        raise Refusal(
+            "sweep", sweep.count, f"variants are more than {MOST:,}: ask for the first ones with --limit", MOST
+        )
+    return min(sweep.count, limit or sweep.count)
+
+
+@dataclass
+class _GeometryJobs:
+    """Waiting variants of one geometry."""
+
+    jobs: deque[Job] = field(default_factory=deque)
+    making: bool = False
+
+
+class _Batch:
+    """One run of one sweep; at most `room` tasks are submitted at a time."""
+
+    def __init__(
+        self, sweep: Sweep, options: BatchOptions, executor: Executor, room: int,
+        watch: Watch, journal: Journal, destination: Destination, summary: Summary, indices: range,
+    ) -> None:  # fmt: skip
+        self.sweep, self.options, self.executor, self.room = sweep, options, executor, room
+        self.watch, self.journal, self.destination, self.summary = watch, journal, destination, summary
+        self.indices, self.turn = indices, _turn(options.shard)
+        self.only = checked_outputs(options.only)
+        self.coming = self._to_make()
+        self.groups: dict[str, _GeometryJobs] = {}
+        self.waiting = 0
+        self.again: deque[tuple[str, Job]] = deque()
+        self.tried: set[int] = set()
+        self.made: set[int] = set()
+        self.seen: dict[int, int] = {}
+        self.running: dict[Future[tasks.Answer], Task] = {}
+        self.lost = False  # whether a worker ended in the middle of its task
+
+    def all(self) -> None:
+        while not self.summary.stopped:
+            more = self._fill()
+            self._submit()
+            if not self.running and not more:
+                break
+            self._collect(at_once=more)
+        while self.running:  # tasks that were begun are finished and kept
+            self._collect()
+
+    def _to_make(self) -> Iterator[tuple[int, JournalEntry | None]]:
+        """Yield the variants that are not finished, with what the journal has of them.
+
+        What failed before comes last: a batch that stops at a failure has made all others by then.
+        """
+        failed: list[int] = []
+        for index in self.indices:
+            entry = self.journal.entry(index)
+            if entry is not None and self.destination.stands(entry):
+                self._finished(VariantOutcome(index, entry.status), fresh=False)
+            elif entry is not None and entry.status == tasks.FAILED:
+                failed.append(index)
+            else:
+                yield index, entry
+        for index in failed:
+            yield index, self.journal.entry(index)
+
+    def _fill(self) -> bool:
+        """Bring up to STEP variants into the window; return whether more may follow.
+
+        Those that are refused or equal to another one are noted at once. A shard fills the whole window, since it
+        chooses where in it to begin.
+        """
+        for _ in range(WINDOW if self.options.shard else STEP):
+            if self.waiting >= WINDOW or self.summary.stopped:
+                return False
+            index, entry = next(self.coming, (None, None))
+            if index is None:
+                return False
+            try:
+                spec = self.sweep.spec(index)
+            except UnitcadError as error:
+                self._finished(VariantOutcome(index, tasks.REFUSED, reason=self.sweep.faults(index, error)))
+                continue
+            wanted = subject(spec)
+            first = self.seen.setdefault(int(wanted.folder_name[-12:], 16), index)
+            if first != index:
+                self.journal.add(JournalEntry(index=index, same_as=first, values=self.sweep.values(index)[1]))
+                self._finished(VariantOutcome(index, tasks.OK), fresh=False, before=entry is not None)
+                continue
+            key = wanted.key(self.only, self.options.check)
+            self.groups.setdefault(key, _GeometryJobs()).jobs.append(
+                Job(index, wanted.text, self.destination.damaged(entry) if entry else "")
+            )
+            self.waiting += 1
+        return self.waiting < WINDOW
+
+    def _submit(self) -> None:
+        """Submit tasks: one for every worker, and one ahead."""
+        while len(self.running) < self.room and not self.summary.stopped:
+            chosen = self._next()
+            if chosen is None:
+                return
+            key, jobs = chosen
+            task = Task(tuple(jobs), key, self.only, self.options.check, self.options.timeout)
+            self.running[self.executor.submit(tasks.work, self.destination.task(task))] = task
+
+    def _next(self) -> tuple[str, list[Job]] | None:
+        """Choose a variant to try again alone; else a geometry not yet made; else more of one that is."""
+        if self.again:
+            key, job = self.again.popleft()
+            return key, [job]
+        fresh = [k for k, g in self.groups.items() if g.jobs and not g.making and _short(k) not in self.made]
+        new = fresh[int(len(fresh) * self.turn)] if fresh else None
+        key = new or next((k for k, g in self.groups.items() if g.jobs and not g.making), None)
+        if key is None:
+            return None
+        group = self.groups[key]
+        group.making = new is not None
+        jobs = [group.jobs.popleft() for _ in range(min(len(group.jobs), FIRST if new else NEXT))]
+        self.waiting -= len(jobs)
+        return key, jobs
+
+    def _collect(self, at_once: bool = False) -> None:
+        """Take up what is done; wait for the first, or with `at_once` for none."""
+        for future in wait(list(self.running), 0 if at_once else None, return_when="FIRST_COMPLETED").done:
+            task = self.running.pop(future)
+            group = self.groups.get(task.geometry)
+            try:
+                outcomes = tasks.outcomes(future.result())
+            except WorkerEnded as error:
+                self._lost(task, error)
+            except UnitcadError:  # with NoWorker: where no worker can start, none of the others can be made either
+                raise
+            except (Exception, CancelledError) as error:
+                self._lost(task, error)
+            else:
+                if _short(task.geometry) not in self.made and any(o.status == tasks.OK for o in outcomes):
+                    self._made(task.geometry)
+                for outcome, job in zip(outcomes, task.jobs, strict=True):
+                    self._outcome(outcome, task.geometry, job)
+            if group:
+                group.making = False
+                if not group.jobs:
+                    del self.groups[task.geometry]
+
+    def _made(self, key: str) -> None:
+        self.made.add(_short(key))
+        self.summary.geometries = len(self.made)
+        if len(self.made) % COLLECT_EVERY == 0:
+            trim(self.options)
+
+    def _lost(self, task: Task, error: BaseException) -> None:
+        """Handle a task whose worker ended: each of its variants is tried alone, to see which one ended it."""
+        if isinstance(error, CancelledError):
+            raise UnitcadError(f"lost the scheduler after {self.summary.done} variants; the same command resumes")
+        self.lost = True
+        job, *others = task.jobs
+        if others:
+            self.again.extend((task.geometry, job) for job in task.jobs)
+            return
+        reason = str(error) or type(error).__name__
+        if reason == "timed out" and self.options.timeout:
+            reason = f"timed out after {self.options.timeout:g} s"
+        self._outcome(VariantOutcome(job.index, tasks.FAILED, reason=reason), task.geometry, job)
+
+    def _outcome(self, outcome: VariantOutcome, key: str, job: Job) -> None:
+        if outcome.status == tasks.NO_SPACE:
+            self.summary.stopped = self.summary.stopped or outcome.reason
+            return
+        if outcome.status == tasks.FAILED and outcome.index not in self.tried:
+            self.tried.add(outcome.index)
+            self.summary.retried += 1
+            self.again.append((key, job))
+            return
+        self.tried.discard(outcome.index)
+        self._finished(self.destination.take(outcome, key))
+
+    def _finished(self, outcome: VariantOutcome, fresh: bool = True, before: bool = True) -> None:
+        """Count a variant that has ended, and note it if it is `fresh`; others are from `before`, or another's twin."""
+        summary = self.summary
+        if fresh:
+            self.journal.add(
+                JournalEntry(
+                    index=outcome.index,
+                    status=outcome.status,
+                    reason=outcome.reason,
+                    folder=outcome.folder,
+                    values=self.sweep.values(outcome.index)[1],
+                    row=outcome.row,
+                    manifest=outcome.manifest,
+                    record=outcome.record,
+                )
+            )
+        summary.resumed += before and not fresh
+        summary.reused += bool(fresh and outcome.reused and not outcome.built)
+        count_entry(summary, outcome.status, lambda: self.journal.entry(outcome.index))
+        # A refusal concerns one variant only; a failure may happen to each.
+        stops = outcome.status not in (tasks.OK, tasks.REFUSED) and not self.options.keep_going
+        if fresh and stops:
+            summary.stopped = summary.stopped or f"variant {outcome.index}: {outcome.reason}"
+        self.watch(summary, outcome)
+
+
+def count_entry(summary: Summary, status: str, entry: Callable[[], JournalEntry | None]) -> None:
+    """Count a variant that has ended; the first ones that are not ok are named by their `entry`."""
+    summary.done += 1
+    if status == tasks.OK:
+        summary.ok += 1
+        return
+    summary.failed += 1
+    if len(summary.failures) < MOST_FAILURES and (found := entry()) is not None:
+        summary.failures.append(Failure(found.index, found.status, found.reason, found.folder))
+
+
+def shard_record(out: Path, sweep: Sweep, head: BatchHead, options: BatchOptions, count: int) -> ShardRecord:
+    """Return what the folder of a shard says of it: the head is that of the batch without shards."""
+    assert options.shard
+    whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
+    return ShardRecord(
+        number=options.shard.number,
+        of=options.shard.of,
+        variants=count,
+        head=whole,
+        shard_head=head,
+        code=code_version(),
+        store=noted(out, absolute(options.store or "")),
+        sweep=replace(sweep, written=()),  # paths of this machine
+    )
+
+
+def _turn(shard: Shard | None) -> float:
+    """Return where in the window a shard begins: shards that begin together then make different geometries."""
+    return (shard.number - 1) / shard.of if shard else 0.0
+
+
+def _short(key: str) -> int:
+    """Shorten a key to 8 bytes."""
+    return int(key[:16], 16)
+
+
+def _ended(outcome: VariantOutcome, out: Path, summary: Summary) -> UnitcadError:
+    error = UnitcadError(f"{out}: {outcome.reason}; {summary.done} variants are done, the same command resumes")
+    error.exit_code = 1
+    return error

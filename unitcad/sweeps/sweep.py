@@ -1,0 +1,322 @@
+"""The sweep file: which specs, over which values. Variants are expanded one at a time.
+
+base = "unit.toml"                        # a template, a spec file beside this one, or a list of them
+name = "walls"                            # else the file's name
+[set]                                     # the same for every variant
+"output.formats" = ["stl"]
+[sweep]
+mode = "product"                          # product | zip | cases
+"layers.0.material" = ["ecoflex-00-10", "ecoflex-00-50"]
+"layers.0.wall_mm" = { start = 1.0, stop = 2.0, num = 5 }
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar, get_args
+
+from msgspec import Meta, Struct, field, structs
+
+from unitcad.arrays.array_file import makeable_array
+from unitcad.arrays.array_names import array_templates, confirm_known, is_array
+from unitcad.arrays.array_units import expanded
+from unitcad.arrays.offers import offered
+from unitcad.cache import digest
+from unitcad.errors import Refusal, UnitcadError, WrongArgument
+from unitcad.files import names_device, read_text
+from unitcad.pipeline.write import subject_of_data
+from unitcad.spec import check_plain, convert, read_toml
+from unitcad.spec.fields import fields_of
+from unitcad.sweeps.paths import check_path
+from unitcad.validation import override, put, read
+from unitcad.validation.load import all_faults
+from unitcad.validation.shipped_files import is_path, named_file, shipped_files
+
+T = TypeVar("T", bound=Struct)
+Mode = Literal["product", "zip", "cases"]
+_KEYS = {
+    "mode": {"enum": list(get_args(Mode)), "default": "product"},
+    "cases": {"type": "array", "items": {"type": "object"}},
+}
+EXPLAINED = 20
+"""Of so many variants, the first ones, every fault is looked for: a base's own faults are then all listed."""
+MOST = 1_000_000
+"""Variants that a sweep may have without --limit."""
+
+
+class Range(Struct, frozen=True, forbid_unknown_fields=True):
+    """`num` values from `start` to `stop`, both among them."""
+
+    start: Annotated[float, Meta(ge=-1e12, le=1e12)]
+    stop: Annotated[float, Meta(ge=-1e12, le=1e12)]
+    num: Annotated[int, Meta(ge=1, le=1_000_000_000)]
+
+    def __len__(self) -> int:
+        return self.num
+
+    def __getitem__(self, index: int) -> float:
+        if self.num == 1:
+            return self.start
+        # Rounded, so that a step of a tenth reads as one and the same value has the same folder in every sweep.
+        return round(self.start + (self.stop - self.start) * index / (self.num - 1), 9)
+
+
+class SweepFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A sweep as typed: `from_file` validates `fixed` and the paths of `sweep`."""
+
+    base: str | Annotated[list[str], Meta(min_length=1)]
+    name: Annotated[str, Meta(min_length=1, max_length=60)] | None = None
+    fixed: Annotated[dict[str, Any], Meta(description="values by path, the same for every variant")] = field(
+        name="set", default_factory=dict
+    )
+    sweep: Annotated[dict[str, Any], Meta(description="values by path", extra_json_schema={"properties": _KEYS})]
+
+
+class SweepTable(Struct, frozen=True):
+    """Keys of `sweep` that are no paths."""
+
+    mode: Mode = "product"
+    cases: tuple[dict[str, Any], ...] = ()
+
+
+class CaseKeys(Struct, frozen=True):
+    """Keys of a case that are no paths: its base where it is not the file's first one, a name for its folder."""
+
+    base: str | None = None
+    name: str | None = None
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One swept path and its values."""
+
+    path: str
+    values: Sequence[Any] | Range
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A validated sweep: `bases` as (name, data); values by path for each case, or axes.
+
+    `written` are the bases that stand in a file; `fixed` the paths that the sweep, or an option, sets in every base.
+    """
+
+    name: str
+    bases: tuple[tuple[str, dict[str, Any]], ...]
+    mode: str
+    axes: tuple[Axis, ...]
+    cases: tuple[tuple[str, dict[str, Any]], ...] = ()
+    written: tuple[tuple[str, Path], ...] = ()
+    fixed: tuple[str, ...] = ()
+
+    @property
+    def slug(self) -> str:
+        """Name of the batch's folder."""
+        slug = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-") or "batch"
+        return f"{slug}-batch" if names_device(slug) else slug
+
+    def overridden(self, overrides: Sequence[str]) -> Sweep:
+        """Return the sweep with each "path=value" put into every base; swept values win. Raises Refusal."""
+        if not overrides:
+            return self
+        for text in overrides:
+            for _, data in self.bases:
+                check_path(text.partition("=")[0].strip(), data)
+        bases = tuple((name, override(data, overrides)) for name, data in self.bases)
+        set_here = (text.partition("=")[0].strip() for text in overrides)
+        return replace(self, bases=bases, fixed=(*self.fixed, *set_here))
+
+    @cached_property
+    def count(self) -> int:
+        """Number of variants."""
+        if self.mode == "cases":
+            return len(self.cases)
+        per_base = 1
+        for axis in self.axes:
+            per_base = per_base * len(axis) if self.mode == "product" else max(per_base, len(axis))
+        return per_base * len(self.bases)
+
+    @cached_property
+    def paths(self) -> tuple[str, ...]:
+        """Swept paths, in the file's order."""
+        if self.mode == "cases":
+            return tuple(dict.fromkeys(path for _, values in self.cases for path in values))
+        return tuple(axis.path for axis in self.axes)
+
+    @property
+    def hash(self) -> str:
+        """Hash over everything that decides which variants there are."""
+        axes = [
+            (a.path, structs.asdict(a.values) if isinstance(a.values, Range) else list(a.values)) for a in self.axes
+        ]
+        return digest(json.dumps([self.name, self.bases, self.mode, axes, self.cases]).encode())
+
+    def values(self, index: int) -> tuple[str, dict[str, Any]]:
+        """Return (base, value by path) of variant `index`: the last axis runs fastest, the bases slowest."""
+        if self.mode == "cases":
+            return self.cases[index]
+        per_base = self.count // len(self.bases)
+        base, rest = divmod(index, per_base)
+        chosen: dict[str, Any] = {}
+        for axis in reversed(self.axes):
+            if self.mode == "product":
+                rest, here = divmod(rest, len(axis))
+            else:
+                here = rest if len(axis) > 1 else 0
+            chosen[axis.path] = axis.values[here]
+        return self.bases[base][0], {axis.path: chosen[axis.path] for axis in self.axes}
+
+    def spec(self, index: int) -> Any:
+        """Return the effective spec, or the array, of variant `index`. Raises Refusal."""
+        return subject_of_data(self._data(index)).of
+
+    def faults(self, index: int, first: UnitcadError) -> str:
+        """Return what is wrong with a refused variant in one line, `first` being what it was refused for."""
+        if isinstance(first, Refusal) and self.of_arrays:
+            told = offered(first, self._data(index), makeable_array) if index < EXPLAINED else _unoffered(first)
+            return str(told)
+        if index >= EXPLAINED or not isinstance(first, Refusal):
+            return str(first)
+        base, values = self.values(index)
+        file = dict(self.written).get(base)
+        text = read_text(file) if file else ""
+        every = all_faults(first, self._data(index), text)
+        for fault in every:
+            if file and fault.field not in (*values, *self.fixed):
+                fault.file = str(file)
+        return "; and ".join(fault.located for fault in every)
+
+    @property
+    def of_arrays(self) -> bool:
+        """Whether any base is an array."""
+        return any("array" in data for _, data in self.bases)
+
+    def _data(self, index: int) -> dict[str, Any]:
+        base, values = self.values(index)
+        data = self.base_data(base)
+        for path, value in values.items():
+            put(data, path, value)
+        return data
+
+    def base_data(self, base: str) -> dict[str, Any]:
+        """Return a copy of a base's data."""
+        return json.loads(self._texts[base])
+
+    def __iter__(self) -> Iterator[tuple[int, dict[str, Any]]]:
+        return ((index, self.values(index)[1]) for index in range(self.count))
+
+    @cached_property
+    def _texts(self) -> dict[str, str]:
+        return {name: json.dumps(data) for name, data in self.bases}
+
+
+def _unoffered(refusal: Refusal) -> Refusal:
+    """Return an array's refusal without its value to offer, which nobody tried."""
+    return Refusal(refusal.field, refusal.value, refusal.limit)
+
+
+def shipped() -> dict[str, Path]:
+    """Return the shipped sweeps by name."""
+    return shipped_files("sweeps")
+
+
+def load_sweep(source: str | os.PathLike[str]) -> Sweep:
+    """Load the sweep of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
+
+    Raises Refusal or UnitcadError for an unknown base or path, lists of unequal lengths in a zip, an empty sweep.
+    """
+    path = named_file(os.fspath(source), shipped(), "sweep", WrongArgument)
+    return from_file(read_toml(path), path.parent, path.stem)
+
+
+def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
+    """Return a validated sweep of a sweep file's data; `folder` is where its relative paths start."""
+    file = convert(data, SweepFile)
+    table, values = _parted(file.sweep, SweepTable, "sweep")
+    typed = [_parted(case, CaseKeys, f"sweep.cases.{i}") for i, case in enumerate(table.cases)]
+    named = [file.base] if isinstance(file.base, str) else list(file.base)
+    named += [case.base for case, _ in typed if case.base is not None]
+    bases: dict[str, dict[str, Any]] = {}
+    for base in dict.fromkeys(named):
+        bases[base] = _read_base(base, folder)
+        for path, value in file.fixed.items():
+            check_path(path, bases[base], "set")
+            put(bases[base], path, value)
+    axes = tuple(Axis(path, _values(path, given, table.mode)) for path, given in values.items())
+    cases = tuple(
+        (case.base or named[0], {"name": case.name, **values} if case.name else values) for case, values in typed
+    )
+    _check_mode(table.mode, axes, cases)
+    for base, values in cases or [(base, {axis.path: None for axis in axes}) for base in bases]:
+        for path in values:
+            check_path(path, bases[base])
+    written = tuple((base, folder / base) for base in bases if is_path(base))
+    return Sweep(file.name or name, tuple(bases.items()), table.mode, axes, cases, written, tuple(file.fixed))
+
+
+def _parted(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[str, Any]]:
+    """Split a table into the keys that `kind` has and the other ones, which are paths of a spec."""
+    own = fields_of(kind)
+    return (
+        convert({key: value for key, value in data.items() if key in own}, kind, field),
+        {key: value for key, value in data.items() if key not in own},
+    )
+
+
+def _read_base(base: str, folder: Path) -> dict[str, Any]:
+    place = folder / base if is_path(base) else base
+    confirm_known(base, "base", Refusal)
+    if is_array(place):
+        path = array_templates().get(base) or Path(place)
+        data = expanded(read_toml(path), path.parent)
+    else:
+        data = read(place)
+    check_plain(data)
+    return data
+
+
+def _values(path: str, given: Any, mode: Mode) -> Sequence[Any] | Range:
+    """Return the values of an axis: a scalar or a table counts as one, a table with a range's keys as a range.
+
+    In a product each differs from the others. In a zip one may come again, beside another value of another axis.
+    """
+    if isinstance(given, dict) and given.keys() & fields_of(Range).keys():
+        given = convert(given, Range, f"sweep.{path}")
+    values = given if isinstance(given, list | Range) else [given]
+    if not len(values):
+        raise Refusal(f"sweep.{path}", [], "an axis needs a value: the sweep is empty")
+    if isinstance(values, Range):
+        if values.num > 1 and values.start == values.stop:
+            raise Refusal(f"sweep.{path}.num", values.num, "start and stop are the same value", 1)
+        return values
+    seen = [json.dumps(value) for value in values]
+    twice = next((value for value, text in zip(values, seen, strict=True) if seen.count(text) > 1), None)
+    if mode != "zip" and len(set(seen)) < len(seen) and len(seen) <= 10_000:
+        raise Refusal(f"sweep.{path}", twice, "is there twice")
+    return values
+
+
+def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> None:
+    if mode == "cases":
+        if axes:
+            raise Refusal("sweep", axes[0].path, "mode = cases takes its values from [[sweep.cases]] only")
+        if not cases:
+            raise Refusal("sweep.cases", [], "the sweep is empty: it needs a [[sweep.cases]] table or more")
+        return
+    if cases:
+        raise Refusal("sweep.mode", mode, "[[sweep.cases]] goes with another mode", "cases")
+    if not axes:
+        raise Refusal("sweep", None, 'the sweep is empty: it needs a path with values, such as "diameter_mm"')
+    lengths = {axis.path: len(axis) for axis in axes if len(axis) > 1}
+    if mode == "zip" and len(set(lengths.values())) > 1:
+        counts = ", ".join(f"{path} has {count}" for path, count in lengths.items())
+        raise Refusal("sweep.mode", "zip", f"the lists are of unequal lengths: {counts}")
