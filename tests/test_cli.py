@@ -214,11 +214,12 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     procedure = json.loads((folder / "casting.json").read_text())
     manifest = json.loads((folder / "manifest.json").read_text())
     assert lines[0].startswith("14 mm across")
-    assert duration(procedure["earliest_finish_min"]) in lines[1]
-    assert lines[2] == "to mix: 2 g of ecoflex-00-10, 4 g of dragon-skin-30"
-    assert f"{len(manifest['laws'])} of {len(manifest['laws'])} mould checks passed" in lines[3]
-    assert lines[4] == manifest["estimate"]["answer"]
-    assert lines[5] == f"open {folder / 'report.html'}"
+    assert lines[1] == "assumed: motor.thickness_mm = 2 (2 to 2.65); measure the motor before you print"
+    assert duration(procedure["earliest_finish_min"]) in lines[2]
+    assert lines[3] == "to mix: 2 g of ecoflex-00-10, 4 g of dragon-skin-30"
+    assert f"{len(manifest['laws'])} of {len(manifest['laws'])} mould checks passed" in lines[4]
+    assert lines[5] == manifest["estimate"]["answer"]
+    assert lines[6] == f"open {folder / 'report.html'}"
     assert (folder / "report.html").is_file()
     without = _run("build", "embedded", "--formats", "stl", "-o", str(tmp_path / "b"), "--no-report")
     assert not (Path(without.stdout.strip()) / "report.html").exists()
