@@ -25,13 +25,20 @@ class FileKind:
     plural: str = ""
     """The name in `unitcad list`; empty if none is shipped."""
     shipped: str = ""
-    """"module:name" of the function that returns the shipped files by name."""
+    """"module:name" of the function that returns the shipped files by name; default: the folder `plural` of templates.
+    """
     model: str = ""
     """"module:name" of the msgspec Struct of the file; empty for a kind without a schema."""
     schema: str = ""
     """"module:name" of the function that returns the JSON Schema; default: the schema of `model`."""
     command: str = ""
     """The command that takes the file; empty if `unitcad init` does not write one."""
+    keys: tuple[str, ...] = ()
+    """The top-level keys by which a file is known to be of this kind."""
+    subject: str = ""
+    """"module:name" of the `pipeline.subjects.Compound` that the file describes, if it describes one."""
+    page: str = ""
+    """The module with the file's part of the live page, if it has one."""
 
 
 def load(reference: str) -> Any:

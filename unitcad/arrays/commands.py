@@ -7,9 +7,11 @@ FILE_KINDS = (
     FileKind(
         "array",
         "arrays",
-        "unitcad.arrays.array_names:array_templates",
-        "unitcad.arrays.array_tables:AskedArray",
-        "unitcad.arrays.array_schema:schema",
-        "unitcad build",
+        model="unitcad.arrays.array_tables:AskedArray",
+        schema="unitcad.arrays.array_schema:schema",
+        command="unitcad build",
+        keys=("array",),
+        subject="unitcad.arrays.arrayed:Arrayed",
+        page="unitcad.arrays.live_answers",
     ),
 )

@@ -7,7 +7,9 @@ COMMANDS = {
     for name in ("build", "check", "estimate", "report", "init", "list", "schema", "coupon", "cache")
 }
 FILE_KINDS = (
-    FileKind("spec", "templates", "unitcad.validation:templates", "unitcad.spec.asked:AskedSpec", "", "unitcad build"),
+    FileKind(
+        "spec", "templates", "unitcad.validation:templates", "unitcad.spec.asked:AskedSpec", command="unitcad build"
+    ),
     FileKind("custom", "custom", "unitcad.validation:custom_templates"),
     FileKind("cast-record", model="unitcad.casting.cast_record:CastRecord"),
 )

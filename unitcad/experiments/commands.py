@@ -3,4 +3,4 @@
 from unitcad.rooms import FileKind
 
 COMMANDS = {"experiments": "unitcad.experiments.experiments_command:experiments"}
-FILE_KINDS = (FileKind("experiment", "experiments", "unitcad.experiments.lab_file:shipped"),)
+FILE_KINDS = (FileKind("experiment", "experiments"),)

@@ -3,4 +3,7 @@
 from unitcad.rooms import FileKind
 
 COMMANDS = {name: f"unitcad.lab.{name}_command:{name}" for name in ("measure", "material", "fit", "phantom")}
-FILE_KINDS = (FileKind("phantom", "phantoms", "unitcad.lab.phantom.recipe:phantoms"),)
+FILE_KINDS = (
+    FileKind("phantom", "phantoms"),
+    FileKind("campaign", keys=("sensor", "unit"), page="unitcad.lab.campaign_page"),
+)

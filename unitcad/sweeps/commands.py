@@ -6,4 +6,4 @@ COMMANDS = {
     "batch": "unitcad.sweeps.batch_command:batch",
     "export": "unitcad.sweeps.export_command:export",
 }
-FILE_KINDS = (FileKind("sweep", "sweeps", "unitcad.sweeps.sweep:shipped", "unitcad.sweeps.sweep:SweepFile"),)
+FILE_KINDS = (FileKind("sweep", "sweeps", model="unitcad.sweeps.sweep:SweepFile"),)
