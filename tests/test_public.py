@@ -80,7 +80,7 @@ def test_every_name_resolves_and_has_a_docstring(name: str) -> None:
     assert getattr(unitcad, name) is found
 
 
-@pytest.mark.parametrize("name", ["build", "estimate", "check", "batch", "load", "materials", "motors", "printers"])
+@pytest.mark.parametrize("name", ["build", "estimate", "check", "load", "materials", "motors", "printers"])
 def test_functions_say_what_they_raise_and_in_which_units(name: str) -> None:
     found = getattr(unitcad, name)
     text = inspect.getdoc(found.__call__ if inspect.ismodule(found) else found) or ""

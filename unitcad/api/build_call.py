@@ -19,7 +19,6 @@ from unitcad.pipeline.write import build as build_whole
 from unitcad.spec import Spec
 from unitcad.spec.asked import Format
 from unitcad.validation import Changes, Source
-from unitcad.validation.tables import changes_of
 
 
 class Buildable(Protocol):
@@ -95,10 +94,9 @@ def build(
     Raises Refusal or UnitcadError before anything is written.
     """
     into, say = Path(path("out", out)), progress or _silent
-    changes = [*changes_of(set)]
+    wanted = load_subject(source, set)
     if formats is not None:
-        changes.append(("output.formats", texts("formats", formats)))
-    wanted = load_subject(source, changes)
+        wanted = load_subject(wanted.of, {"output.formats": texts("formats", formats)})
     built = build_whole(wanted.of, into, only=texts("only", only), check=check, say=say)
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
         from unitcad.report import write_report
