@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from unitcad.casting.steps import duration
 from unitcad.cli import app
 from unitcad.export import slicer
+from unitcad.rooms import commands
 
 
 def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -129,11 +130,12 @@ def test_a_command_loads_no_other_command() -> None:
 
 
 def _commands() -> dict[str, Any]:
-    commands = get_command(app).commands  # pyright: ignore
+    whole: Any = get_command(app)
+    shown = {name: whole.get_command(None, name) for name in whole.list_commands(None)}
     return {
-        "": get_command(app),
-        **commands,
-        **{f"cache {name}": below for name, below in commands["cache"].commands.items()},
+        "": whole,
+        **shown,
+        **{f"cache {name}": below for name, below in shown["cache"].commands.items()},
     }
 
 
@@ -148,6 +150,12 @@ def test_help_cuts_no_option_s_name_and_no_square_bracket(command: str) -> None:
         for option in (*parameter.opts, *parameter.secondary_opts):
             assert not option.startswith("-") or option in shown.replace(",", " ").split()
         assert " ".join((getattr(parameter, "help", None) or "").split()) in shown
+
+
+def test_the_list_of_commands_says_what_their_help_says() -> None:
+    for name, command in commands().items():
+        said = " ".join(CliRunner().invoke(app, [name, "--help"], env={"COLUMNS": "80"}).stdout.split())
+        assert command.help in said
 
 
 def test_help_and_version() -> None:

@@ -42,7 +42,7 @@ FLOORS = [
     {"workers"},
     {"errors"},
     {"text", "json_text", "notebook", "geometry"},
-    {"lean_import", "heap", "rooms"},
+    {"lean_import", "rooms"},
 ]
 ROOMS = {
     "accuracy": set(),
@@ -57,20 +57,6 @@ ROOMS = {
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 LIVE = {Path(importlib.util.find_spec(kind.page).origin or "") for kind in file_kinds() if kind.page}
 CAD = ("OCP", "build123d", "cadquery")
-NEEDLESS = ("unitcad.arrays",)
-"""What neither a unit's build nor a check needs, and takes longer to load than a small mesh takes to check."""
-OF_OTHERS = {
-    "check": (
-        "numpy.ma",
-        "unitcad.meshcheck.rules.d_walls",
-        "unitcad.meshcheck.rules.m_manifest",
-        "unitcad.meshcheck.geometry.rays",
-        "unitcad.meshcheck.geometry.small_shells",
-        "tomllib",
-    ),
-    "build": ("unitcad.moulds.dovetails",),
-}
-"""What is for a printer, a manifest, many shells or settings, and for arrays: by the commands that load none of it."""
 
 
 def _edges() -> set[tuple[str, str, str]]:
@@ -227,7 +213,7 @@ def test_no_piece_is_recognised_by_its_name() -> None:
     ids=lambda run: run[0],
 )
 def test_nothing_needless_is_loaded(run: list[str], tmp_path: Path) -> None:
-    needless = CAD + (NEEDLESS if run[0] in ("build", "check") else ()) + OF_OTHERS.get(run[0], ())
+    needless = (*CAD, *(f"unitcad.{room}" for room in ROOMS))
     corners = ["0 0 0", "9 0 0", "0 9 0", "0 0 9"]
     facets = [
         "facet normal 0 0 0\nouter loop\n" + "".join(f"vertex {corners[k]}\n" for k in face) + "endloop\nendfacet\n"
@@ -292,8 +278,8 @@ def test_a_room_can_be_deleted(gone: set[str], tmp_path: Path) -> None:
         assert done.returncode == 0, f"{words}: {done.stderr}"
         return done.stdout
 
-    named = {name: reference.split(".")[1] for name, reference in commands().items()}
-    told = re.findall(r"^  ([a-z-]+) ", run("--help").partition("Commands:")[2], re.MULTILINE)
+    named = {name: command.run.split(".")[1] for name, command in commands().items()}
+    told = re.findall(r"^  ([a-z-]+)  ", run("--help").partition("Make:")[2], re.MULTILINE)
     assert sorted(told) == sorted(name for name, room in named.items() if room not in gone)
     run("init", "mine", "--template", "embedded")
     built = Path(run("build", "mine.toml", "--formats", "stl,svg", "--report").splitlines()[-1])

@@ -18,8 +18,7 @@ from unitcad.errors import Refusal
 from unitcad.lab.fit_files import fit_toml
 from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.pipeline.make import Progress, Subject
-from unitcad.pipeline.plan import OUTPUTS
-from unitcad.spec.asked import AskedSpec
+from unitcad.spec.asked import OUTPUTS, AskedSpec
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.spec.fields import alternatives, entry_in, fields_of, notes, table_in
 from unitcad.validation import from_data, put, read

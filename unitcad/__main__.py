@@ -5,6 +5,6 @@ import sys
 if not sys.flags.safe_path:
     del sys.path[0]  # where the command runs: what lies there is not ours to import
 
-from unitcad.cli import program
+from unitcad.cli import main
 
-program()
+main()

@@ -19,6 +19,15 @@ _CORE = "cli"
 """The package whose additions come first."""
 
 
+class Command(Struct, frozen=True, forbid_unknown_fields=True):
+    """A command of the command line, with its line in `unitcad --help`."""
+
+    run: str
+    """"module:name" of its function, or of its Typer application."""
+    group: str
+    help: str
+
+
 class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
     """A kind of TOML file: `unitcad list PLURAL`, `unitcad schema NAME`, and a start for `unitcad init`."""
 
@@ -42,8 +51,8 @@ class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _Room(Struct, frozen=True, forbid_unknown_fields=True):
-    commands: dict[str, str] = {}  # msgspec copies it
-    files: tuple[FileKind, ...] = field(default=())
+    commands: dict[str, Command] = field(default_factory=dict)
+    files: tuple[FileKind, ...] = ()
 
 
 @cache
@@ -59,9 +68,9 @@ def load(reference: str) -> Any:
     return getattr(import_module(module), name)
 
 
-def commands() -> dict[str, str]:
-    """Return the function of each command of the command line, as "module:name"."""
-    return {name: reference for room in _rooms() for name, reference in room.commands.items()}
+def commands() -> dict[str, Command]:
+    """Return the commands of the command line by name."""
+    return {name: command for room in _rooms() for name, command in room.commands.items()}
 
 
 def file_kinds() -> tuple[FileKind, ...]:

@@ -11,7 +11,7 @@ from unitcad.cache import MemoryStore
 from unitcad.pipeline import plan as bodies
 from unitcad.pipeline.make import Progress, Subject
 from unitcad.pipeline.manifest import Manifest
-from unitcad.pipeline.plan import OUTPUTS
+from unitcad.spec.asked import OUTPUTS
 from unitcad.validation import default_template, load, templates
 
 _ALL = ("step", "stl", "3mf", "svg", "glb")

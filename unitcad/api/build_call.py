@@ -12,12 +12,11 @@ from typing import Protocol
 from unitcad import notebook
 from unitcad.arguments import path, texts
 from unitcad.pipeline import Variant
-from unitcad.pipeline.plan import OUTPUTS
 from unitcad.pipeline.subjects import load_subject
 from unitcad.pipeline.write import PAGE, Built, held
 from unitcad.pipeline.write import build as build_whole
 from unitcad.spec import Spec
-from unitcad.spec.asked import Format
+from unitcad.spec.asked import OUTPUTS, Format
 from unitcad.validation import Changes, Source
 
 

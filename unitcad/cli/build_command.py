@@ -7,11 +7,13 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from unitcad.cli.output import say_error, warn
+from unitcad.cli.build_summary import summary
+from unitcad.cli.output import print_json, progress, say_error, warn
+from unitcad.cli.saves import saves
 from unitcad.cli.shared_options import (
     AllowCode,
     AsJson,
@@ -26,11 +28,16 @@ from unitcad.cli.shared_options import (
     overrides,
     with_fit,
 )
-
-if TYPE_CHECKING:
-    from unitcad.pipeline.make import Subject
-    from unitcad.pipeline.manifest import Manifest
-    from unitcad.pipeline.write import Built
+from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.pipeline import step_helper
+from unitcad.pipeline.make import Subject
+from unitcad.pipeline.manifest import NO_KERNEL, Manifest
+from unitcad.pipeline.slicing import check_slicing, slice_tools
+from unitcad.pipeline.subjects import Compound, load_subject
+from unitcad.pipeline.write import PAGE, Built, held
+from unitcad.pipeline.write import build as build_subject
+from unitcad.report import write_report
+from unitcad.validation import confirm_known
 
 
 def build(
@@ -65,8 +72,6 @@ def build(
         if not once():
             sys.exit(1)
         return
-    from unitcad.cli.saves import saves
-    from unitcad.errors import UnitcadError, WrongArgument
 
     if lacking := [spec for spec in specs if not Path(spec).is_file()]:
         why = "is no file that could be saved; unitcad init makes one from a template"
@@ -94,20 +99,10 @@ def _built(
     as_json: bool,
 ) -> bool:
     """Build the specs and print what came out; return whether every check passed."""
-    from unitcad.pipeline import step_helper
 
     outputs_asked = {"unit", "moulds"} if only is None else set(listed(only))
     if outputs_asked & {"unit", "moulds"} and (formats is None or "step" in listed(formats)):
         step_helper.start()  # first: it loads its modules while this process loads its own
-    from unitcad.cli.output import print_json, progress
-    from unitcad.heap import keep_freed_memory
-    from unitcad.pipeline.slicing import check_slicing, slice_tools
-    from unitcad.pipeline.subjects import load_subject
-    from unitcad.pipeline.write import PAGE, build, held
-    from unitcad.report import write_report
-    from unitcad.validation import confirm_known
-
-    keep_freed_memory()
     paged = only is None if page is None else page
     changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
     allow_code(code)
@@ -121,7 +116,7 @@ def _built(
     printing: list[str] = []
     for spec in wanted:
         with progress(spec.name) as say:
-            result = build(spec.of, out, only=chosen, check=not no_check, say=say)
+            result = build_subject(spec.of, out, only=chosen, check=not no_check, say=say)
             if slicing:
                 say("slicing")
                 printing.append(slice_tools(spec.unit, result.folder, result.manifest, say))
@@ -145,15 +140,12 @@ def _built(
 
 def _summary(of: Subject, built: Built) -> Iterator[str]:
     """Return the lines of a result."""
-    from unitcad.cli.build_summary import summary
-    from unitcad.pipeline.subjects import Compound
 
     return of.summary(built.folder, built.manifest) if isinstance(of, Compound) else summary(of.unit, built)
 
 
 def _print_faults(manifest: Manifest) -> None:
     """Print warnings, failed mould checks, and findings in files."""
-    from unitcad.pipeline.manifest import NO_KERNEL
 
     for warning in manifest["warnings"]:
         warn(f"warning: {warning}")

@@ -7,16 +7,19 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cache import collect, default_root, usage
+from unitcad.cli.output import print_json
 from unitcad.cli.shared_options import AsJson, finite
 
-cache = typer.Typer(help="The cache of distinct parts.", no_args_is_help=True)
+cache = typer.Typer(
+    help="The cache of distinct parts.", no_args_is_help=True, add_completion=False, rich_markup_mode=None
+)
 Where = Annotated[Path | None, typer.Option("--cache", help="The cache's folder; else the user's.")]
 
 
 @cache.command("ls")
 def ls(where: Where = None, as_json: AsJson = False) -> None:
     """Print what the cache holds. The last line printed is its folder."""
-    from unitcad.cache import default_root, usage
 
     root = where or default_root()
     used = usage(root)
@@ -32,7 +35,6 @@ def gc(
     as_json: AsJson = False,
 ) -> None:
     """Remove what was used longest ago, down to a size. Results keep their files: they are links."""
-    from unitcad.cache import collect, default_root
 
     root = where or default_root()
     gone = collect(root, int(limit * 1e6))
@@ -41,7 +43,6 @@ def gc(
 
 
 def _print_usage(text: str, root: Path, data: dict, as_json: bool) -> None:
-    from unitcad.cli.output import print_json
 
     if as_json:
         print_json({"cache": str(root), **data})

@@ -7,14 +7,21 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from unitcad import catalogue, files
+from unitcad.catalogue import Printer
+from unitcad.cli import check_settings
+from unitcad.cli.check_settings import Configuration
 from unitcad.errors import Refusal, UnitcadError, unknown_name
-
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
-    from unitcad.cli.check_settings import Configuration
-    from unitcad.meshcheck import FileReport, Limits, Options
+from unitcad.export import finding_pictures
+from unitcad.meshcheck import FileReport, Limits, Options, detail, many_files
+from unitcad.meshcheck import baseline as baselines
+from unitcad.meshcheck import manifest as listing
+from unitcad.meshcheck.output import as_text
+from unitcad.meshcheck.output.render import FORMATS, render
+from unitcad.meshcheck.rules.registry import check_prefixes, rules
+from unitcad.meshcheck.rules.registry import explain as explanation
+from unitcad.meshcheck.units import unit_named
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,13 +60,6 @@ class Asked:
 
 def run(asked: Asked) -> int:
     """Check the files and print or save the report; return the exit code. Raises UnitcadError or Refusal."""
-    from unitcad.cli import check_settings
-    from unitcad.meshcheck import Options, detail, many_files
-    from unitcad.meshcheck.output import as_text
-    from unitcad.meshcheck.output.render import FORMATS, render
-    from unitcad.meshcheck.rules.registry import check_prefixes, rules
-    from unitcad.meshcheck.rules.registry import explain as explanation
-    from unitcad.meshcheck.units import unit_named
 
     if asked.list_rules:
         sys.stdout.write("".join(f"{rule.code} {rule.severity}: {rule.title}\n" for rule in rules().values()))
@@ -84,8 +84,6 @@ def run(asked: Asked) -> int:
     if asked.write_baseline and base is None:
         raise UnitcadError("--write-baseline needs a file: --baseline FILE, or the key baseline of the settings")
     if base is not None:
-        from unitcad.meshcheck import baseline as baselines
-
         known = baselines.read(base) if base.exists() or not asked.write_baseline else baselines.EMPTY
     selected = check_prefixes(*configuration.chosen("select", _split(asked.select)))
     extra = check_prefixes("--extend-select", _split(asked.extend_select) or [])
@@ -109,8 +107,6 @@ def run(asked: Asked) -> int:
         check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
     draw = None
     if asked.show is not None:
-        from unitcad.export import finding_pictures
-
         draw = partial(finding_pictures.write, Path(asked.show))
     memory = asked.memory or configuration.value("memory") or 8000
     check_all = partial(many_files.check_files, jobs=asked.jobs, memory_mb=memory, then=draw)
@@ -149,7 +145,6 @@ def _copy(given: str, formats: Sequence[str]) -> tuple[str, Path]:
 
 def _save(path: Path, text: str) -> None:
     """Write a report to a file, whole or not at all; its folder is made."""
-    from unitcad import files
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -184,7 +179,6 @@ def _reports(
 
     if manifest is None:
         return list(check_all([(path, of_path(path)) for path in paths]))
-    from unitcad.meshcheck import manifest as listing
 
     listed = listing.read(manifest)
     work = listing.work(listed, paths, of_path, options.printer is not None)
@@ -195,13 +189,11 @@ def _reports(
 def _printer(field: str, name: str | None) -> Printer | None:
     if not name:
         return None
-    from unitcad import catalogue
 
     return catalogue.choose(field, name, catalogue.printers())
 
 
 def _limits(max_faces: int | None, field: str, seconds: float | None) -> Limits:
-    from unitcad.meshcheck import Limits
 
     default = Limits()
     if seconds is not None and not seconds < 1e7:

@@ -9,14 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from unitcad import files
+from unitcad.cli.check_table import Settings
 from unitcad.errors import Refusal, UnitcadError, unknown_key
 from unitcad.files import seen_from
-
-if TYPE_CHECKING:
-    from unitcad.cli.check_table import Settings
+from unitcad.spec.toml import parse_toml
 
 NAMES = ("unitcad.toml", "pyproject.toml")
 
@@ -117,7 +116,6 @@ def _read(path: Path) -> Configuration | None:
     shown, text = seen_from(path.absolute()), files.read_text(path)
     if path.name == "pyproject.toml" and "unitcad" not in text and "\\" not in text:  # with escapes it may be meant
         return None
-    from unitcad.spec.toml import parse_toml
 
     data: Any = parse_toml(text, shown)
     table = _table(path, data)

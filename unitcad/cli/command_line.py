@@ -1,10 +1,12 @@
-"""The parser of the command line, by Typer."""
+"""The command line, by Typer. A command's module is imported when the command runs or its help is asked for."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, cast
 
 import typer
+from typer.core import TyperGroup
+from typer.main import get_command
 
 from unitcad import __version__
 from unitcad.cli.output import Form, form_of, say_error
@@ -13,34 +15,45 @@ from unitcad.rooms import commands, load
 
 WrongArguments = cast(type[typer.BadParameter], typer.BadParameter.__mro__[2])
 """Typer's error of the command line itself, such as an unknown option: ClickException, its own or click's."""
+_PLAIN: dict[str, Any] = {
+    "add_completion": False,
+    "pretty_exceptions_enable": False,
+    "rich_markup_mode": None,  # boxes cut long option names, and markup swallows square brackets
+}
+
+
+class _Commands(TyperGroup):
+    """The commands of the core and of the rooms."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(commands())
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        known = commands()
+        if cmd_name not in known:
+            return None
+        command = load(known[cmd_name].run)
+        if not isinstance(command, typer.Typer):
+            alone = typer.Typer(**_PLAIN)
+            alone.command(cmd_name)(command)
+            command = alone
+        made = get_command(command)
+        made.name = cmd_name
+        return made
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        groups: dict[str, list[tuple[str, str]]] = {}
+        for name, command in commands().items():
+            groups.setdefault(command.group, []).append((name, command.help))
+        for group, rows in groups.items():
+            with formatter.section(group):
+                formatter.write_dl(rows)
 
 
 def _version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"unitcad {__version__}")
         raise typer.Exit()
-
-
-def application(*names: str) -> typer.Typer:
-    """Return the command line with these commands, or with all: reading one does not load the others."""
-    app = typer.Typer(
-        name="unitcad",
-        help="Haptic units, their casting moulds and an attenuation estimate, from a short TOML spec.",
-        no_args_is_help=True,
-        add_completion=False,
-        pretty_exceptions_enable=False,
-        rich_markup_mode=None,  # boxes cut long option names, and markup swallows square brackets
-        context_settings={"help_option_names": ["-h", "--help"]},
-    )
-    known = commands()
-    for name in names or known:
-        command = load(known[name])
-        if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name)
-        else:
-            app.command(name)(command)
-    app.callback()(_root)
-    return app
 
 
 def _root(
@@ -51,10 +64,21 @@ def _root(
     pass
 
 
+app = typer.Typer(
+    name="unitcad",
+    cls=_Commands,
+    help="Haptic units, their casting moulds and an attenuation estimate, from a short TOML spec.",
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    **_PLAIN,
+)
+app.callback()(_root)
+
+
 def run(words: list[str]) -> int:
     """Run the command of the program's arguments; return its exit code. Says itself what is wrong with them."""
     try:
-        return application(*(word for word in words[:1] if word in commands()))(standalone_mode=False) or 0
+        return app(words, standalone_mode=False) or 0
     except WrongArguments as error:
         _refuse(error, form_of(words))
         return error.exit_code

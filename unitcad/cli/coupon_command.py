@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+from unitcad import catalogue
+from unitcad.casting.coupon import Coupon, write
+from unitcad.cli.output import print_json
 from unitcad.cli.shared_options import AsJson
 
 
@@ -18,9 +21,6 @@ def coupon(
     as_json: AsJson = False,
 ) -> None:
     """Write a fit coupon to print first, and how to read it. The last line printed is the folder."""
-    from unitcad import catalogue
-    from unitcad.casting.coupon import Coupon, write
-    from unitcad.cli.output import print_json
 
     chosen = catalogue.choose("PRINTER", printer, catalogue.printers())
     folder = write(chosen, out)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from unitcad.attenuation.edge.fitted_models import MODELS
+from unitcad.catalogue import FREQUENCIES_HZ
+from unitcad.cli.estimate_tables import print_errors, print_estimate, print_frequencies, print_neighbours
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
+from unitcad.designs import design_of
 from unitcad.errors import Refusal
-from unitcad.lean_import import postpone_tools
-
-if TYPE_CHECKING:
-    from unitcad.spec import Spec
+from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec, neighbours_of_specs
+from unitcad.moulds.plan import plan
+from unitcad.rooms import load as load_named
+from unitcad.spec import Spec
+from unitcad.validation import compound_kind, confirm_known, load
 
 _MOST_FREQUENCIES = 1000
 
@@ -48,11 +53,6 @@ def estimate(
     the least error, and what was measured. Of an array: how much of a unit's motion reaches its neighbours. Of
     several arrays each is compared with the first.
     """
-    postpone_tools()
-    from unitcad.attenuation.edge.fitted_models import MODELS
-    from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec, neighbours_of_specs
-    from unitcad.rooms import load as load_named
-    from unitcad.validation import compound_kind, confirm_known, load
 
     if model not in ("", "all", *MODELS, MECHANICS):
         raise Refusal("--model", model, f"is none of {', '.join((*MODELS, MECHANICS, 'all'))}", MODELS[0])
@@ -83,7 +83,6 @@ def estimate(
     if as_json:
         print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates, **beside})
         return
-    from unitcad.cli.estimate_tables import print_errors, print_estimate, print_frequencies, print_neighbours
 
     for block in beside.values():
         print_neighbours(block)
@@ -101,8 +100,6 @@ def estimate(
 
 def _warn_of_moulds(spec: Spec) -> None:
     """Warn that `build` would refuse the moulds of a unit that can be estimated."""
-    from unitcad.designs import design_of
-    from unitcad.moulds.plan import plan
 
     if design_of(spec).passes is None:
         return
@@ -114,7 +111,6 @@ def _warn_of_moulds(spec: Spec) -> None:
 
 def frequencies(text: str) -> list[float]:
     """Parse HZ, or FROM:TO:STEP with both ends, into a list in Hz. Raises `Refusal`."""
-    from unitcad.catalogue import FREQUENCIES_HZ
 
     parts = text.split(":")
     try:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
 from unitcad.cli.output import console
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 
 def print_estimate(data: dict[str, Any], details: bool = False) -> None:

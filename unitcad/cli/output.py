@@ -8,13 +8,14 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
+
+from rich.console import Console
+from rich.text import Text
 
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.text import printable
-
-if TYPE_CHECKING:
-    from rich.console import Console
+from unitcad.workers import STAGES
 
 
 def print_json(data: Any) -> None:
@@ -83,7 +84,6 @@ def warn(line: str) -> None:
 
 def console(stderr: bool = False) -> Console:
     """Return a rich console. Text is shown as it is: a name may hold square brackets, or colons that spell an emoji."""
-    from rich.console import Console
 
     return Console(markup=False, emoji=False, highlight=False, stderr=stderr)
 
@@ -93,7 +93,6 @@ def stage_lines() -> Callable[[str], None] | None:
 
     The environment variable UNITCAD_STAGES holds the text that such a line begins with.
     """
-    from unitcad.workers import STAGES
 
     mark = os.environ.get(STAGES)
     return (lambda stage: warn(f"{mark}{stage}")) if mark else None
@@ -106,7 +105,6 @@ def progress(name: str) -> Iterator[Callable[[str], None]]:
     if lines or not sys.stderr.isatty():
         yield lines or (lambda stage: None)
         return
-    from rich.text import Text
 
     # As Text: a spinner reads markup whatever its console's setting.
     with console(stderr=True).status(Text(name)) as status:

@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AllowCode, AsJson, allow_code
+from unitcad.report import write_report
+from unitcad.report.read_results import check_casts
 
 
 def report(
@@ -16,9 +19,6 @@ def report(
     as_json: AsJson = False,
 ) -> None:
     """Write one offline page for what a folder holds. The last line printed is the page."""
-    from unitcad.cli.output import print_json, progress, warn
-    from unitcad.report import write_report
-    from unitcad.report.read_results import check_casts
 
     allow_code(code)
     with progress(str(folder)) as say:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from unitcad.errors import unknown_name
+from unitcad.spec import custom_code
+from unitcad.spec.asked import FORMATS, OUTPUTS
 
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
 Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]
@@ -33,15 +38,12 @@ def finite(value: float | None) -> float | None:
 
 def with_fit(sets: list[str] | None, fit: Path | None) -> list[str]:
     """Return what --set and --fit override in a spec."""
-    import json
 
     return [*(sets or ()), *([] if fit is None else [f"estimate.fit={json.dumps(str(fit))}"])]
 
 
 def overrides(sets: list[str] | None, formats: str | None) -> list[str]:
     """Return what --set and --formats override in a spec. Raises Refusal for an unknown format."""
-    from unitcad.errors import unknown_name
-    from unitcad.pipeline.plan import FORMATS
 
     names = listed(formats)
     for name in names or ():
@@ -52,7 +54,6 @@ def overrides(sets: list[str] | None, formats: str | None) -> list[str]:
 
 def outputs(only: str | None) -> tuple[str, ...]:
     """Return what --only asks for; all without it."""
-    from unitcad.pipeline.plan import OUTPUTS
 
     return OUTPUTS if only is None else tuple(name for name in listed(only) if name)
 
@@ -64,7 +65,6 @@ def listed(text: str | None) -> list[str]:
 
 def allow_code(wanted: bool, nothing_else: bool = False) -> None:
     """Let this process run the code inside a spec; with `nothing_else`, no design's code at all."""
-    from unitcad.spec import custom_code
 
     if wanted:
         custom_code.allow({custom_code.ANY})

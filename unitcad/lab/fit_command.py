@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich.table import Table
 
+from unitcad import files
+from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
-
-if TYPE_CHECKING:
-    from unitcad.lab.fitting import Fitted
+from unitcad.lab import fit_files
+from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
 
 
 def fit(
@@ -27,10 +29,6 @@ def fit(
     Each unit is predicted without it, the null of two levels beside the models. The constants are shrunk towards the
     stored ones by how many units there are. `estimate --fit` and `build --fit` take lab-fit.toml.
     """
-    from unitcad import files
-    from unitcad.cli.output import print_json, progress
-    from unitcad.lab import fit_files
-    from unitcad.lab.fitting import fit_lab, load_fit_lab
 
     loaded = load_fit_lab(lab)
     with progress("fit") as stage:
@@ -47,10 +45,6 @@ def fit(
 
 
 def _print(result: Fitted) -> None:
-    from rich.table import Table
-
-    from unitcad.cli.output import console
-    from unitcad.lab import fit_files
 
     screen, chosen, settings = console(), result.chosen, result.lab.settings
     screen.print(f"{settings.name}: {result.fit.units} units of its own, {settings.moduli} moduli", soft_wrap=True)

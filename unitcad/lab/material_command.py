@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
+from rich.table import Table
 
+from unitcad import catalogue, files
+from unitcad.catalogue import Material
+from unitcad.cli.output import console, print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, finite
 from unitcad.errors import Refusal, unknown_name
-
-if TYPE_CHECKING:
-    from unitcad.catalogue import Material
-    from unitcad.lab.dynamic import DynamicResult
-    from unitcad.lab.tensile import TensileResult
+from unitcad.lab import material_files as written
+from unitcad.lab.columns import declared
+from unitcad.lab.dynamic import DynamicResult, evaluate_dynamic, read_dynamic
+from unitcad.lab.readers import Layout
+from unitcad.lab.tensile import Specimen, TensileResult, evaluate, read_curve
 
 _DELIMITERS = {"tab": "\t", "space": " "}
 _Length = typer.Option(min=0.001, max=10000, callback=finite, help="Of the specimen; goes before the file's header.")
@@ -59,15 +64,6 @@ def material(
     dynamic test. A tensile test gives a quasi-static modulus, which the estimate takes where the spec says
     moduli = "quasi-static" under [estimate].
     """
-    import json
-
-    from unitcad import catalogue, files
-    from unitcad.cli.output import print_json, progress
-    from unitcad.lab import material_files as written
-    from unitcad.lab.columns import declared
-    from unitcad.lab.dynamic import evaluate_dynamic, read_dynamic
-    from unitcad.lab.readers import Layout
-    from unitcad.lab.tensile import Specimen, evaluate, read_curve
 
     if not curves and dma is None:
         raise Refusal("FILES", None, "name one tensile curve or more, or --dma with a file")
@@ -173,9 +169,6 @@ def _pair(field: str, text: str, nearest: str) -> tuple[float, float]:
 
 
 def _print_tensile(name: str, result: TensileResult, found: dict[str, Any]) -> None:
-    from rich.table import Table
-
-    from unitcad.cli.output import console, warn
 
     screen = console()
     low, high = result.low / 1e3, result.high / 1e3
@@ -201,7 +194,6 @@ def _percent(half_width: float | None) -> str:
 
 
 def _print_dynamic(result: DynamicResult) -> None:
-    from unitcad.cli.output import console, warn
 
     screen = console()
     screen.print(

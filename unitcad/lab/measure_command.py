@@ -9,7 +9,11 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson
+from unitcad.files import sha256
+from unitcad.lab import measured_files, measuring
+from unitcad.lab.campaign import read_campaign
 
 
 def measure(
@@ -25,10 +29,6 @@ def measure(
     normalised by the motor, with an interval of 95 % from the repeats.
     Exit 1 when a finding says that a record or a level is in doubt. The last line printed is the folder.
     """
-    from unitcad.cli.output import print_json, progress, warn
-    from unitcad.files import sha256
-    from unitcad.lab import measured_files, measuring
-    from unitcad.lab.campaign import read_campaign
 
     asked = read_campaign(campaign)
     folder = out or Path("out") / f"measure-{campaign.stem}"

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich.table import Table
 
+from unitcad.cli.output import console, print_json, progress, warn
 from unitcad.cli.shared_options import AsJson
-
-if TYPE_CHECKING:
-    from unitcad.lab.phantom import PhantomSet
+from unitcad.lab.phantom import PhantomSet, phantom_files, phantom_set
+from unitcad.lab.phantom.recipe import load_phantom
 
 
 def phantom(
@@ -26,9 +28,6 @@ def phantom(
     Recipe, box with a screed frame a layer, lid, stage holder, procedure, bench sheet, the tissue for
     an estimate, and the response to expect. The last line printed is the folder.
     """
-    from unitcad.cli.output import print_json, progress, warn
-    from unitcad.lab.phantom import phantom_files, phantom_set
-    from unitcad.lab.phantom.recipe import load_phantom
 
     table = load_phantom(source)
     with progress("phantom") as stage:
@@ -42,8 +41,6 @@ def phantom(
         folder = out / f"phantom-{table.name}"
         faults = phantom_files.write(folder, found, made.printer.name)
     if as_json:
-        from dataclasses import asdict
-
         print_json(
             {
                 "folder": str(folder),
@@ -62,9 +59,6 @@ def phantom(
 
 
 def _print(made: PhantomSet) -> None:
-    from rich.table import Table
-
-    from unitcad.cli.output import console
 
     screen, e = console(), made.expected
     layers = Table("layer", "silicone", "thinner", "kPa", "mm", "0.1 mm thinner")

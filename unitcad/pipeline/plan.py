@@ -13,7 +13,6 @@ from functools import cache, lru_cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -35,11 +34,8 @@ from unitcad.pipeline.scenes import pictures
 from unitcad.shape import Shape, content_hash
 from unitcad.shape.body import Body, copies, part_names
 from unitcad.spec import Spec
-from unitcad.spec.asked import Format
+from unitcad.spec.asked import OUTPUTS, Output
 
-Output = Literal["unit", "moulds", "estimate", "casting"]
-OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
-FORMATS: tuple[Format, ...] = ("step", "stl", "3mf", "svg", "png", "glb")
 GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
 KERNELS = {

@@ -20,10 +20,10 @@ from unitcad.errors import UnitcadError
 from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product, Progress, Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
-from unitcad.pipeline.plan import FORMATS, OUTPUTS, checked_outputs, code_version
+from unitcad.pipeline.plan import checked_outputs, code_version
 from unitcad.pipeline.subjects import subject
 from unitcad.spec import read_toml
-from unitcad.spec.asked import Format
+from unitcad.spec.asked import FORMATS, OUTPUTS, Format
 
 LOCK = re.compile(r"\.[a-z0-9-]+-[0-9a-f]{12}\.lock")
 PAGE = "report.html"

@@ -6,8 +6,17 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.text import Text
 
+from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
+from unitcad.files import seen_from
+from unitcad.search import design_files
+from unitcad.search import design_words as words
+from unitcad.search.design_words import explanation_lines
+from unitcad.search.explanation import explain as explained
+from unitcad.search.proposals import invert
+from unitcad.search.target_file import load_target
 
 
 def design(
@@ -27,13 +36,6 @@ def design(
     Each proposal has its probability of meeting the level at the edge, with a range, and what no measurement covers.
     The last line printed is the folder: ranking.csv, front.svg, design.md, design.html, and specs to build.
     """
-    from unitcad.cli.output import console, print_json, progress
-    from unitcad.files import seen_from
-    from unitcad.search import design_files
-    from unitcad.search.design_words import explanation_lines
-    from unitcad.search.explanation import explain as explained
-    from unitcad.search.proposals import invert
-    from unitcad.search.target_file import load_target
 
     wish = load_target(target)
     if explain is None:
@@ -61,10 +63,6 @@ def design(
 
 
 def _print(data: dict[str, Any]) -> None:
-    from rich.text import Text
-
-    from unitcad.cli.output import console
-    from unitcad.search import design_words as words
 
     screen = console()
     screen.print(Text.assemble((data["name"], "bold"), f": {words.wish_line(data['wish'])}"), soft_wrap=True)

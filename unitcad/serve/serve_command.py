@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import threading
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from unitcad.cli.shared_options import AllowCode
+from unitcad.serve.addresses import TOKEN
+from unitcad.serve.server import serve as run
 
 
 def serve(
@@ -29,13 +32,10 @@ def serve(
     A change of a number shows unit, moulds, refusals and estimate at once. Ctrl-C ends it.
     The environment variable UNITCAD_TOKEN is the token in the address; left out, a random one.
     """
-    from unitcad.serve.addresses import TOKEN
-    from unitcad.serve.server import serve as run
 
     def ready(address: str) -> None:
         typer.echo(address)
         if browser:
-            import threading
             import webbrowser
 
             # open() waits for the end of a browser in the terminal, or of one that $BROWSER names.

@@ -28,6 +28,9 @@ Cavities = Annotated[int, Meta(ge=1)]
 Vents = Annotated[int, Meta(ge=1, le=1000)]
 TailWidth = Annotated[float, Meta(ge=LEAST_TAIL, le=kinds.LONGEST_MM)]
 Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
+FORMATS: tuple[Format, ...] = ("step", "stl", "3mf", "svg", "png", "glb")
+Output = Literal["unit", "moulds", "estimate", "casting"]
+OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
 _LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
 _TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
 Moduli = Literal["dynamic", "quasi-static"]

@@ -12,9 +12,9 @@ from typing import Any
 from unitcad import notebook
 from unitcad.arguments import check_number, path, texts
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
-from unitcad.pipeline.plan import OUTPUTS, checked_outputs
+from unitcad.pipeline.plan import checked_outputs
 from unitcad.report.batch_table import read_batch
-from unitcad.spec.asked import Format
+from unitcad.spec.asked import OUTPUTS, Format
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import Summary
 from unitcad.sweeps.estimate_table import write_estimates

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from msgspec import to_builtins
 
-from unitcad.cli.output import warn
+from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import (
     AllowCode,
     AsJson,
@@ -23,10 +24,19 @@ from unitcad.cli.shared_options import (
     outputs,
     overrides,
 )
-
-if TYPE_CHECKING:
-    from unitcad.sweeps import BatchOptions, Summary
-    from unitcad.sweeps.batch_records import Preview
+from unitcad.errors import Refusal, WrongArgument
+from unitcad.meshcheck.findings import counted
+from unitcad.pipeline.write import PAGE
+from unitcad.report import write_report
+from unitcad.sweeps import BatchOptions, Summary, load_sweep
+from unitcad.sweeps.batch_call import checked_tables, folders_for, make
+from unitcad.sweeps.batch_progress import watching
+from unitcad.sweeps.batch_records import Preview
+from unitcad.sweeps.cluster import Certificates
+from unitcad.sweeps.executors import Workers
+from unitcad.sweeps.merging import merge
+from unitcad.sweeps.preview import preview
+from unitcad.sweeps.shards import shard_folders, shard_of
 
 
 def batch(
@@ -99,17 +109,6 @@ def batch(
     json_lines: Annotated[bool, typer.Option("--json-lines", help="One JSON object a line as variants end.")] = False,
 ) -> None:
     """Make every variant of a sweep, each distinct part once. The last line printed is the folder."""
-    from msgspec import to_builtins
-
-    from unitcad.cli.output import print_json
-    from unitcad.errors import Refusal
-    from unitcad.sweeps import BatchOptions, load_sweep
-    from unitcad.sweeps.batch_call import checked_tables, folders_for, make
-    from unitcad.sweeps.batch_progress import watching
-    from unitcad.sweeps.cluster import Certificates
-    from unitcad.sweeps.executors import Workers
-    from unitcad.sweeps.preview import preview
-    from unitcad.sweeps.shards import shard_of
 
     named = listed(table) if table is not None else None
     if sweep == "merge":
@@ -157,7 +156,6 @@ _OF_MERGE = ("sweep", "shards", "out", "folders", "cache", "table", "page", "as_
 
 def _confirm_merges(ctx: typer.Context) -> None:
     """Raise WrongArgument for an option that a merge would not read."""
-    from unitcad.errors import WrongArgument
 
     for parameter in ctx.command.params:
         source = ctx.get_parameter_source(parameter.name or "")
@@ -170,11 +168,6 @@ def _confirm_merges(ctx: typer.Context) -> None:
 
 def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: bool, as_json: bool) -> None:
     """Join shards as one batch: in the folder that holds them, or in `out`."""
-    from msgspec import to_builtins
-
-    from unitcad.cli.output import print_json
-    from unitcad.sweeps.merging import merge
-    from unitcad.sweeps.shards import shard_folders
 
     folders = [each for path in named for each in (shard_folders(path) or [path])]
     whole = out or (folders[0].parent if folders else Path())
@@ -196,19 +189,14 @@ def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: boo
 
 def _write_page(folder: Path, asked: bool) -> None:
     """Write a batch's page where it is asked for; one that is there is kept up."""
-    from unitcad.cli.output import progress
-    from unitcad.pipeline.write import PAGE
 
     if asked or (folder / PAGE).is_file():
-        from unitcad.report import write_report
-
         with progress(folder.name) as say:
             say("page")
             write_report(folder, warn)
 
 
 def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> None:
-    from unitcad.meshcheck.findings import counted
 
     for warning in summary.warnings:
         warn(f"warning: {warning}")
@@ -232,14 +220,12 @@ def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> N
 
 
 def _parts(summary: Summary) -> str:
-    from unitcad.meshcheck.findings import counted
 
     known = f"{counted(summary.reused, 'variant')} of known parts alone"
     return f"{counted(summary.geometries, 'geometry', 'geometries')}, {known}"
 
 
 def _print_preview(size: Preview) -> None:
-    from unitcad.meshcheck.findings import counted
 
     about = "" if size.exact else "about "
     typer.echo(f"{counted(size.variants, 'variant')} of {about}{counted(size.geometries, 'geometry', 'geometries')}")

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 
 from msgspec import to_builtins
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from unitcad.cli.output import console, print_json_line, stage_lines
 from unitcad.sweeps.batch_records import Summary
@@ -48,7 +49,6 @@ def _line(summary: Summary, outcome: VariantOutcome | None) -> None:
 
 @contextlib.contextmanager
 def _bar() -> Iterator[Watch]:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
         BarColumn(),

@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cache import DiskStore, default_root
+from unitcad.cli.output import print_json
 from unitcad.cli.shared_options import AsJson
+from unitcad.sweeps.result_folders import export_variants
 
 
 def export(
@@ -22,9 +25,6 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Make the folders of some variants of a batch, from its store. Each is a line printed."""
-    from unitcad.cache import DiskStore, default_root
-    from unitcad.cli.output import print_json
-    from unitcad.sweeps.result_folders import export_variants
 
     kept = DiskStore(where or default_root())
     try:
