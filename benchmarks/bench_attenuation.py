@@ -15,7 +15,7 @@ import numpy as np
 
 from unitcad.accuracy.hankel_peers import adaptive
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.crosstalk_matrix import Decays, crosstalk
+from unitcad.arrays.crosstalk import Decays, crosstalk
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.crosstalk import decay
 from unitcad.attenuation.edge.closed_form import Units

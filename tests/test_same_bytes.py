@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_file import array_templates
 from unitcad.validation import templates
 
 QUICK = ("encapsulating", "forearm-patch")

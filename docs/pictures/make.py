@@ -25,8 +25,8 @@ from PIL import Image  # noqa: E402
 from running import serving  # noqa: E402
 
 from unitcad.arrays.array_file import load_array  # noqa: E402
-from unitcad.arrays.crosstalk_files import crosstalk_files  # noqa: E402
-from unitcad.arrays.patch_moulds import patch_moulds  # noqa: E402
+from unitcad.arrays.crosstalk_maps import crosstalk_files  # noqa: E402
+from unitcad.arrays.patch import patch_moulds  # noqa: E402
 from unitcad.arrays.patch_pictures import pictures as patch_pictures  # noqa: E402
 from unitcad.cache import MemoryStore  # noqa: E402
 from unitcad.export.picture import draw  # noqa: E402

@@ -18,11 +18,10 @@ from casting_rules import broken_rules
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_hash, load_array
-from unitcad.arrays.array_summary import array_summary
+from unitcad.arrays.array_procedure import pocket_procedure
 from unitcad.arrays.arrayed import unit_folders
-from unitcad.arrays.patch import patch_bodies
-from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.arrays.pocket_procedure import pocket_procedure
+from unitcad.arrays.estimate_arrays import array_summary
+from unitcad.arrays.patch import patch_bodies, patch_moulds
 from unitcad.cache import MemoryStore
 from unitcad.casting.bill import mould_plates
 from unitcad.casting.procedure import Procedure, procedure

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.sweeps.sweep import load_sweep

@@ -13,13 +13,11 @@ import pytest
 
 import unitcad
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_file import array_templates, expanded, load_array
 from unitcad.arrays.array_tables import AskedArray
-from unitcad.arrays.array_units import expanded
 from unitcad.arrays.layouts import layouts
-from unitcad.arrays.outlines import rounded
-from unitcad.arrays.tail_ways import tails
+from unitcad.arrays.sheet import rounded
+from unitcad.arrays.tails import tails
 from unitcad.errors import Refusal
 from unitcad.validation import compound_kind, default_template, load, templates
 

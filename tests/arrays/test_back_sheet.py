@@ -10,7 +10,7 @@ from functools import cache
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds, mould_checks
 from unitcad.checks.draw import blocked
 from unitcad.errors import Refusal

@@ -10,8 +10,8 @@ from itertools import pairwise
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.array_procedure import back_sheet_procedure
+from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.drawings import HELD, TAPE_WIDTH, side_places, tape_places
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import pour_warnings

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.bending import bending
-from unitcad.arrays.crosstalk_matrix import pairs
-from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.arrays.patch_pictures import picture_names
-from unitcad.arrays.worn import FINEST, worn, wrapped
+from unitcad.arrays.crosstalk import pairs
+from unitcad.arrays.limb import bending
+from unitcad.arrays.patch import patch_moulds
+from unitcad.arrays.patch_pictures import FINEST, picture_names, worn, wrapped
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
 from unitcad.shape import box

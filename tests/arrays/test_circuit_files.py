@@ -13,11 +13,8 @@ import pytest
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.circuit.circuit_dxf import circuit_dxf
-from unitcad.arrays.circuit.circuit_svg import circuit_svg
-from unitcad.arrays.circuit.kicad_board import kicad_board
+from unitcad.arrays.circuit.circuit_files import circuit_dxf, circuit_svg, kicad_board, pad_table
 from unitcad.arrays.circuit.outline import circuit_body, outline
-from unitcad.arrays.circuit.pad_table import pad_table
 from unitcad.arrays.circuit.wiring import Wiring, wiring
 from unitcad.errors import Missing, Refusal
 from unitcad.geometry.segments import to_segment

@@ -14,10 +14,8 @@ import pytest
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.circuit.outline import outline
+from unitcad.arrays.crosstalk import BAND_HZ, MOST_LOADED, SHAPE, crosstalk, crosstalk_csv, crosstalk_lines, pairs
 from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
-from unitcad.arrays.crosstalk_matrix import BAND_HZ, MOST_LOADED, SHAPE, crosstalk, pairs
-from unitcad.arrays.crosstalk_table import crosstalk_csv
-from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.attenuation import UniformDisc
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.inputs import body

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_procedure import curved_procedure
 from unitcad.arrays.array_view import patch_model
 from unitcad.arrays.circuit.outline import circuit_body
-from unitcad.arrays.curved_procedure import curved_procedure
-from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.casting.figures import RESIN_LAYER_S
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.views import views

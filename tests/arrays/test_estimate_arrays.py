@@ -5,13 +5,11 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from unitcad.arrays.array_extras import extras
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.circuit.circuit_files import circuit_files, has_circuit
 from unitcad.arrays.circuit.outline import outline
-from unitcad.arrays.crosstalk_files import crosstalk_files
-from unitcad.arrays.crosstalk_matrix import crosstalk
-from unitcad.arrays.crosstalk_words import crosstalk_lines, ratios
+from unitcad.arrays.crosstalk import crosstalk, crosstalk_lines, ratios
+from unitcad.arrays.crosstalk_maps import crosstalk_files, extras
 from unitcad.cli import app
 from unitcad.errors import Refusal
 

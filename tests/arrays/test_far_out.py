@@ -10,10 +10,9 @@ from typing import Any
 
 import pytest
 
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_names import array_templates
-from unitcad.arrays.outlines import slot_profile
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.arrays.patch import patch_moulds
+from unitcad.arrays.sheet import slot_profile
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal, UnitcadError
 

@@ -9,11 +9,10 @@ import pytest
 from casting_rules import broken_rules
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.hidden_tails import MOST_NAMES, hidden_tails, hidden_tails_warning
-from unitcad.arrays.outlines import rounded
-from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.arrays.pocket_procedure import pocket_procedure
-from unitcad.arrays.tail_ways import tail_half_width, tail_length
+from unitcad.arrays.array_procedure import pocket_procedure
+from unitcad.arrays.patch import patch_moulds
+from unitcad.arrays.sheet import rounded
+from unitcad.arrays.tails import MOST_NAMES, hidden_tails, hidden_tails_warning, tail_half_width, tail_length
 from unitcad.casting.procedure import procedure
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds, overlap
 from unitcad.checks.finding import MouldFinding
 from unitcad.shape import Shape, box, cut, cylinder, moved, union

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_names import array_templates
-from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.arrays.piece_labels import Strip, on_pieces
+from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.arrays.patch import patch_moulds
+from unitcad.arrays.piece_seams import Strip, on_pieces
 from unitcad.kernels.mesh import realise
 from unitcad.moulds.dovetails import straight
 from unitcad.moulds.labels import set_label

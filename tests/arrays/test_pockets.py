@@ -9,7 +9,7 @@ import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.construction import constructions
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import check_moulds, overlap
 from unitcad.errors import Refusal
 from unitcad.export import stl

@@ -9,10 +9,8 @@ from typing import Any
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.back_sheet_drawing import drawing_of
-from unitcad.arrays.back_sheet_tools import _base_letters
-from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
-from unitcad.arrays.pry_slots import pieces
+from unitcad.arrays.constructions.back_sheet import _base_letters, drawing_of, pieces
+from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.export import stl

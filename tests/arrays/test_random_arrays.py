@@ -10,7 +10,7 @@ import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.construction import constructions
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.validation import default_template, put, templates

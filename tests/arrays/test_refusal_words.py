@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.errors import Refusal, unknown_key, unknown_name
 
 

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_names import array_templates
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.figures import FDM_ERROR, print_min
 from unitcad.export import slicer, stl
 from unitcad.export.printing import print_ready

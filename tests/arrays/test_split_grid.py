@@ -11,11 +11,11 @@ from itertools import combinations, pairwise
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.back_sheet_drawing import drawing_of
-from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
-from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.array_procedure import back_sheet_procedure
+from unitcad.arrays.constructions.back_sheet import drawing_of
+from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.arrays.patch_pictures import taken_apart
-from unitcad.arrays.seam_weep import weep
+from unitcad.arrays.piece_seams import weep
 from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
 from unitcad.export import stl

@@ -11,8 +11,8 @@ from itertools import pairwise
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
-from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.array_procedure import back_sheet_procedure
+from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
 from unitcad.export import stl

@@ -9,9 +9,8 @@ import pytest
 from casting_rules import broken_rules
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
-from unitcad.arrays.curved_procedure import curved_procedure
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.array_procedure import back_sheet_procedure, curved_procedure
+from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.pouring import LEVEL_AGAIN, TACK
 from unitcad.casting.procedure import Pour, Procedure, procedure
 from unitcad.moulds.mould_set import MouldSet

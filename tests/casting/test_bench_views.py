@@ -12,9 +12,8 @@ from manifold3d import Manifold
 from PIL import Image
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
-from unitcad.arrays.curved_procedure import curved_procedure
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.array_procedure import back_sheet_procedure, curved_procedure
+from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.drawings import ARROW, BAND, CARD, GREASE, TAPE, tongue_prop
 from unitcad.casting.pictures import SIZE, BenchPictures, pictures
 from unitcad.casting.procedure import Procedure, procedure

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.array_procedure import back_sheet_procedure
+from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.catalogue import materials

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.bill import mould_plates
 from unitcad.casting.preparation import printing
 from unitcad.moulds.mould_set import MouldSet

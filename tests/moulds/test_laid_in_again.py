@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import draw, overlap
 from unitcad.moulds.plan import Step
 from unitcad.moulds.removal import CAST, Removal, Way

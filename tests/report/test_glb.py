@@ -12,8 +12,7 @@ import pytest
 import trimesh
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch import patch_bodies, patch_parts
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.export import glb
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.pipeline.plan import glb_content, patch_glb

@@ -17,13 +17,11 @@ import trimesh
 from live import Live
 from running import Server, serving
 
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.array_view import patch_glb
+from unitcad.arrays.crosstalk import crosstalk
 from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
-from unitcad.arrays.crosstalk_matrix import crosstalk
-from unitcad.arrays.patch import patch_parts
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch import patch_moulds, patch_parts
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import read_campaign

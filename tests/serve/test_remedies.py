@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
-from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_file import array_templates
 from unitcad.serve.answers import answered
 from unitcad.serve.messages import Ask, Edit, Fault, Trusted, What
 from unitcad.serve.server import _trusted

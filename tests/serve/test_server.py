@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from running import Server, serving
 
-from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_file import array_templates
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.serve.server import serve
 from unitcad.validation import custom_templates

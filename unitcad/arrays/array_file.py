@@ -1,8 +1,4 @@
-"""Array files: a template, a file or plain data to an array with everything settled, or one refusal.
-
-A unit is a template, a spec file beside the array file, or a table of a spec's keys in which `like` names where the
-others come from.
-"""
+"""From an array's file, or plain data, to an array with everything settled."""
 
 from __future__ import annotations
 
@@ -11,36 +7,176 @@ import hashlib
 import json
 import math
 import os
+import re
 from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from unitcad.arrays.array import Array, Placed, Sheet
-from unitcad.arrays.array_names import array_templates
-from unitcad.arrays.array_tables import AskedArray
-from unitcad.arrays.array_units import expanded, merged, unit_data, with_changes
-from unitcad.arrays.asked_places import layout_of, places_of
+from unitcad.arrays.array_tables import AskedArray, PlaceTable
 from unitcad.arrays.construction import Construction, construction_of
-from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point
+from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
 from unitcad.arrays.layouts.ring import RingTable
-from unitcad.arrays.made_plan import made_plan
 from unitcad.arrays.offers import offered
-from unitcad.arrays.sheet_outline import middle_radius, sheet_of
-from unitcad.arrays.tail_ways import Blocked, angles
+from unitcad.arrays.sheet import middle_radius, sheet_of
+from unitcad.arrays.tails import Blocked, angles
 from unitcad.designs.limits import up
-from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
+from unitcad.moulds.plan import Plan
 from unitcad.shape import mm
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.custom_code import with_source
+from unitcad.spec.fields import fields_of
 from unitcad.spec.toml import text_of
-from unitcad.validation import default_template, from_data, templates
+from unitcad.text import listed
+from unitcad.validation import custom_templates, default_template, from_data, templates
 from unitcad.validation.dotted import ABSENT, at
 from unitcad.validation.faults import line_of
-from unitcad.validation.load import changed
-from unitcad.validation.shipped_files import named_file
+from unitcad.validation.load import changed, override
+from unitcad.validation.shipped_files import named_file, shipped_files
 from unitcad.validation.tables import Changes, changes_of
+
+
+def array_templates() -> dict[str, Path]:
+    """Return the shipped arrays by name."""
+    return shipped_files("arrays")
+
+
+_UNIT = re.compile(r"((?:place\.\d+\.)?unit)(?:\.(.+))?")
+"""The path of a unit, or of a value in it."""
+
+
+def with_changes(
+    written: Mapping[str, Any], file: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]
+) -> dict[str, Any]:
+    """Return an expanded array's plain data with changes by `changes_of` put in: those of values in units last.
+
+    `file`: the data as the file has it, of which a unit whose `like` is changed keeps its other keys.
+    """
+    whole, inside = override(written, ()), []
+    for change in changes:
+        path = (change.partition("=")[0] if isinstance(change, str) else change[0]).strip()
+        unit = _UNIT.fullmatch(path)
+        if unit is None:
+            whole = changed(whole, [change])
+        elif unit[2] in (None, "like"):
+            value = at(changed({}, [change]), path)
+            if unit[2]:
+                own = at(file, unit[1])
+                value = {**(own if isinstance(own, dict) else {}), "like": value}
+            whole = changed(whole, [(unit[1], unit_data(value, unit[1], Path()))])
+        else:
+            inside.append(change)
+    return changed(whole, inside)
+
+
+def expanded(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
+    """Return an array's plain data with the whole spec of each unit in it. Raises Refusal for a unit not found."""
+    whole = copy.deepcopy(dict(data))
+    if "unit" in whole:
+        whole["unit"] = unit_data(whole["unit"], "unit", folder)
+    places = whole.get("place")
+    for i, place in enumerate(places if isinstance(places, list) else ()):
+        if isinstance(place, dict) and "unit" in place:
+            place["unit"] = unit_data(place["unit"], f"place.{i}.unit", folder)
+    return whole
+
+
+def unit_data(given: Any, field: str, folder: Path) -> Any:
+    """Return the plain data of a unit's spec: what `like` names, with the other keys in place of its own."""
+    at_field = field if isinstance(given, str) else f"{field}.like"
+    if isinstance(given, str):
+        given = {"like": given}
+    if not isinstance(given, dict) or "like" not in given:
+        return with_source(given, folder) if isinstance(given, dict) else given
+    own = {key: value for key, value in given.items() if key != "like"}
+    if not isinstance(given["like"], str):
+        raise Refusal(at_field, given["like"], "takes a text: the name of a template, or a spec file")
+    known = templates() | custom_templates()
+    if given["like"] in array_templates() and given["like"] not in known:
+        raise Refusal(at_field, given["like"], "is an array; a unit is a single one")
+    path = named_file(given["like"], known, at_field)
+    if path not in known.values():
+        path = folder / path
+        if not path.is_file():
+            raise Refusal(at_field, given["like"], f"there is no file {path}")
+    base = with_source(read_toml(path), path.parent)
+    return merged(base, with_source(own, folder))
+
+
+def merged(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a table with the keys of another in place of its own, and so the tables in it."""
+    result = dict(base)
+    for key, value in own.items():
+        there = result.get(key)
+        result[key] = merged(there, value) if isinstance(there, dict) and isinstance(value, dict) else value
+    return result
+
+
+def layout_of(asked: AskedArray) -> tuple[Any, LayoutKind]:
+    """Return the layout's table and kind."""
+    name = asked.layout.get("kind")
+    if name is None:
+        raise Refusal("layout.kind", None, f"is required: one of {', '.join(layouts())}")
+    if not isinstance(name, str) or name not in layouts():
+        raise unknown_name("layout.kind", str(name), layouts())
+    kind = layouts()[name]
+    own = set(fields_of(kind.table))
+    of_others = {key for each in layouts().values() for key in fields_of(each.table)} - own
+    if foreign := [key for key in asked.layout if key in of_others]:
+        keys = listed([f"layout.{key}" for key in foreign])
+        limit = f"unknown key; a layout of the kind {name!r} has no such keys: leave out {keys}"
+        raise UnknownKey(f"layout.{foreign[0]}", asked.layout[foreign[0]], limit)
+    return convert(asked.layout, kind.table, "layout"), kind
+
+
+def places_of(asked: AskedArray, points: list[Point]) -> dict[int, int]:
+    """Return the number of each point that a [[place]] speaks of, with that table's number."""
+    found: dict[int, int] = {}
+    for i, place in enumerate(asked.place):
+        index = _number(place, i, points)
+        if index in found:
+            raise Refusal(f"place.{i}.at", _shown(place), f"place.{found[index]} speaks of it too")
+        found[index] = i
+    return found
+
+
+def _number(place: PlaceTable, i: int, points: list[Point]) -> int:
+    """Return the number of the point that a place speaks of."""
+    if isinstance(place.at, str):
+        names = [p.name for p in points]
+        if place.at not in names:
+            raise unknown_name(f"place.{i}.at", place.at, names)
+        return names.index(place.at)
+    column, row = place.at
+    there = {(p.column + 1, p.row + 1): n for n, p in enumerate(points)}
+    if (column, row) not in there:
+        nearest = min(there, key=lambda at: (abs(at[0] - column) + abs(at[1] - row), at))
+        raise Refusal(f"place.{i}.at", [column, row], "there is no such column and row", list(nearest))
+    return there[column, row]
+
+
+def _shown(place: PlaceTable) -> object:
+    return place.at if isinstance(place.at, str) else list(place.at)
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of `AskedArray`; its layout is one of the kinds, each with its own keys."""
+    document = msgspec.json.schema(AskedArray)
+    kinds = [kind.table for kind in layouts().values()]
+    tables, definitions = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
+    for table in definitions.values():
+        table["required"] = ["kind", *table.get("required", ())]
+    defs = {**document["$defs"], **definitions}
+    array = dict(defs["AskedArray"])
+    about = array["properties"]["layout"].get("description", "")
+    array["properties"] = {**array["properties"], "layout": {"description": about, "oneOf": list(tables)}}
+    return {**document, "$defs": {**defs, "AskedArray": array}}
+
 
 _OVERRIDES = ("moulds", "casting", "estimate", "output")
 """Tables of an array file that override those of its units."""
@@ -79,6 +215,17 @@ def makeable_array(data: Mapping[str, Any]) -> Array:
     array = array_of(data)
     made_plan(array)
     return array
+
+
+def made_plan(array: Array) -> Plan:
+    """Return tools and pours. Raises Refusal for tools that can't be made, and for a circuit that does not fit."""
+    way = construction_of(array.construction, array.cast)
+    made = way.plan(array)
+    if not way.own_tails:
+        from unitcad.arrays.circuit.outline import outline  # the mesh kernel: reading an array does without
+
+        outline(array)
+    return made
 
 
 def _locate(

@@ -12,7 +12,7 @@ from typing import Any
 from unitcad import files
 from unitcad.arrays.array_file import array_of
 from unitcad.arrays.array_view import array_model
-from unitcad.arrays.crosstalk_words import crosstalk_lines
+from unitcad.arrays.crosstalk import crosstalk_lines
 from unitcad.arrays.layouts import layouts
 from unitcad.casting.steps import duration
 from unitcad.checks import mould_checks

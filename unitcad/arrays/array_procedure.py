@@ -1,11 +1,605 @@
-"""How an array is cast: the procedure of its construction."""
+"""How an array is cast: the procedures of a back sheet, a curved mould and pockets."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import groupby
 
-from unitcad.arrays.patch_moulds import PatchMoulds
-from unitcad.casting.procedure import Procedure
+from msgspec import structs
+
+from unitcad import catalogue
+from unitcad.arrays.array import Array
+from unitcad.arrays.constructions.pockets import hold_strain
+from unitcad.arrays.layouts import layouts
+from unitcad.arrays.patch import PatchMoulds
+from unitcad.arrays.tails import hidden_tails, longer_tails, where_they_end
+from unitcad.casting.bill import Item, bill, consumed, injecting, motor_name, mould_plates
+from unitcad.casting.figures import (
+    LAY_IN_MIN,
+    LIFT_MIN,
+    PEEL_MIN,
+    PULL_MIN,
+    Batch,
+)
+from unitcad.casting.pouring import (
+    BondFace,
+    Face,
+    after_pours,
+    cure,
+    injected,
+    lid_held,
+    mixed,
+    motor_in,
+    never_pushed,
+    pour_steps,
+    shown,
+    struck,
+)
+from unitcad.casting.pouring import release as flat_release
+from unitcad.casting.pouring import shown as grams_shown
+from unitcad.casting.preparation import cleaning, fall, joining, level, printing
+from unitcad.casting.procedure import Procedure, pour_of, procedure, times
+from unitcad.casting.steps import NEEDS, BenchStep, Phase, duration, phases
+from unitcad.casting.views import picture_path, views
+from unitcad.catalogue import Material
+from unitcad.meshcheck.findings import counted
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
+from unitcad.shape.lettering import seen
+from unitcad.text import listed, number, spaced
+
+
+def back_sheet_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
+    """Return the procedure of an array whose units are cast with the sheet: nothing is meshed or drawn.
+
+    `layer_volumes_mm3`: of each pour, of all units together. `printed_mm3`: of all printed pieces.
+    """
+    made = procedure(moulds, layer_volumes_mm3, printed_mm3)
+    return replace(
+        made,
+        assembly=motors_in(made.assembly),
+        time_line=(*made.time_line[:-1], replace(made.time_line[-1], name="motors and circuit in")),
+        last="Motors and circuit in",
+    )
+
+
+def motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
+    """Return the steps of the assembly, each with its own title: soldering shows no state of the mould."""
+    solder, lay_in, cure = steps
+    return (
+        replace(solder, title="Solder the motors", picture=""),
+        replace(lay_in, title="Lay the circuit in", picture=picture_path("motor-in")),
+        cure,
+    )
+
+
+def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
+    """Return the procedure of an array that is cast round the limb: nothing is meshed or drawn.
+
+    `layer_volumes_mm3`: of each pour, of all units together. `printed_mm3`: of all printed pieces.
+    """
+    flat = moulds.cast_flat
+    assert flat is not None
+    made, shown = procedure(flat, layer_volumes_mm3[:-1], printed_mm3), views(flat)
+    spec, step = moulds.spec, moulds.plan.steps[-1]
+    injected_spec = structs.replace(spec, moulds=structs.replace(spec.moulds, pour="injected"))
+    under_lid = PatchMoulds(injected_spec, moulds.plan, array=moulds.array)
+    known, cells = catalogue.materials(spec.materials), len(flat.plan.layout.cells)
+    silicones = [known[each.material] for each in moulds.plan.steps]
+    # In the words of the whole set: what is cast flat bonds later, so its cup gets no release agent.
+    flat_batches = [
+        Batch(moulds, each, silicone, volume, cells)
+        for each, silicone, volume in zip(flat.plan.steps, silicones[:-1], layer_volumes_mm3[:-1], strict=True)
+    ]
+    batch = Batch(under_lid, step, silicones[-1], layer_volumes_mm3[-1], 1)
+    flat_pours = tuple(
+        replace(each, agent=(), steps=tuple(pour_steps(of, shown)))
+        for each, of in zip(made.pours, flat_batches, strict=True)
+    )
+    steps = (
+        *_laid_in(moulds, flat, silicones[0]),
+        *_lid_on(moulds, step),
+        *mixed(batch),
+        *injected(batch, _picture(step, "inject")),
+        cure(batch, "the bead on a vent", "layer", _picture(step, "filled")),
+        _lid_off(moulds, step),
+    )
+    pours, prepared = (*flat_pours, pour_of(batch, steps)), (_sort_curved(moulds), *made.preparation[1:])
+    out, together = tuple(_out_of_curved(moulds, silicones[0])), motors_in(tuple(motor_in(moulds, silicones)))
+    every = [*prepared, *(each for one in pours for each in one.steps), *out, *together]
+    grams = [v * float(s.density_g_cm3) / 1000 for v, s in zip(layer_volumes_mm3, silicones, strict=True)]
+    return replace(
+        made,
+        name=spec.name,
+        label=moulds.plan.label,
+        **times(prepared, pours, out, "motors and circuit in", together),
+        printing=printing(moulds, printed_mm3, max(_heights(moulds))),
+        preparation=prepared,
+        pours=pours,
+        bonds=tuple(_bonds(moulds)),
+        release=out,
+        assembly=together,
+        measure=tuple(_measure_curved(moulds, grams)),
+        bill=(*_bill(moulds, [*flat_batches, batch], every), *injecting([batch])),
+        last="Motors and circuit in",
+    )
+
+
+def _picture(step: Step, name: str) -> str:
+    """Return the path of a view of the last pour."""
+    return picture_path(f"pour{step.index}-{name}")
+
+
+def _heights(moulds: PatchMoulds) -> Iterator[float]:
+    """Yield the heights of base and lid of the last pour as they are printed, mm."""
+    for tool in moulds.plan.tools:
+        if tool.step == len(moulds.plan.steps) and tool.made == "printed":
+            _, _, low, _, _, high = moulds.mesh(tool).bounding_box()
+            yield high - low
+
+
+def _base(moulds: PatchMoulds) -> str:
+    """Return what the base of the last pour is called."""
+    return spaced(moulds.plan.base_of(moulds.plan.steps[-1]))
+
+
+def _sort_curved(moulds: PatchMoulds) -> BenchStep:
+    plan, label = moulds.plan, seen(moulds.plan.label)
+    last = plan.steps[-1]
+    cups = listed(f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps[:-1])
+    return BenchStep(
+        "Sort the pieces",
+        f"Print the pieces as they lie in their files, without supports. All are engraved {label}. The flat ones are "
+        f"for Layer 1: the base has a b before it, and of the cups {cups}. The curved ones are for the last pour: "
+        f"{_base(moulds)} has B{last.index:X} before it, {spaced(last.lid or '')} L{last.index:X}.",
+        picture_path("pieces"),
+        minutes=5.0,
+    )
+
+
+def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
+    """Say how the inner layers leave their flat base and come to lie on the curved one."""
+    units, base, step = len(moulds.arranged.places), _base(moulds), moulds.plan.steps[-1]
+    lid = spaced(step.lid or "")
+    cast = "Layer 1" if step.index == 2 else f"Layers 1 to {step.index - 1}"
+    pulled = next(iter(flat_release(flat, inner)))
+    yield replace(pulled, title="Filament out of the flat base", picture=picture_path("flat-filament-out"))
+    yield BenchStep(
+        f"{cast} out",
+        f"Peel {cast} of each unit straight up off the flat base, its edge loosened with a blunt spatula. They differ "
+        "in the notches of the circuit: lay each down on paper at its own place, the same way round as in the mould. "
+        "Trim the flash with small scissors.",
+        picture_path("flat-peel"),
+        minutes=PEEL_MIN * units,
+        needs=("small scissors", "blunt spatula", "paper"),
+    )
+    yield BenchStep(
+        f"Filament into {base}",
+        f"Cut {units} straight pieces of filament, {_lengths(moulds)} mm long. Hold {base} in the hand and push one "
+        "up through each core from below, until its lower end is flush with the underside. Then stand it down on a "
+        "flat board: it bears the filaments, so none can sink. Trim the upper end flush with the core's top with a "
+        "knife.",
+        _picture(step, "filament"),
+        minutes=3.0 * units,
+        needs=("sharp knife",),
+    )
+    yield BenchStep(
+        f"Level {base}",
+        f"Put {base} where it will stay and {lid} on it, dry. Lay a phone with its level, or a small spirit level, on "
+        f"{lid}, along it and across, and put paper under a corner of {base} until it shows less than 5 degrees: so "
+        f"much the vents clear (C400). Lift {lid} off again. {base.capitalize()} stays there: it is filled and cured "
+        "on this spot.",
+        _picture(step, "level"),
+        minutes=5.0,
+        needs=("level", "paper"),
+    )
+    yield BenchStep(
+        f"Wipe {cast}",
+        f"Wipe {cast} with isopropanol and let it dry. Its outside is the bond face: no release agent on it, ever, no "
+        "grease, no fingers.",
+        minutes=2.0 * units,
+        needs=("isopropanol and lint-free wipes",),
+    )
+    yield BenchStep(
+        f"Lay {cast} in",
+        f"Lay each one over its core of {base}, at the place where it was cast: A1 on A1, its notches over the fins. "
+        "Press its edge down all round until it lies on the floor of its moat and its top flat on the core: what "
+        "creeps under it fills the cavity's mouth. No release agent and no grease on core or moat.",
+        _picture(step, "laid-in"),
+        minutes=LAY_IN_MIN * units / 2,
+    )
+
+
+def _lengths(moulds: PatchMoulds) -> str:
+    """Return the lengths of the straight filaments, mm: along the unit's axis, from the core's top to the bench."""
+    array = moulds.arranged
+    radius, middle = array.radius_mm or 0.0, array.middle_radius_mm or 1.0
+    bottom = moulds.plan.tool(moulds.plan.base_of(moulds.plan.steps[-1])).shape
+    low = moulds.mesh_of(bottom).bounding_box()[2]
+    found: Counter[str] = Counter()
+    for place in array.places:
+        length = radius + moulds.plan.dimensions.core_height - (radius + low) / math.cos(place.x / middle)
+        found[number(math.ceil(length) + 1, 3)] += 1
+    return listed(f"{count} of {length}" for length, count in found.items())
+
+
+def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
+    lid, base = spaced(step.lid or ""), _base(moulds)
+    slit = number(moulds.spec.moulds.seat_relief_mm, 3)
+    yield BenchStep(
+        f"Lid {step.index} on",
+        f"Draw a thin line of petroleum jelly on the curved land of {base} round the sheet's bed, near its outer edge. "
+        f"Put {lid} on over the pins: one of them stands off the rectangle of the others, so it goes on one way only. "
+        f"Press it down until it bears on the land all round; at both ends, beside the pins, a slit of {slit} mm stays "
+        "open.",
+        _picture(step, "lid-on"),
+        minutes=LIFT_MIN,
+        needs=("petroleum jelly",),
+    )
+    yield lid_held(step, _picture(step, "lid-held"))
+
+
+def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
+    return BenchStep(
+        f"Lid {step.index} off",
+        "Take off what held the lid down. Lay a screwdriver into the slit at either end, beside the pins, and turn "
+        f"both a little at a time, until {spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents "
+        "tear off at the sheet. Trim them flush with a knife.",
+        _picture(step, "lid-off"),
+        minutes=LIFT_MIN,
+        needs=("sharp knife",),
+    )
+
+
+def _out_of_curved(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
+    """Describe the way from the cured sheet to a sleeve in the hand."""
+    units, base = len(moulds.arranged.places), _base(moulds)
+    yield BenchStep(
+        "Filament out",
+        f"Lift the mould off the bench and lay {base} on its side. Take each filament with pliers in its pocket and "
+        f"pull it out along itself: {never_pushed(moulds.spec, inner)}",
+        picture_path("filament-out"),
+        minutes=PULL_MIN * units,
+        needs=("narrow pliers",),
+    )
+    yield BenchStep(
+        "Peel off",
+        "Loosen the sheet's edge all round with a blunt spatula. Begin at one end: lift it, and draw each unit off its "
+        "core square to the base at its place, row after row. Straight up only the middle ones come. The "
+        "picture shows the way of each part; the sheet stays in one piece. Trim the flash with small scissors.",
+        picture_path("peel"),
+        minutes=PEEL_MIN * units,
+        needs=("small scissors", "blunt spatula"),
+    )
+
+
+def _bonds(moulds: PatchMoulds) -> Iterator[BondFace]:
+    """Yield every face of the tools that forms what bonds later."""
+    *inner, last = moulds.plan.steps
+    for step in inner:
+        yield BondFace(Face(step.cup, "bore"), f"layer {step.index + 1}")
+    yield BondFace(Face(moulds.plan.base_of(inner[0]), "core"), "motor")
+    yield BondFace(Face(moulds.plan.base_of(inner[0]), "seat"), "the next layer")
+    yield BondFace(Face(moulds.plan.base_of(last), "core and moat"), f"layer {last.index - 1}")
+
+
+def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
+    array: Array = moulds.arranged
+    yield moulds.across
+    yield (
+        f"The sheet between the units: {grams_shown(array.sheet.thickness_mm, 2)} mm thick, at its four edges and in "
+        "its middle. A lid that did not sit down shows here."
+    )
+    weights = " + ".join(grams_shown(each) for each in grams) + f" = {grams_shown(sum(grams))}"
+    yield f"Weigh one {moulds.makes}, trimmed, without motors and circuit: {weights} g. Less means air."
+
+
+def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchStep]) -> Iterator[Item]:
+    """Yield the bill of the whole set, its filaments told apart: bent ones, and straight ones."""
+    places = len(moulds.arranged.places)
+    for item in bill(moulds, batches, steps, after_pours(moulds, [batch.silicone for batch in batches])):
+        if item.item == "filament stub":
+            size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
+            yield replace(item, quantity=item.quantity - places)
+            yield Item("filament stub, straight", places, "piece", "cut", f"{size}: {_lengths(moulds)} mm long")
+        elif item.item == "adhesive tape":
+            # The last pour is held by bands.
+            yield replace(item, quantity=item.quantity * (1 - 1 / len(moulds.plan.steps)))
+        else:
+            yield item
+
+
+ONCE = frozenset(NEEDS)
+"""What one piece, dab or roll of is enough for every casting."""
+
+
+def pocket_bill(
+    moulds: PatchMoulds, batch: Batch, steps: Iterable[BenchStep], units: Mapping[str, Procedure]
+) -> tuple[Item, ...]:
+    """Return the bill of units and sheet. `batch` and `steps`: of the sheet; `units` by their folder."""
+    silicone, mix = batch.silicone, batch.mix
+    net = f"sheet: {number(mix.net_g, 3)} g net"
+    own = [
+        *_pieces(moulds),
+        Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", net),
+        Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", net),
+        *_wires(moulds.arranged),
+        *consumed(moulds, [batch], steps),
+    ]
+    return tuple(_added([*_scaled(moulds.arranged, units), *own]))
+
+
+def counts(array: Array) -> list[int]:
+    """Return how many places hold each distinct unit, in the order of `Array.units`."""
+    held = Counter(array.units.index(place.unit) for place in array.places)
+    return [held[i] for i in range(len(array.units))]
+
+
+def castings(count: int, unit: Procedure) -> int:
+    """Return how often a unit's mould has to be filled for so many units."""
+    return math.ceil(count / unit.cells)
+
+
+def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
+    lengths = moulds.spec.moulds
+    note = f"for the sheet: {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
+    for tool in moulds.plan.pieces:
+        attitude = "upside down" if tool.upside_down else "as drawn"
+        yield Item(moulds.plan.called(tool.name), 1, "piece", f"printed {attitude}", note)
+
+
+def _wires(array: Array) -> Iterator[Item]:
+    """List the wires of the tails that end under the sheet, two for each: a motor has two poles."""
+    if hidden := hidden_tails(array):
+        longest = number(max(tail.short_mm for tail in hidden), 2)
+        note = f"thin and insulated, two for each tail that ends under the sheet, at least {longest} mm and a connector"
+        yield Item("lead wire", 2 * len(hidden), "piece", "bought", note)
+
+
+def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
+    """Yield the lines of the units' bills for all units: their pieces once, what is used up as often as it is."""
+    for spec, count, (folder, unit) in zip(array.units, counts(array), units.items(), strict=True):
+        times = castings(count, unit)
+        inside = {motor_name(spec), "flexible circuit", "wire"}
+        for item in unit.bill:
+            if item.made.startswith(("printed", "cut")):
+                yield replace(item, note=f"for {folder}{f': {item.note}' if item.note else ''}")
+            elif item.unit == "g":
+                often = "1 casting" if times == 1 else f"{times} castings"
+                yield replace(item, quantity=times * item.quantity, note=f"{folder}, {often}: {item.note}")
+            elif item.item in inside:
+                yield replace(item, quantity=count * item.quantity / unit.cells)
+            elif item.made == "bought" and item.item not in ONCE:
+                yield replace(item, quantity=times * item.quantity)
+            else:
+                yield item
+
+
+def _added(items: Iterable[Item]) -> list[Item]:
+    """Return a bill in which each thing stands once: what is used up is added, of what is reused the most is taken.
+
+    A thing that is used up in two sizes has a line for each; of a tool in two sizes the larger one does.
+    """
+    found: dict[tuple[str, str, str], Item] = {}
+    for item in items:
+        once = item.item in ONCE or item.made == "tool"
+        key = item.item, item.unit, "" if item.unit == "g" or once else item.note
+        there = found.get(key)
+        if there is None:
+            found[key] = item
+        elif item.unit == "g":
+            quantity, note = there.quantity + item.quantity, f"{there.note}; {item.note}"
+            found[key] = replace(there, quantity=quantity, note=note)
+        elif item.made == "bought" and not once:
+            found[key] = replace(there, quantity=there.quantity + item.quantity)
+        else:
+            larger = max(there, item, key=lambda each: each.least_ml or 0.0)
+            found[key] = replace(larger, quantity=max(there.quantity, item.quantity))
+    return list(found.values())
+
+
+PUSH_MIN = 1.0
+"""To push one unit into its pocket and turn it (assumed)."""
+SOLDER_MIN = 3.0
+"""To solder wires to one tail (assumed)."""
+
+
+def pocket_procedure(
+    moulds: PatchMoulds, sheet_mm3: float, printed_mm3: float, units: Mapping[str, Procedure]
+) -> Procedure:
+    """Return the procedure of an array whose units are cast apart.
+
+    `sheet_mm3`: volume of the sheet. `printed_mm3`: of tray and blade. `units`: the procedure of each distinct unit
+    by its folder, in the order of `Array.units`.
+    """
+    array, spec, (step,) = moulds.arranged, moulds.spec, moulds.plan.steps
+    silicone = catalogue.materials(spec.materials)[step.material]
+    batch = Batch(moulds, step, silicone, sheet_mm3, 1)
+    cast = tuple(_units(array, units))
+    prepared = (
+        BenchStep("Sort the pieces", _sort(moulds), picture_path("pieces"), minutes=5.0),
+        *cleaning(moulds, [silicone]),
+        *joining(moulds),
+        # The sheet must not get thinner at one end by more than a dent.
+        level(
+            f"{fall(moulds)}. Put the tray where it will stay. Lay a phone with its level, or a small spirit level, on "
+            "the cores, which are as high as the wall, along the tray and across, and put paper under a corner until "
+            "it shows less. The tray stays there: it is poured and cured on this spot."
+        ),
+    )
+    poured = (
+        *mixed(batch),
+        *struck(
+            batch,
+            "Pour in a thin thread, first along the wall and round every core, until the tray stands over its rim and "
+            "the cores are covered. Prick the bubbles that you see with a pin.",
+            "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke from end to "
+            "end: it runs on rim and cores. What it takes goes into the groove.",
+            " The film that it leaves on the cores cures too and is trimmed at the end.",
+            len(array.places),
+            1,
+            picture_path,
+        ),
+        cure(batch, "the silicone in the groove", "sheet", picture_path("filled")),
+    )
+    out = tuple(_out(moulds))
+    together = tuple(_together(array, moulds))
+    sheet = [("sheet: preparation", prepared), ("sheet: pour", poured), ("sheet: out of the mould", out)]
+    until = _side_by_side(phases([("units", cast)]), phases(sheet), _first_cure(units))
+    finish = max(phase.end_min for phase in until)
+    line = (*until, *_later(phases([("units in", together)]), finish))
+    pour = replace(pour_of(batch, poured), layer="sheet")
+    grams = sheet_mm3 * float(silicone.density_g_cm3) / 1000
+    return Procedure(
+        name=array.name,
+        label=moulds.plan.label,
+        cells=1,
+        vacuum=spec.casting.vacuum,
+        tunnels=(),
+        earliest_finish_min=finish,
+        bench_min=sum(phase.bench_min for phase in until),
+        time_line=line,
+        printing=tuple(_printing(moulds, printed_mm3, array, units)),
+        preparation=(*cast, *prepared),
+        off_grid=(),
+        unit_heights=(),
+        pours=(pour,),
+        bonds=(),
+        release=out,
+        assembly=together,
+        measure=tuple(_measure(array, grams, units)),
+        eccentricity=None,
+        without_ribs=None,
+        walls=(),
+        bill=pocket_bill(moulds, batch, [*prepared, *poured, *out, *together], units),
+        makes="sheet",
+        last="Units in",
+    )
+
+
+def _first_cure(units: Mapping[str, Procedure]) -> float:
+    """Return when the first pour of the first units cures, min: until then the bench is theirs."""
+    first = next(iter(units.values()), None)
+    poured = first and next((phase for phase in first.time_line if phase.name == "pour 1"), None)
+    return poured.end_min - 60 * first.pours[0].cure_h if first and poured else 0.0
+
+
+def _later(line: Iterable[Phase], by: float) -> tuple[Phase, ...]:
+    """Return phases that begin later."""
+    return tuple(replace(phase, start_min=phase.start_min + by) for phase in line)
+
+
+def _side_by_side(units: Iterable[Phase], sheet: Iterable[Phase], after: float) -> tuple[Phase, ...]:
+    """Return the phases of units and sheet in the order of their beginnings; the sheet's begin `after` so long."""
+    return tuple(sorted((*units, *_later(sheet, after)), key=lambda phase: phase.start_min))
+
+
+def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
+    """Say how the units are made first: by their own procedures, as often as their mould has to be filled."""
+    for i, (count, (folder, unit)) in enumerate(zip(counts(array), units.items(), strict=True)):
+        times = castings(count, unit)
+        cavities = "one cavity" if unit.cells == 1 else f"{unit.cells} cavities"
+        filled = "one casting" if times == 1 else f"{times} castings, one after the other,"
+        take = "takes" if times == 1 else "take"
+        whole, bench = unit.time_line[-1].end_min, sum(phase.bench_min for phase in unit.time_line)  # motors in
+        # One sheet is cast, beside the first of them.
+        after = duration(_first_cure(units)) if not i else ""
+        beside = f"Begin the sheet beside them, while their first pour cures, {after} from now." if after else ""
+        more = "" if unit.cells >= count else " More cavities (moulds.cavities) or a second set of moulds save days."
+        yield BenchStep(
+            "Cast the units",
+            f"Cast {count} of {unit.name} by {folder}/casting.md, motors in: {filled} in moulds of {cavities} {take} "
+            f"{duration(times * whole)}, of which {duration(times * bench)} at the bench. "
+            f"{beside}{more} Try every motor.",
+            kind="cure",
+            minutes=times * bench,
+            wait_min=times * (whole - bench),
+        )
+
+
+def _sort(moulds: PatchMoulds) -> str:
+    tray, files = (
+        listed(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base")),
+        listed(mould_plates(moulds)),
+    )
+    return (
+        f"Print tray ({tray}){_and_blade(moulds)} as they lie in {files}, without supports. The tray is engraved "
+        f"{seen(f'B{moulds.plan.label}')}."
+    )
+
+
+def _and_blade(moulds: PatchMoulds) -> str:
+    """Name the blade where it is printed too."""
+    return " and blade" * all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
+
+
+def _printing(moulds: PatchMoulds, solid_mm3: float, array: Array, folders: Iterable[str]) -> Iterator[str]:
+    yield from printing(moulds, solid_mm3)
+    of_units = zip(folders, array.units, strict=True)
+    files = (f"{folder}/{file}" for folder, unit in of_units for file in mould_plates(MouldSet(unit)))
+    yield f"The units' moulds: {listed(files)}, as their casting.md says."
+
+
+def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
+    thick = number(moulds.arranged.sheet.thickness_mm, 3)
+    yield BenchStep(
+        "Peel off",
+        "Cut the sheet free from the groove's silicone along the land. Loosen a corner with a blunt spatula and peel "
+        f"the sheet off slowly, up over the cores: it is {thick} mm thick and tears at a notch. Trim the flash round "
+        "the pockets and strap slots with small scissors.",
+        picture_path("peel"),
+        minutes=PEEL_MIN * 2,
+        needs=("small scissors", "blunt spatula"),
+    )
+
+
+def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
+    """Say how the units go in, and which way each one's tail points."""
+    if hidden := hidden_tails(array):
+        yield BenchStep(
+            "Wires on hidden tails",
+            f"{counted(len(hidden), 'tail')} would end under the sheet, {where_they_end(hidden)}. Nothing can be "
+            "joined to them once the units are in. Solder wires to the end of each now, longer than this way by what "
+            "the connector needs, and try the motor again. They leave between sheet and skin. Longer tails need none "
+            f"where the way is free. {longer_tails(hidden)}",
+            minutes=SOLDER_MIN * len(hidden),
+            needs=("soldering iron and solder",),
+        )
+    strains = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units}
+    stretch = listed(f"{number(100 * one, 2)} % round {number(size, 3)} mm" for size, one in sorted(strains.items()))
+    ordered = sorted(array.places, key=lambda place: place.angle_deg)
+    ways = listed(
+        f"{number(angle, 3)} degrees: {' '.join(place.name for place in places)}"
+        for angle, places in groupby(ordered, key=lambda place: place.angle_deg)
+    )
+    turned = (
+        " Turn each one until its tail points where it belongs. Angles count counter-clockwise from the way along a "
+        f"row to the right, seen from the back: {ways}."
+        if any(unit.fpcb or unit.wires for unit in array.units)
+        else ""
+    )
+    over = number(array.sheet.low, 3)
+    names = layouts()[array.layout["kind"]].naming
+    yield BenchStep(
+        "Units in",
+        f"Lay the sheet down with its back up, as it came out of the tray. Push each unit up into its pocket from "
+        f"below, back first, until the pocket's lower edge stands {over} mm over the unit's skin side all round: the "
+        f"pocket stretches by {stretch} and holds it. Water with a drop of soap helps; it dries.{turned} {names}",
+        picture_path("units-in"),
+        minutes=PUSH_MIN * len(array.places),
+    )
+
+
+def _measure(array: Array, grams: float, units: Mapping[str, Procedure]) -> Iterator[str]:
+    sheet = array.sheet
+    yield f"Thickness of the sheet: {shown(sheet.thickness_mm, 2)} mm, at the middle and at the corners."
+    for size in sorted({unit.diameter_mm for unit in array.units}):
+        yield f"A pocket for a unit of {shown(size, 2)} mm: {shown(size - 2 * sheet.hold_mm, 2)} mm across."
+    yield f"Weigh the sheet, trimmed: {shown(grams)} g. Less means air or a low strike."
+    yield "Each unit as its own procedure says, before it goes in."
 
 
 def array_procedure(
@@ -18,13 +612,7 @@ def array_procedure(
     """
     way = moulds.construction
     if way.own_tails:
-        from unitcad.arrays.pocket_procedure import pocket_procedure
-
         return pocket_procedure(moulds, layer_volumes_mm3[0], printed_mm3, of_units)
     if way.cast == "curved":
-        from unitcad.arrays.curved_procedure import curved_procedure
-
         return curved_procedure(moulds, layer_volumes_mm3, printed_mm3)
-    from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
-
     return back_sheet_procedure(moulds, layer_volumes_mm3, printed_mm3)

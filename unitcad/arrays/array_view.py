@@ -7,8 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.patch import PatchPart, patch_parts
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch import PatchPart, patch_moulds, patch_parts
 from unitcad.arrays.patch_pictures import laid_elsewhere, taken_apart
 from unitcad.export import glb
 from unitcad.moulds.mould_set import MouldSet

@@ -20,11 +20,11 @@ from typing import Any
 
 from unitcad import __version__
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_extras import extras
 from unitcad.arrays.array_file import (
     ArraySource,
     array_hash,
     array_of,
+    expanded,
     load_array,
     makeable_array,
     to_toml,
@@ -32,19 +32,17 @@ from unitcad.arrays.array_file import (
 )
 from unitcad.arrays.array_page import ARRAY_FILE, ArrayManifest, write_array_page
 from unitcad.arrays.array_procedure import array_procedure
-from unitcad.arrays.array_summary import array_summary
-from unitcad.arrays.array_units import expanded
 from unitcad.arrays.array_view import patch_glb
-from unitcad.arrays.bending import bending_record
 from unitcad.arrays.circuit.circuit_files import has_circuit
-from unitcad.arrays.circuit.tracks import crowded_tracks
+from unitcad.arrays.circuit.wiring import crowded_tracks
 from unitcad.arrays.construction import construction_of
-from unitcad.arrays.estimate_arrays import estimate_arrays
-from unitcad.arrays.hidden_tails import hidden_tails, hidden_tails_warning
+from unitcad.arrays.crosstalk_maps import extras
+from unitcad.arrays.estimate_arrays import array_summary, estimate_arrays
+from unitcad.arrays.limb import bending_record
 from unitcad.arrays.offers import offered
-from unitcad.arrays.patch import patch_bodies, patch_parts
-from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_parts
 from unitcad.arrays.patch_pictures import picture_names, pictures
+from unitcad.arrays.tails import hidden_tails, hidden_tails_warning
 from unitcad.cache import Store, digest
 from unitcad.casting.pictures import pictures as bench_pictures
 from unitcad.casting.procedure import Procedure

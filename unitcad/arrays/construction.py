@@ -72,8 +72,8 @@ def construction_of(name: Name, cast: Cast) -> Construction:
 
 @cache
 def _found() -> dict[tuple[str, str], Construction]:
-    """Return every CONSTRUCTION that a file of this room defines, by its name and cast."""
-    room = import_module(__package__ or "")
-    modules = (import_module(f"{room.__name__}.{file.name}") for file in pkgutil.iter_modules(room.__path__))
+    """Return every CONSTRUCTION that a file of `constructions` defines, by its name and cast."""
+    folder = import_module("unitcad.arrays.constructions")
+    modules = (import_module(f"{folder.__name__}.{file.name}") for file in pkgutil.iter_modules(folder.__path__))
     found = (module.CONSTRUCTION for module in modules if hasattr(module, "CONSTRUCTION"))
     return {(construction.name, construction.cast): construction for construction in found}

@@ -1,10 +1,8 @@
-"""Pictures of an array's crosstalk as SVG: a heat map of all pairs, the patch coloured by what adds up at each unit.
-
-Colours go from 0 to the largest value; values that are written alike have one colour.
-"""
+"""Maps and files of an array's crosstalk."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from html import escape
@@ -12,8 +10,11 @@ from itertools import groupby
 from typing import Any
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.circuit.circuit_svg import outline_path
-from unitcad.arrays.outlines import rounded, slot_profile
+from unitcad.arrays.circuit.circuit_files import circuit_files, has_circuit, outline_path
+from unitcad.arrays.circuit.outline import circuit_body, outline
+from unitcad.arrays.crosstalk import crosstalk, crosstalk_csv
+from unitcad.arrays.sheet import rounded, slot_profile
+from unitcad.errors import Missing, Refusal
 from unitcad.export.drawing import number
 from unitcad.shape import Profile
 from unitcad.text import number as number_of
@@ -200,3 +201,51 @@ def _percent(value: float) -> str:
     """Return a fraction in per cent: two digits, three from 100 on."""
     shown = 100.0 * value
     return f"{shown:.0f}" if shown >= 9.95 else number_of(shown, 2)
+
+
+JSON = "crosstalk.json"
+
+
+def crosstalk_files(
+    array: Array, circuit: Profile | None = None, data: dict[str, Any] | None = None
+) -> dict[str, bytes]:
+    """Return the files by their names; `circuit` is drawn on the patch, `data` what `crosstalk` gave, if it is known.
+
+    Raises Refusal for units without an estimate.
+    """
+    data = data or crosstalk(array)
+    return {
+        JSON: (json.dumps(data, indent=1, allow_nan=False) + "\n").encode(),
+        "crosstalk.csv": crosstalk_csv(array),
+        "crosstalk.svg": heat_map_svg(data).encode(),
+        "crosstalk-edge.svg": heat_map_svg(data, target="nearest_edge").encode(),
+        "crosstalk-patch.svg": patch_map_svg(array, data, circuit).encode(),
+    }
+
+
+CROSSTALK = JSON
+STEP = "circuit.step"
+
+
+def extras(array: Array, only: Sequence[str]) -> tuple[dict[str, bytes], dict[str, str]]:
+    """Return circuit and crosstalk files by their paths, as the outputs `only` ask for, and why one was left out.
+
+    Raises Refusal for a circuit that does not fit.
+    """
+    files: dict[str, bytes] = {}
+    lacking: dict[str, str] = {}
+    if "unit" in only:
+        files, lacking = circuit_files(array)
+        if files and "step" in array.unit.output.formats:
+            try:
+                from unitcad.export.step import content
+
+                files[STEP] = content([circuit_body(array)], "circuit")
+            except Missing as missing:
+                lacking[STEP] = str(missing)
+    if "estimate" in only:
+        try:
+            files |= crosstalk_files(array, outline(array) if has_circuit(array) else None)
+        except Refusal as refusal:
+            lacking[CROSSTALK] = str(refusal)
+    return files, lacking

@@ -11,18 +11,15 @@ from typing import Any
 from msgspec.structs import replace
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import array_of, makeable_array, to_toml
-from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_file import array_of, array_templates, expanded, makeable_array, to_toml
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.array_tables import AskedArray, BodyTable, CircuitTable, SheetTable
-from unitcad.arrays.array_units import expanded
 from unitcad.arrays.array_view import patch_model, tools_model
 from unitcad.arrays.arrayed import unit_folders
+from unitcad.arrays.crosstalk import crosstalk, crosstalk_lines
 from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
-from unitcad.arrays.crosstalk_matrix import crosstalk
-from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.arrays.layouts import layouts
-from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import in_short
 from unitcad.catalogue import materials

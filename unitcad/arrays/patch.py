@@ -1,18 +1,35 @@
-"""The patch as it is worn: sheet, units and what goes into them, each at its place (mm, z = 0 at the skin)."""
+"""The patch of an array: its bodies and parts, and its moulds."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import NamedTuple
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
+
+from msgspec import structs
 
 from unitcad.arrays.array import Array, Placed
+from unitcad.arrays.array_file import made_plan, makeable_array
 from unitcad.arrays.circuit.circuit_files import has_circuit
-from unitcad.arrays.circuit.laid import laid_circuit
-from unitcad.arrays.construction import construction_of
-from unitcad.arrays.limb_frame import at_place
-from unitcad.designs import unit_bodies
-from unitcad.shape import moved, rotated
+from unitcad.arrays.circuit.outline import laid_circuit
+from unitcad.arrays.construction import Construction, construction_of
+from unitcad.arrays.limb import at_place
+from unitcad.arrays.offers import offered, with_other_ways
+from unitcad.designs import Dimensions, unit_bodies
+from unitcad.designs.design import Fitting
+from unitcad.errors import Refusal
+from unitcad.moulds.mould_set import MouldSet, geometric
+from unitcad.moulds.plan import Plan, Step
+from unitcad.shape import Shape, cut, cylinder, moved, rotated
 from unitcad.shape.body import Body
+from unitcad.spec import Spec, to_json, with_formats
+from unitcad.spec.effective import CastLayer
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
 
 SHEET = "sheet"
 
@@ -68,3 +85,202 @@ def _at_places(array: Array, part: PatchPart) -> tuple[Body, ...]:
         )
         for place in part.places
     )
+
+
+@dataclass(frozen=True, eq=False)
+class PatchMoulds(MouldSet):
+    """The silicone of an array besides its units, as it is cast, and the tools and pours of it.
+
+    `spec` is that of the array's unit with the patch's own layers (see `patch_moulds`): what checks and procedure read
+    of lengths, silicones and lab. Frame of the tools, mm.
+    """
+
+    array: Array | None = None
+
+    @property
+    def arranged(self) -> Array:
+        """The array."""
+        assert self.array is not None
+        return self.array
+
+    @cached_property
+    def construction(self) -> Construction:
+        """The way that the array is made."""
+        return construction_of(self.arranged.construction, self.arranged.cast)
+
+    @cached_property
+    def blank(self) -> PatchMoulds:
+        """The same set with everything blank that the geometry does not read."""
+        spec = geometric(self.spec)
+        return self if spec == self.spec else PatchMoulds(spec, self.altered, array=self.array)
+
+    @cached_property
+    def geometry(self) -> str:
+        """What the geometry reads, as a text: places, sheet and lengths, no silicone and no name."""
+        array = self.arranged
+        distinct = [to_json(with_formats(geometric(unit))) for unit in array.units]
+        places = [(p.name, p.x, p.y, p.angle_deg, array.units.index(p.unit)) for p in array.places]
+        sheet = replace(array.sheet, material="")
+        reads = (array.construction, array.cast, array.radius_mm, distinct, places, sheet, array.circuit)
+        return f"{to_json(with_formats(geometric(self.spec)))} {reads!r}"
+
+    @cached_property
+    def unit(self) -> tuple[Body, ...]:
+        """The silicone as it is cast."""
+        return self.construction.bodies(self.arranged)
+
+    @cached_property
+    def laid_later(self) -> tuple[Body, ...]:
+        """The motors at their places and the common circuit, of units that are cast in one pour with the sheet."""
+        if self.construction.own_tails:
+            return ()
+        array, motors = self.arranged, [body for body in unit_bodies(self.arranged.unit) if body.kind == "motor"]
+        placed = [
+            replace(body, name=f"{p.name}-{body.name}", shape=at_place(array, body.shape, p))
+            for p in array.places
+            for body in motors
+        ]
+        return (*placed, *laid_circuit(array))
+
+    @cached_property
+    def pushed_in(self) -> tuple[Body, ...]:
+        """The units that pockets hold, at their places over the sheet as it is cast."""
+        if not self.construction.own_tails:
+            return ()
+        low = self.arranged.sheet.low
+        return tuple(replace(body, shape=moved(body.shape, z=-low)) for body in patch_bodies(self.arranged)[1:])
+
+    @cached_property
+    def together(self) -> tuple[tuple[str, tuple[Shape, ...]], ...]:
+        """What shares the space of the patch, by name: of pockets the units, and the sheet as it lies round them.
+
+        A pocket is stretched to its unit's radius: what the hold takes of the sheet is none of the overlap. A turned
+        unit's polygon lies within the circle round the pocket's.
+        """
+        if not self.construction.own_tails:
+            return super().together
+        array, round_polygon = self.arranged, 1 / math.cos(math.pi / self.segments)
+        (sheet,) = self.unit
+        high = array.sheet.thickness_mm
+        open_to = [
+            moved(cylinder(place.radius * round_polygon, -high, 2 * high), place.x, place.y) for place in array.places
+        ]
+        units: dict[str, list[Shape]] = {place.name: [] for place in array.places}
+        for body in self.pushed_in:
+            units[body.name.partition("-")[0]].append(body.shape)
+        return (SHEET, (cut(sheet.shape, open_to),)), *((name, tuple(shapes)) for name, shapes in units.items())
+
+    @cached_property
+    def cast_flat(self) -> PatchMoulds | None:
+        """The flat tools and pours of the inner layers alone, where the last pour is cast round the limb; else None.
+
+        Its silicone, motors and circuit are those of the whole array, laid flat.
+        """
+        plan, spec = self.plan, self.spec
+        if plan.standing(plan.steps[-1], "cup") or not plan.of_kind("cup"):
+            return None
+        steps, dims = plan.steps[:-1], plan.dimensions
+        standing = {name for step in steps for name in step.tools}
+        tools = tuple(tool for tool in plan.tools if tool.name in standing or tool.kind == "blade")
+        inner = replace(dims, radii=dims.radii[: len(steps)], heights=dims.heights[: len(steps)])
+        layers = spec.layers[: len(steps)]
+        return PatchMoulds(
+            structs.replace(spec, layers=layers),
+            replace(plan, tools=tools, steps=steps, dimensions=inner),
+            array=replace(self.arranged, cast="flat"),
+        )
+
+    @property
+    def makes(self) -> str:
+        """What comes out of the mould."""
+        return "sheet" if self.construction.own_tails else "patch"
+
+    @property
+    def across(self) -> str:
+        """What to measure across."""
+        x0, y0, x1, y1 = self.arranged.sheet.outline
+        if self.arranged.cast == "curved":
+            along, radius = y1 - y0, self.arranged.radius_mm or 0.0
+            return f"The sheet: {along:.2f} mm along the limb. Every unit lies on a tube of radius {radius:.2f} mm."
+        middles = f" Between the middles of neighbouring units: {pitch:.2f} mm." if (pitch := self._pitch) else ""
+        return f"The sheet: {x1 - x0:.2f} x {y1 - y0:.2f} mm, before it is bent.{middles}"
+
+    @property
+    def _pitch(self) -> float:
+        """The least distance between two units' middles, mm; 0 of a single one."""
+        places = self.arranged.places
+        return min((math.dist((p.x, p.y), (q.x, q.y)) for p, q in combinations(places, 2)), default=0.0)
+
+    @property
+    def poured_across(self) -> tuple[str, float]:
+        """The widest surface that lies open in a pour: the sheet's longer side, mm."""
+        x0, y0, x1, y1 = self.arranged.sheet.outline
+        return "sheet", max(x1 - x0, y1 - y0)
+
+    def greased(self, step: Step) -> str:
+        """Return what gets petroleum jelly before a cup is put on, in the construction's words."""
+        return self.construction.greased(self.arranged, step.index)
+
+    @property
+    def source(self) -> str:
+        """The file in a result's folder that makes the result again."""
+        return "array.toml"
+
+    @property
+    def assembly(self) -> tuple[Fitting, ...]:
+        """How motors and circuit go in, in the construction's words."""
+        return self.construction.assembly(self.arranged)
+
+    def pieces(self, name: str) -> int:
+        """Return the number of solids that a body is drawn of: a layer of all units has one for each."""
+        return next((len(step.layer) for step in self.plan.steps if step.name == name), 1)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Tools and pours. Raises Refusal where the moulds can't be made."""
+        if self.altered:
+            return self.altered
+        try:
+            return made_plan(self.arranged)
+        except Refusal as refusal:
+            asked, places = self.arranged.asked, len(self.arranged.places)
+            better = offered(refusal, asked, makeable_array)
+            raise with_other_ways(better, asked, places, makeable_array) from None
+
+    @cached_property
+    def dimensions(self) -> Dimensions:
+        """The lengths that the tools are drawn to."""
+        return self.plan.dimensions
+
+    @cached_property
+    def segments(self) -> int:
+        """Sides of every full turn: as fine as the largest round of units and corners needs."""
+        from unitcad.kernels.mesh import segment_count
+
+        array = self.arranged
+        radius = max(array.sheet.corner_mm, *(unit.diameter_mm / 2 for unit in array.units))
+        if array.cast == "curved":
+            radius = max(radius, array.back_radius_mm)
+        return segment_count(radius + math.sqrt(radius), self.spec.output.tolerance_mm)
+
+    @cached_property
+    def rib_spaces(self) -> Manifold:
+        """Empty: no cup of a patch is centred by ribs on a plinth."""
+        from manifold3d import Manifold
+
+        return Manifold()
+
+
+def patch_moulds(array: Array, altered: Plan | None = None) -> PatchMoulds:
+    """Return the mould set of an array's sheet; `altered` stands in for its plan: a set with a fault, for tests."""
+    return PatchMoulds(patch_spec(array), altered, array=array)
+
+
+def patch_spec(array: Array) -> Spec:
+    """Return the spec that stands for the sheet: the unit's lengths, silicones and lab, and the sheet as its layers."""
+    unit, way = array.unit, construction_of(array.construction, array.cast)
+    layers = (CastLayer(material=array.sheet.material, wall_mm=array.sheet.margin_mm, cap_mm=array.sheet.thickness_mm),)
+    if not way.own_tails:
+        layers = (*unit.layers[:-1], structs.replace(unit.layers[-1], material=array.sheet.material))
+    entries = {name: entry for each in array.units for name, entry in each.materials.items()}
+    return structs.replace(unit, name=array.name, layers=layers, fpcb=None, wires=None, materials=entries)

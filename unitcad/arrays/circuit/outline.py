@@ -1,10 +1,11 @@
-"""The outline of an array's common circuit: one closed curve of lines and arcs with rounded inner corners (mm)."""
+"""The outline of a common circuit, and the circuit as it is laid on the sheet."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -14,9 +15,10 @@ from manifold3d import CrossSection, JoinType, OpType
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_tables import CircuitTable
 from unitcad.arrays.circuit.wiring import Strip, Wiring, wiring
+from unitcad.arrays.limb import LENGTH, at_place
 from unitcad.designs import CIRCUIT_COLOUR, dimensions
 from unitcad.errors import Refusal
-from unitcad.shape import Extrude, Profile
+from unitcad.shape import Common, Extrude, Profile, cylinder, moved
 from unitcad.shape.body import Body
 from unitcad.shape.profile import Vertex
 
@@ -193,3 +195,25 @@ def _turn(points: np.ndarray) -> float:
     ax, ay, bx, by = x0 - x, y0 - y, x1 - x, y1 - y
     seen = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
     return -math.copysign(2 * (math.pi - abs(seen)), seen)
+
+
+def laid_circuit(array: Array) -> tuple[Body, ...]:
+    """Return the circuit in the frame that the silicone is cast in.
+
+    In a curved cast what of it lies within each unit is flat; between the units it bends freely, and is not drawn.
+    """
+    whole = circuit_body(array)
+    if array.cast == "flat":
+        return (whole,)
+    return tuple(
+        replace(
+            whole,
+            name=f"{place.name}-circuit",
+            shape=at_place(
+                array,
+                Common((moved(whole.shape, -place.x, -place.y), cylinder(place.radius, -LENGTH, LENGTH))),
+                place,
+            ),
+        )
+        for place in array.places
+    )

@@ -1,12 +1,4 @@
-"""Where the common circuit of an array lies: a pad on each motor, rows that join them, a spine across the rows, a tail.
-
-    o===o===|=o      pads and rows, along x here; the spine lies in a gap between two columns
-    o===o===|=o
-    o===o===|=o
-            |        the spine goes on as the tail, over the edge of the sheet
-
-Lengths in mm, in the array's flat frame. What is drawn from it, silicone or circuit, reads the same strips.
-"""
+"""The wiring of a common circuit: pads, rows, and tracks that are too crowded."""
 
 from __future__ import annotations
 
@@ -19,11 +11,12 @@ from msgspec.structs import replace
 
 from unitcad.arrays.array import Array, Placed
 from unitcad.arrays.array_tables import CircuitTable
-from unitcad.arrays.tail_ways import CLEAR
+from unitcad.arrays.tails import CLEAR
 from unitcad.designs import dimensions
 from unitcad.designs.limits import up
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point, to_box, to_segment
+from unitcad.text import number
 
 LEAST_BEND = 10.0
 """Least radius that a circuit is bent to, over its thickness: two layers of copper, bent once (IPC-2223)."""
@@ -227,3 +220,26 @@ def _check_bend(array: Array, pads: Sequence[CircuitPad], thickness: float, tabl
                     f"{bend:.3g} mm; {LEAST_BEND:g} times its thickness is {least:.3g} mm"
                 )
                 raise Refusal("body.radius_mm", array.radius_mm, limit, up(least * pitch / free) if free else None)
+
+
+TRACK_MM = GAP_MM = 0.1
+"""Least width of a track, and of the gap beside it (assumed: 4 mil, what makers of flexible circuits usually offer)."""
+
+
+def width_needed(motors: int) -> float:
+    """Return how wide one layer of a track a motor and a common return is, mm, a gap at both edges."""
+    return (motors + 1) * (TRACK_MM + GAP_MM) + GAP_MM
+
+
+def crowded_tracks(array: Array) -> list[str]:
+    """Return a sentence where spine and tail are too narrow for the tracks of all motors; else []."""
+    width, motors = (array.circuit or CircuitTable()).row_width_mm, len(array.places)
+    needed = width_needed(motors)
+    if needed <= width + 1e-9:
+        return []
+    most = int((width - GAP_MM) / (TRACK_MM + GAP_MM) + 1e-9) - 1
+    return [
+        f"the circuit's spine and tail are {number(width, 3)} mm wide (circuit.row_width_mm), enough for {most} "
+        f"motors: {motors} tracks and a common return, {TRACK_MM:g} mm wide and {GAP_MM:g} mm apart on one layer, need "
+        f"{number(needed, 3)} mm"
+    ]

@@ -1,20 +1,26 @@
-"""The tray that a sheet with pockets is cast in: floor, wall with an overflow groove, cores of pockets and strap slots.
-
-Open at the top; the sheet's back is struck off on the wall. z = 0 is the floor, where the sheet's skin side lies (mm).
-"""
+"""Arrays of units in the pockets of a sheet: the construction and its tray."""
 
 from __future__ import annotations
 
 import math
 
-from unitcad.arrays.array import Array, Box
-from unitcad.arrays.bending import bent_stretches
-from unitcad.arrays.larger_than_bed import longer_than_bed, of_sheet, round_units, sized
-from unitcad.arrays.outlines import rounded, slot_profile
-from unitcad.arrays.piece_labels import Strip, on_pieces
-from unitcad.arrays.seam_weep import sheet_mm2, too_much
-from unitcad.designs import Dimensions
+from unitcad.arrays.array import Array, Box, Sheet
+from unitcad.arrays.construction import Construction, Level
+from unitcad.arrays.limb import bent_stretches
+from unitcad.arrays.piece_seams import (
+    Strip,
+    longer_than_bed,
+    of_sheet,
+    on_pieces,
+    round_units,
+    sheet_mm2,
+    sized,
+    too_much,
+)
+from unitcad.arrays.sheet import rounded, slot_profile
+from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, unit_bodies
 from unitcad.designs.tooling import Cell, Layout
+from unitcad.errors import UnitcadError
 from unitcad.moulds.blade import bar
 from unitcad.moulds.cuts import seams
 from unitcad.moulds.dovetails import Seam, split
@@ -23,8 +29,10 @@ from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.pieces import base_piece, blade_piece
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal
-from unitcad.shape import Extrude, Shape, cut, cylinder, moved, union
+from unitcad.shape import Extrude, Shape, cut, cylinder, moved, ring, union
+from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT
+from unitcad.spec import Spec
 from unitcad.text import number
 
 BEYOND = 1.0
@@ -125,3 +133,97 @@ def _seams(array: Array, outer: Box) -> tuple[Seam, ...]:
     area = sheet_mm2(array) - sum(math.pi * (place.radius - array.sheet.hold_mm) ** 2 for place in array.places)
     fault = too_much(array, outer, (plate, plate + thickness), area * thickness)
     return seams(sized(array, outer, kept, kept), what, array.unit.moulds.plinth_clearance_mm, fault=fault)
+
+
+LEAST_WEB = 2.0
+"""Silicone between two pockets, at least, mm (assumed): a narrower strip tears as a unit is pushed in."""
+OFF_ROUND = 0.05
+"""How far a unit's outline may lie off its disc, mm (assumed): a quarter of the usual hold."""
+SLIVER = 1e-6
+"""Volume that is rounding's, mm3."""
+
+
+def apart(unit: Spec) -> tuple[float, str]:
+    """Return the least distance of two units' edges, mm, and why."""
+    return LEAST_WEB, f"the sheet keeps a web of {LEAST_WEB:g} mm between its pockets"
+
+
+def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Level:
+    """Return where the sheet lies: over the tails, as near to the lowest unit's back as it can; else under them."""
+    lengths = [dimensions(unit) for unit in units]
+    back = min(dims.heights[-1] for dims in lengths)
+    over = max((dims.exit.high for dims in lengths if dims.exit), default=0.0)
+    under = min((dims.exit.low for dims in lengths if dims.exit), default=back)
+    most = max(back - over, min(under, back))
+    top = back if back - over >= thickness - 1e-9 else min(under, back)
+    return Level(top - thickness, top, most)
+
+
+def unfit(unit: Spec, sheet: Sheet) -> str:
+    """Return why a sheet's pocket can't hold a unit, "" where it can: the unit is a disc of its diameter there.
+
+    Nothing but tails reaches beyond that disc, they do so under or over the sheet, and at the sheet the silicone
+    fills the disc's edge. Where a design can't be drawn, that is said when it is drawn.
+    """
+    if design_of(unit).tooling == "concentric":
+        return ""  # rings of these radii: their tails leave where `level` looks
+    from unitcad.kernels.mesh import realise, segment_count
+    from unitcad.moulds.cavities import united
+
+    try:
+        bodies = unit_bodies(unit)
+    except UnitcadError:
+        return ""
+    radius, segments = unit.diameter_mm / 2, segment_count(unit.diameter_mm, unit.output.tolerance_mm)
+    made = united(realise(body.shape, segments) for body in bodies if body.made != "bought")
+    whole = united(realise(body.shape, segments) for body in bodies)
+    disc = f"a pocket holds a disc of diameter_mm = {unit.diameter_mm:g}"
+    low, high = made.bounding_box()[2::3]
+    beyond = made - realise(cylinder(radius + OFF_ROUND, low - BEYOND, high + BEYOND), segments)
+    if beyond.volume() > SLIVER:
+        x0, y0, _, x1, y1, _ = beyond.bounding_box()
+        return f"{disc}, and this unit reaches {max(-x0, -y0, x1, y1):.3g} mm from its axis"
+    at_sheet = realise(cylinder(radius + OFF_ROUND, sheet.low, sheet.high), segments)
+    across = whole.trim_by_plane((0, 0, 1), sheet.low).trim_by_plane((0, 0, -1), -sheet.high) - at_sheet
+    if across.volume() > SLIVER:
+        return f"its circuit or wires leave where the sheet lies, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin"
+    edge = ring(radius - OFF_ROUND - sheet.hold_mm, radius - OFF_ROUND, sheet.low, sheet.high)
+    if (realise(edge, segments) - made).volume() > SLIVER:
+        return f"{disc}; where the sheet lies, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin, this unit is none"
+    return ""
+
+
+def sheet(array: Array) -> Shape:
+    """Draw the sheet as it is cast, z = 0 at its side towards the skin (mm)."""
+    drawn, thickness = array.sheet, array.sheet.thickness_mm
+    holes = [
+        moved(cylinder(place.radius - drawn.hold_mm, -BEYOND, thickness + BEYOND), place.x, place.y)
+        for place in array.places
+    ]
+    slots = [Extrude(slot_profile(slot), -BEYOND, thickness + BEYOND) for slot in drawn.strap_slots]
+    return cut(Extrude(rounded(drawn.outline, drawn.corner_mm), 0.0, thickness), [*holes, *slots])
+
+
+def bodies(array: Array) -> tuple[Body, ...]:
+    """Return the sheet."""
+    colour = layer_colour(2)
+    return (Body("layer1", "unit", "layer", sheet(array), colour, made="cast", step=1),)
+
+
+def plan(array: Array) -> Plan:
+    """Return the tray and its pour. Raises Refusal for a tray that is larger than the printer's bed."""
+    return tray_plan(array, sheet(array))
+
+
+CONSTRUCTION = Construction(
+    name="pockets",
+    about="a sheet with holes that hold finished units, which can be tested alone and exchanged",
+    mixed=True,
+    own_tails=True,
+    thickness_mm=2.0,
+    apart=apart,
+    level=level,
+    bodies=bodies,
+    plan=plan,
+    unfit=unfit,
+)

@@ -1,31 +1,26 @@
-"""Crosstalk of an array: how much of each unit's motion at its edge reaches each other unit, and what adds up there.
-
-The amplitude that unit i makes at p is level_i g(p) / g(D/2): its level at the edge, times the decay of the bare skin
-from there under the unit's own motor (`attenuation.crosstalk.decay`). What is given first is the decay, which the
-units' levels are not in. Amplitudes of several units are summed as if all were in phase, the worst case, and as the
-root of the sum of squares: motors are not synchronous, so their phases are unknown.
-
-One radial response serves all pairs of a distinct unit, frequency and drive.
-"""
+"""Crosstalk between the units of an array: matrix, table and sentences."""
 
 from __future__ import annotations
 
+import csv
+import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.attenuation.crosstalk import Reading, decay, ends
 from unitcad.attenuation.edge.estimates import not_of_this_drive
 from unitcad.attenuation.inputs import Drive, EstimateInput, body
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.text import listed, number
 
 BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
 SHAPE = (0.82, 1.14)
@@ -118,8 +113,8 @@ class Decays:
         `drive`, `hertz`: else each unit's own.
         """
         found = np.zeros(distances.shape)
-        for number, one in enumerate(self.inputs):
-            rows = self.kind[drivers] == number
+        for kind, one in enumerate(self.inputs):
+            rows = self.kind[drivers] == kind
             if np.any(rows):
                 found[rows] = decay(one, 1e-3 * distances[rows], drive, hertz, end, reading)
         return found
@@ -360,3 +355,154 @@ def _table(matrix: np.ndarray) -> list[list[float | None]]:
 
 def _rounded(values: np.ndarray) -> list[float]:
     return [round(float(value), DIGITS) for value in values]
+
+
+DRIVES = ("flat", "axial")
+
+
+def crosstalk_csv(array: Array, band: Sequence[float] = BAND_HZ) -> bytes:
+    """Return a CSV file: `from` drives, `to` is moved; distances along the skin in mm, from the middle of `from`.
+
+    The other columns are |u| over that at the edge of `from`, to the `centre` and the nearest `edge` of `to`, by drive,
+    at `frequency_hz` and then at each frequency of the band. Raises Refusal as `crosstalk_matrix.crosstalk`.
+    """
+    units = Decays(array)
+    apart = ~np.eye(units.pairs.count, dtype=bool)
+    heads, columns = [], []
+    for hertz in (None, *band):
+        for drive in DRIVES:
+            both = units.both(drive, hertz)[apart]
+            suffix = "" if hertz is None else f"_{hertz:g}hz"
+            heads += [f"{drive}_centre{suffix}", f"{drive}_edge{suffix}"]
+            columns += [both[:, 0], both[:, 1]]
+    values = np.round(np.stack(columns, axis=1), DIGITS)
+    distances = np.round(np.stack([units.pairs.centre[apart], units.pairs.edge[apart]], axis=1), 4)
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(("from", "to", "distance_mm", "edge_mm", "frequency_hz", *heads))
+    names = [place.name for place in array.places]
+    for (i, j), away, of in zip(np.argwhere(apart).tolist(), distances.tolist(), values.tolist(), strict=True):
+        rows.writerow((names[i], names[j], *away, units.inputs[units.kind[i]].frequency.middle, *of))
+    return text.getvalue().encode()
+
+
+IN_BRACKETS = (
+    "In brackets is the range: tissue moduli, damping, thicknesses and frequency taken to both ends of their ranges, "
+    "and how far finite elements differ from the computed decay."
+)
+ALIKE = 1e-3
+"""Sums that differ by less, as a share, are called alike."""
+Crosstalk = Mapping[str, Any]
+"""What `crosstalk_matrix.crosstalk` returns."""
+
+
+def crosstalk_lines(data: Crosstalk) -> list[str]:
+    """Return the answer, the nearest neighbour first: what reaches it, what adds up, and the range over the models."""
+    nearest, worst = data["nearest"], data["worst"]
+    if nearest is None:
+        return ["A single unit has no neighbour: there is no crosstalk."]
+    lines = [
+        f"Of a unit's motion at its edge {_percent(nearest['centre'])} reaches the middle of its nearest neighbour "
+        f"({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
+        f"{_percent(nearest['nearest_edge'])} that neighbour's edge.",
+        f"With all other units on, {_most(data)}: {_times(worst['root_sum_of_squares'])} times one "
+        f"unit's edge level by the root of the sum of squares, as motors that are not synchronous add up; "
+        f"{_times(worst['sum'])} times if all are in phase.",
+        _absolute_line(data["absolute"]),
+    ]
+    if data["band"]:
+        lines.append(_band(data))
+    if masses := data.get("masses"):
+        at = [place["name"] for place in data["places"]].index(worst["place"])
+        changes = masses["root_sum_of_squares_changes_by"][at], masses["sum_changes_by"][at]
+        lines.append(
+            f"The units' masses on the skin change what {worst['place']} gets by x {number(changes[0], 3)} (root of "
+            f"the sum of squares) and x {number(changes[1], 3)} (in phase)."
+        )
+    return [*lines, IN_BRACKETS]
+
+
+def _most(data: Crosstalk) -> str:
+    """Name the place that gets the most; places that stand alike differ by what their centres are rounded to."""
+    values = data["sums"]["own_drive"]["root_sum_of_squares"]
+    alike = max(values) - min(values) <= ALIKE * max(values)
+    return "all get alike" if alike else f"{data['worst']['place']} gets the most"
+
+
+def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:
+    """Return each array's crosstalk over that of the first: nearest neighbour, and the sums at the worst places.
+
+    In units' own levels at their edge. A ratio is None where one of the two is a single unit.
+    """
+    first, found = every[0], []
+    for other in every[1:]:
+        block: dict[str, Any] = {"array": other["array"], "over": first["array"]}
+        both = first["nearest"], other["nearest"]
+        for key in ("centre", "nearest_edge"):
+            block[f"nearest_{key.removeprefix('nearest_')}"] = (
+                _over(both[1][key], both[0][key]) if both[0] and both[1] else None
+            )
+        for key in ("sum", "root_sum_of_squares"):
+            block[key] = _over(other["worst"][key], first["worst"][key])
+        block["same_body"] = first["tissue"] == other["tissue"]
+        found.append(block)
+    return found
+
+
+def ratio_line(one: Mapping[str, Any]) -> str:
+    """Say how an array's crosstalk compares with another's."""
+    parts = {
+        "nearest neighbour": one["nearest_centre"],
+        "worst place, root of squares": one["root_sum_of_squares"],
+        "in phase": one["sum"],
+    }
+    said = listed(f"{what} x {number(value, 3, zeros=True)}" for what, value in parts.items() if value is not None)
+    body = "" if one["same_body"] else " (on another body)"
+    return (
+        f"{one['array']} over {one['over']}: {said or 'nothing to compare'}{body}, in edge levels of their own units."
+    )
+
+
+def _over(one: Mapping[str, float], other: Mapping[str, float]) -> float | None:
+    return round(one["value"] / other["value"], 6) if other["value"] else None
+
+
+def _percent(quantity: Mapping[str, float]) -> str:
+    value, low, high = (number(100 * quantity[key], 2) for key in ("value", "low", "high"))
+    return f"{value} % ({low} to {high})"
+
+
+def _times(quantity: Mapping[str, float]) -> str:
+    value, low, high = (number(quantity[key], 2) for key in ("value", "low", "high"))
+    return f"{value} ({low} to {high})"
+
+
+def _absolute_line(block: Mapping[str, Any]) -> str:
+    root, phase = block["root_sum_of_squares"], block["sum"]
+    if root is None:
+        return f"No absolute level: {block['reason']}."
+    said = [f"{number(100 * one['low'], 2)} to {number(100 * one['high'], 2)} %" for one in (root, phase)]
+    return (
+        f"At {block['place']} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase: the "
+        "models of the level at a unit's edge differ so much."
+    )
+
+
+def _band(data: Crosstalk) -> str:
+    """Say how the nearest neighbour's share goes over the band under the drive of most units."""
+    drives = [place["drive"] for place in data["places"]]
+    drive = max(("flat", "axial"), key=drives.count)
+    shares = [(row["frequency_hz"], row[drive]["nearest_centre"]) for row in data["band"]]
+    ordered = sorted(shares, key=lambda pair: pair[1])
+    least, most = ordered[0], ordered[-1]
+    falls = all(a[1] >= b[1] for a, b in pairwise(shares))
+    if falls and len(shares) > 1:
+        return (
+            f"From {number(shares[0][0])} to {number(shares[-1][0])} Hz the nearest neighbour's share falls from "
+            f"{number(100 * most[1], 2)} to {number(100 * least[1], 2)} % ({drive} drive)."
+        )
+    return (
+        f"From {number(shares[0][0])} to {number(shares[-1][0])} Hz the nearest neighbour's share lies between "
+        f"{number(100 * least[1], 2)} % at {number(least[0])} Hz and {number(100 * most[1], 2)} % at "
+        f"{number(most[0])} Hz ({drive} drive)."
+    )

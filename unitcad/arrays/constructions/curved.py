@@ -1,33 +1,21 @@
-"""The tools of a back sheet cast round the limb: a base with a moat a unit, and a lid; the inner layers' flat tools.
-
-    section across the limb             lid, flat on top, printed upside down
-            .--vent--sprue--vent--.
-      .-----'   .-------------.   '-----.
-      |pin   .-'  sheet        '-.   pin|   the lid bears on the base beside the sheet: both are bored and turned to the
-      |__|.-'.-|core|.  moat .---'-.|___|   radius of the sheet's back
-      |  '   |_|    ||_______|      '   |
-      '------------- base2 -------------'
-
-Base and lid part upwards, the filaments are pulled along their cores, and the silicone is peeled off unit by unit,
-each along its own axis.
-"""
+"""Arrays that are cast round a limb: the construction, its limits, tools and their release."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.back_sheet_drawing import OFF_SQUARE
-from unitcad.arrays.back_sheet_tools import UP, core_top, inner_tools
-from unitcad.arrays.bending import bent_stretches
 from unitcad.arrays.circuit.wiring import wiring
-from unitcad.arrays.curved_release import parts_out
-from unitcad.arrays.fins import fins
-from unitcad.arrays.limb_frame import angle_deg, axis, barrel, bent, inside_of_end, slice_of, strap_slot
+from unitcad.arrays.construction import Construction, Level
+from unitcad.arrays.constructions import back_sheet
+from unitcad.arrays.constructions.back_sheet import OFF_SQUARE, UP, core_top, fins, inner_tools
+from unitcad.arrays.limb import angle_deg, axis, barrel, bent, bent_stretches, inside_of_end, slice_of, strap_slot
 from unitcad.catalogue import printers
-from unitcad.designs import Dimensions, dimensions
+from unitcad.designs import Dimensions, design_of, dimensions, layer_colour
+from unitcad.designs.design import Fitting
 from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
 from unitcad.moulds.base import core
@@ -37,7 +25,7 @@ from unitcad.moulds.lid import THICKNESS, VENT
 from unitcad.moulds.pieces import base_piece, lid_piece, stub_pieces
 from unitcad.moulds.pins import PIN_RADIUS, Pins, pin_holes, standing_pins
 from unitcad.moulds.plan import Plan, Step
-from unitcad.moulds.removal import Removal
+from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import (
     Common,
     Revolve,
@@ -51,8 +39,104 @@ from unitcad.shape import (
     turned,
     union,
 )
+from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
-from unitcad.spec import Spec
+from unitcad.spec import Spec, printer_of
+
+MOST_DEG = 75.0
+"""Of the sheet's ends from the top, at most (assumed): beyond it lid and base slide on each other as they close."""
+LARGEST = 1000.0
+"""Radius of a limb, at most, mm."""
+_STEP = 0.1
+
+
+def check_limb(array: Array, apart: float, middle: Callable[[float], float]) -> None:
+    """Raise Refusal for a limb too small or too large, with the nearest radius that fits.
+
+    `apart`: between two units' feet, mm. `middle`: from the limb's radius to that of the sheet's middle, mm.
+    """
+    radius = array.radius_mm or 0.0
+    _check_vents(array, radius, middle)
+    if not (why := _too_small(array, radius, apart, middle(radius))):
+        return
+    radii = (tenth * _STEP for tenth in range(math.ceil(radius / _STEP + 1e-9), round(LARGEST / _STEP) + 1))
+    fits = next((each for each in radii if not _too_small(array, each, apart, middle(each))), None)
+    if fits is None or middle(fits) > _largest_middle(array) or array.layout["kind"] == "ring":
+        raise Refusal("body.cast", "curved", f"{why}; cast it flat and bend it", "flat")
+    raise Refusal("body.radius_mm", radius, why, round(fits, 1))
+
+
+def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) -> None:
+    """Raise Refusal for a limb so large that a tilt of the mould brings the highest line off the sheet, and its vents.
+
+    `middle` as in `check_limb`.
+    """
+    largest = _largest_middle(array)
+    if middle(radius) <= largest:
+        return
+    end = math.degrees(largest / middle(radius)) * math.radians(TILT_DEG)
+    why = (
+        f"the sheet reaches {end:.3g} degrees from the top, and a mould tilted by {TILT_DEG:g} degrees keeps air at "
+        "its ends; cast it flat and bend it"
+    )
+    fits = math.floor(min(radius, largest) / _STEP)
+    while middle(fits * _STEP) > largest:
+        fits -= 1
+    raise Refusal("body.radius_mm", radius, why, round(fits * _STEP, 1))
+
+
+def _largest_middle(array: Array) -> float:
+    """Return the radius of the sheet's middle with which its nearer end lies in the tilt from the top, mm."""
+    return min(-array.sheet.outline[0], array.sheet.outline[2]) / math.radians(TILT_DEG)
+
+
+def _too_small(array: Array, radius: float, apart: float, middle: float) -> str:
+    """Return what speaks against a limb of a radius, where the sheet's middle has the radius `middle` (mm), or ""."""
+    sheet = array.sheet
+    steepest = float(printer_of(array.unit).overhang_deg)
+    places = [place.x for place in array.places] + [(slot[0] + slot[2]) / 2 for slot in sheet.strap_slots]
+    tilt = math.degrees(max(map(abs, places)) / middle)
+    if tilt > steepest + 1e-9:
+        return f"the outermost unit or slot is tilted by {tilt:.3g} degrees; from {steepest:g} on it needs support"
+    end = math.degrees(max(-sheet.outline[0], sheet.outline[2]) / middle)
+    if end > MOST_DEG + 1e-9:
+        return f"the sheet reaches {end:.3g} degrees from the top; lid and base close up to {MOST_DEG:g}"
+    for one, other in combinations(array.places, 2):
+        outer, turn = one.radius + other.radius, abs(other.x - one.x) / middle / 2
+        if turn >= math.pi / 2 or abs(other.y - one.y) > outer + apart:
+            continue
+        across, along = 2 * radius * math.sin(turn), other.y - one.y
+        distance = math.hypot(across, along)
+        # Seen along the axis between the two, each unit's foot is an ellipse.
+        gap = distance - outer * math.hypot(math.cos(turn) * across, along) / distance
+        if gap < apart - 2 / 1024:
+            there = f"{gap:.3g}" if gap < apart - 0.05 else f"{gap:.5g}"
+            return f"at the skin {one.name} and {other.name} stand {there} mm apart and need {apart:.4g} mm"
+    return ""
+
+
+BESIDE = 1 / 4
+"""How far the space about a unit reaches beyond it, mm."""
+
+
+def parts_out(array: Array) -> Iterator[Removal]:
+    """Yield the removals of the silicone: each unit along its axis, then the sheet in slices about the limb.
+
+    A slice is that part of the sheet that is nearest to a column of units, or to a strap slot.
+    """
+    sheet = array.sheet
+    outer = dimensions(array.unit).outer_radius + BESIDE
+    for place in array.places:
+        about = bent(array, cylinder(outer, -1.0, sheet.high + outer), place.x, place.y)
+        yield Removal(CAST, axis(array, place.x), f"at {place.name}", about)
+    middles = sorted({place.x for place in array.places} | {(slot[0] + slot[2]) / 2 for slot in sheet.strap_slots})
+    between = [(a + b) / 2 for a, b in pairwise(middles)]
+    bounds = [2 * sheet.outline[0] - middles[0], *between, 2 * sheet.outline[2] - middles[-1]]
+    for i, (x, ends) in enumerate(zip(middles, pairwise(bounds), strict=True)):
+        # The last one takes what rounding leaves.
+        space = slice_of(array, *ends) if i + 1 < len(middles) else None
+        yield Removal(CAST, axis(array, x), f"between the units, {x:+.4g} mm round", space)
+
 
 LAND = 4.0
 """Where base and lid bear on each other beside the sheet, mm."""
@@ -371,3 +455,112 @@ def _along(former: Former, label: str, top: float, edge: float) -> Shape:
     stroke, depth = former.spec.moulds.engraving_stroke_mm, former.spec.moulds.engraving_depth_mm
     drawn = turned(engraving(label, stroke, top - depth, top + BEYOND), "z", 1)
     return moved(drawn, edge + 1.0 + HEIGHT * stroke, -text_width(label, stroke) / 2)
+
+
+def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Level:
+    """Return where the sheet lies on top of a limb of a radius: its back as high as keeps the cap over Layer 1's edge.
+
+    Raises Refusal as `back_sheet.level`.
+    """
+    flat = back_sheet.level(units, thickness, None)
+    spec, limb = units[0], radius or 0.0
+    dims = dimensions(spec)
+    if len(spec.layers) < 2:
+        limit = "in a curved mould the inner layers are laid in; units of one layer are cast flat and bent"
+        raise Refusal("body.cast", "curved", limit, "flat")
+    top = math.hypot(limb + flat.high, dims.radii[-2]) - limb
+    # Beside its unit a notch stays under the sheet.
+    roof = math.hypot(limb + core_top(spec), dims.outer_radius + BEYOND) - limb
+    return Level(top - thickness, top, top - roof)
+
+
+def laid_in(array: Array) -> tuple[tuple[Shape, ...], ...]:
+    """Draw the inner layers where they lie round the limb, pour by pour, a solid a unit."""
+    drawn, count = _of_place(array), len(array.unit.layers) - 1
+    return tuple(
+        tuple(bent(array, drawn[n][i], place.x, place.y) for n, place in enumerate(array.places)) for i in range(count)
+    )
+
+
+def _of_place(array: Array) -> list[list[Shape]]:
+    """Draw the inner layers of each place about the z axis, with the notches of the circuit."""
+    spec = array.unit
+    dims = dimensions(spec)
+    of_unit = design_of(spec).layers(spec, replace(dims, exit=None, sides=()))
+    return [[cut(of_unit[f"layer{i + 1}"], notched) for i in range(len(spec.layers) - 1)] for notched in notches(array)]
+
+
+def notches(array: Array) -> list[list[Shape]]:
+    """Draw the notches of the circuit at each place, about the z axis."""
+    reach, top = dimensions(array.unit).outer_radius + BEYOND, core_top(array.unit)
+    ways = fins(array, wiring(array))
+    return [
+        [way.about_the_axis(reach, 0.0, -BEYOND, top) for way in ways if way.place == i]
+        for i in range(len(array.places))
+    ]
+
+
+def poured(array: Array) -> Shape:
+    """Draw the outermost layers and the sheet, in one piece."""
+    sheet, spec, radius = array.sheet, array.unit, array.radius_mm or 0.0
+    dims = dimensions(spec)
+    inner, height, outer = dims.radii[-2], dims.heights[-2], dims.outer_radius
+    holes = [strap_slot(array, slot, BEYOND) for slot in sheet.strap_slots]
+    back = Common(
+        (barrel(array, array.back_radius_mm), inside_of_end(array, left=True), inside_of_end(array, left=False))
+    )
+    back = cut(back, [barrel(array, radius + sheet.low), *holes])
+    rounds = [bent(array, cylinder(outer, 0.0, sheet.high + BEYOND), p.x, p.y) for p in array.places]
+    rounds = Common((barrel(array, radius + (sheet.low + sheet.high) / 2), union(rounds)))
+    hollow: list[Shape] = []
+    for place, notched in zip(array.places, notches(array), strict=True):
+        hollow.append(bent(array, cylinder(inner, -BEYOND, height), place.x, place.y))
+        hollow += [bent(array, notch, place.x, place.y) for notch in notched]
+    return cut(union((back, rounds)), hollow)
+
+
+def bodies(array: Array) -> tuple[Body, ...]:
+    """Return the silicone as it is worn, a body a pour."""
+    shapes = [*(union(pour) for pour in laid_in(array)), poured(array)]
+    return tuple(
+        Body(f"layer{i + 1}", "unit", "layer", shape, layer_colour(i), made="cast", step=i + 1)
+        for i, shape in enumerate(shapes)
+    )
+
+
+def plan(array: Array) -> Plan:
+    """Return tools and pours. Raises Refusal for tools that are larger than the bed, and for a limb too small."""
+    spec, thickness = array.unit, array.sheet.thickness_mm
+
+    def middle(radius: float) -> float:
+        there = level((spec,), thickness, radius)
+        return radius + (there.low + there.high) / 2
+
+    check_limb(array, back_sheet.apart(spec)[0], middle)
+    return curved_plan(array, back_sheet.layers(array)[:-1], laid_in(array), poured(array))
+
+
+def assembly(array: Array) -> tuple[Fitting, ...]:
+    """Write how the flat circuit is laid into the sleeve."""
+    solder, lay_in = back_sheet.assembly(array)
+    flat = (
+        "Open the sleeve until it lies flat and tape its ends down: the circuit is flat, as long as the sheet laid "
+        "flat, and bends with the sleeve when it is worn. It stays flat until the smear is cured."
+    )
+    return replace(solder, text=f"{solder.text} {flat}"), lay_in
+
+
+CONSTRUCTION = Construction(
+    name="back-sheet",
+    cast="curved",
+    about="a back sheet cast round the limb: Layer 1 is cast flat and laid in, the rest is injected under a lid",
+    mixed=False,
+    own_tails=False,
+    thickness_mm=1.25,
+    apart=back_sheet.apart,
+    level=level,
+    bodies=bodies,
+    plan=plan,
+    assembly=assembly,
+    greased=back_sheet.greased,
+)

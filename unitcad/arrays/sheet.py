@@ -1,19 +1,56 @@
-"""The sheet of an array from its table and the places: level, outline, corners and strap slots (mm)."""
+"""The sheet of an array: its outline, its lengths on the bed, and outlines with rounded corners."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from unitcad import catalogue
 from unitcad.arrays.array import Box, Sheet
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.construction import Construction
 from unitcad.arrays.layouts import Point
-from unitcad.arrays.sheet_length import check_length
 from unitcad.designs.limits import down, up
 from unitcad.errors import Refusal
-from unitcad.shape import mm
+from unitcad.shape import Profile, mm
 from unitcad.spec import Spec
+
+_QUARTER = math.tan(math.pi / 8)
+
+
+def rounded(box: Box, radius: float, grow: float = 0.0) -> Profile:
+    """Return a box with round corners, every side moved out by `grow`."""
+    x0, y0, x1, y1 = box[0] - grow, box[1] - grow, box[2] + grow, box[3] + grow
+    r = radius + grow
+    corners = (
+        (x0 + r, y0, 0.0),
+        (x1 - r, y0, _QUARTER),
+        (x1, y0 + r, 0.0),
+        (x1, y1 - r, _QUARTER),
+        (x1 - r, y1, 0.0),
+        (x0 + r, y1, _QUARTER),
+        (x0, y1 - r, 0.0),
+        (x0, y0 + r, _QUARTER),
+    )
+    # A side without length, between two corners that meet, is none.
+    after = (*corners[1:], corners[0])
+    return Profile(tuple(c for c, n in zip(corners, after, strict=True) if c[2] or _apart(c, n)))
+
+
+def _apart(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
+    return (mm(one[0]), mm(one[1])) != (mm(other[0]), mm(other[1]))
+
+
+def slot_profile(box: Box) -> Profile:
+    """Return a slot that fills a box, its two short ends round; one that is as long as it is wide is a circle."""
+    x0, y0, x1, y1 = box
+    r = min(x1 - x0, y1 - y0) / 2
+    if (mm(x0 + r), mm(y0 + r)) == (mm(x1 - r), mm(y1 - r)):
+        return rounded(box, r)
+    if y1 - y0 >= x1 - x0:
+        return Profile(((x0, y0 + r, 1.0), (x1, y0 + r, 0.0), (x1, y1 - r, 1.0), (x0, y1 - r, 0.0)))
+    return Profile(((x0 + r, y0, 0.0), (x1 - r, y0, 1.0), (x1 - r, y1, 0.0), (x0 + r, y1, 1.0)))
+
 
 BESIDE_SLOT = 2.0
 """From a strap slot to a round corner, at least, mm."""
@@ -146,3 +183,49 @@ def _to_corner(radius: float, outline: Box, slots: tuple[Box, ...]) -> float:
         if x < radius and y < radius:
             least = min(least, radius - math.hypot(radius - x, radius - y))
     return least
+
+
+LONGEST = 1500.0
+"""Of a sheet along x and along y, mm: lines that cut its tools begin and end 1 m from its middle."""
+
+
+def check_length(asked: AskedArray, points: Sequence[Point], outline: Box) -> None:
+    """Raise Refusal for a sheet that is too long: for what takes most of its length, with the value that fits."""
+    for axis, ways in enumerate(zip(*((point.x, point.y) for point in points), strict=True)):
+        length = outline[axis + 2] - outline[axis]
+        over, span = length - LONGEST, max(ways) - min(ways)
+        if over <= 2 / 1024:
+            continue
+        limit = f"the sheet would be {length:.5g} mm long along {'xy'[axis]}; it is at most {LONGEST:g} mm"
+        field, value = max(_beside(asked, axis), key=lambda each: each[1])
+        if span >= 2 * value:
+            field, value, more = _of_layout(asked, axis, span)
+        else:
+            more = 2.0
+        nearest = down(value - over / more) if more else 0.0
+        raise Refusal(field, value, limit, nearest if nearest > 0 else None)
+
+
+def _beside(asked: AskedArray, axis: int) -> list[tuple[str, float]]:
+    """Return what the sheet has at either end along an axis: field and value, mm."""
+    sheet = asked.sheet
+    found = [("sheet.margin_mm", sheet.margin_mm)]
+    if sheet.strap_slot_mm and axis == 0:
+        found += [("sheet.strap_web_mm", sheet.strap_web_mm), ("sheet.strap_slot_mm.0", sheet.strap_slot_mm[0])]
+    return found
+
+
+def _of_layout(asked: AskedArray, axis: int, span: float) -> tuple[str, float, float]:
+    """Return a layout's field, its value, and how much longer (mm) a unit more of it makes the span of the places."""
+    layout = asked.layout
+    if layout["kind"] == "list":
+        return "layout.points_mm", round(span, 3), 0.0
+    if layout["kind"] == "ring":
+        if axis == 0:
+            return "body.radius_mm", asked.body.radius_mm or 0.0, 2 * math.pi * (1 - 1 / layout["count"])
+        pitch, field = layout["band_pitch_mm"], "layout.band_pitch_mm"
+    else:
+        pitch, field = layout["pitch_mm"], "layout.pitch_mm"
+        if not isinstance(pitch, int | float):
+            pitch, field = pitch[axis], f"{field}.{axis}"
+    return field, pitch, span / pitch

@@ -1,0 +1,739 @@
+"""Arrays with a back sheet: the construction, its tools and their drawing, fins and pry slots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+from unitcad.arrays.array import Array, Box
+from unitcad.arrays.circuit.wiring import Wiring, wiring
+from unitcad.arrays.construction import Construction, Level
+from unitcad.arrays.limb import bent_stretches
+from unitcad.arrays.piece_seams import (
+    Strip,
+    box_feature,
+    intervals,
+    longer_than_bed,
+    of_sheet,
+    on_pieces,
+    round_units,
+    sheet_mm2,
+    sized,
+    too_much,
+)
+from unitcad.arrays.sheet import rounded, slot_profile
+from unitcad.arrays.tails import CLEAR
+from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, shipped
+from unitcad.designs.design import Fitting
+from unitcad.designs.limits import filament_groove
+from unitcad.designs.parts import BEYOND
+from unitcad.designs.tooling import Cell, Layout
+from unitcad.errors import Refusal
+from unitcad.geometry.segments import Point, nearer
+from unitcad.moulds import filament
+from unitcad.moulds.base import PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER, core, outline, plate_top, pry_floor, pry_slot
+from unitcad.moulds.blade import blade
+from unitcad.moulds.cuts import BESIDE, Feature, seams
+from unitcad.moulds.dovetails import Interval, Seam, Split, seen, split, strips
+from unitcad.moulds.labels import corner_labels, engraved, row_width, set_label
+from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
+from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, stub_pieces
+from unitcad.moulds.pins import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
+from unitcad.moulds.plan import Plan, Step
+from unitcad.moulds.removal import CAST, Removal
+from unitcad.shape import (
+    Common,
+    Extrude,
+    Profile,
+    Shape,
+    box,
+    cut,
+    cylinder,
+    moved,
+    polygon,
+    ring,
+    turned,
+    union,
+)
+from unitcad.shape.body import Body
+from unitcad.shape.lettering import HEIGHT
+from unitcad.spec import Spec
+from unitcad.text import number
+
+OFF_SQUARE = 4.0
+"""How far one pin stands off the rectangle of the others, mm: a cup goes on in one attitude only."""
+LABEL_MARGIN = 0.6
+"""From a label to the edges of the strip that it stands on, mm."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What all tools of an array are drawn to; where the base and the cups are cut that are larger than the bed."""
+
+    array: Array
+    spec: Spec
+    dims: Dimensions
+    fins: tuple[Fin, ...]
+    lay: Layout
+    pins: Pins
+    base_seams: tuple[Seam, ...] = ()
+    cup_seams: tuple[Seam, ...] = ()
+    pry: tuple[PrySlot, ...] = ()
+
+    @property
+    def hole(self) -> float:
+        """Radius that a pin's hole takes, its mouth included, mm."""
+        return self.pins.hole_radius + CHAMFER
+
+
+def drawing_of(array: Array) -> Drawing:
+    """Return what the tools are drawn to. Raises Refusal for tools larger than the bed that can't be cut."""
+    spec, moulds = array.unit, array.unit.moulds
+    dims = replace(dimensions(spec), exit=None, sides=())
+    height = min(dims.heights[0] - moulds.least_wall_mm - 0.4, 3.0)
+    height = math.floor(height / moulds.layer_mm + 1e-6) * moulds.layer_mm
+    label = HEIGHT * moulds.engraving_stroke_mm
+    hole = PIN_RADIUS + moulds.plinth_clearance_mm
+    wall = max(2 * hole + 2 * moulds.least_wall_mm, label + 1.0 + moulds.least_wall_mm)
+    box_, beside = array.sheet.outline, moulds.land_mm + moulds.groove_width_mm + wall
+    cup = max(abs(box_[0]), box_[2]) + beside, max(abs(box_[1]), box_[3]) + beside
+    plate = cup[0] + label + 2 * LABEL_MARGIN, cup[1] + label + 2 * LABEL_MARGIN
+    x, y = cup[0] / 2, cup[1] - wall / 2
+    places = (-x, -y), (x, -y), (-x, y), (x - OFF_SQUARE, y)
+    cells = tuple(Cell(place.x, place.y, (), place.name) for place in array.places)
+    pitch = min(array.pitch_mm, 2 * cup[1])
+    # No plinth, so no ribs on it.
+    lay = Layout(cells, MARK, pitch, (0.0, 0.0), cup, plate, label)
+    drawn = Drawing(
+        array, spec, dims, fins(array, wiring(array)), lay, Pins(places, height, moulds.plinth_clearance_mm)
+    )
+    return _cut(drawn)
+
+
+def _cut(drawn: Drawing) -> Drawing:
+    """Return the drawing with its seams, and with as many pins that the pieces of base and cups stand on two."""
+    moulds, array, (x, y), plate = drawn.spec.moulds, drawn.array, drawn.lay.cup, drawn.lay.plate
+    kept = [*of_sheet(array), *_beside(drawn)]
+    slots = [_slot(drawn, fin) for fin in drawn.fins]
+    bore = drawn.dims.outer_radius
+    grooved = round_units(array, [bore + moulds.land_mm + moulds.groove_width_mm] * len(array.places))
+    clear, close = [*grooved, *slots, *kept], [*round_units(array, [bore] * len(array.places)), *slots, *kept]
+    what = f"the base of {2 * plate[0]:.4g} x {2 * plate[1]:.4g} mm"
+    play = moulds.plinth_clearance_mm
+    dims, sheet = drawn.dims, array.sheet
+    inner = [dims.cavity_radius, *dims.radii][-2]
+    moats = len(array.places) * math.pi * (dims.radii[-1] ** 2 - inner**2) * sheet.low
+    layer_mm3 = sheet_mm2(array) * sheet.thickness_mm + moats
+    fault = too_much(array, (-x, -y, x, y), (sheet.low, dims.heights[-1]), layer_mm3)
+
+    def levers(found: Sequence[Seam]) -> tuple[tuple[PrySlot, ...], str]:
+        return pry_slots(drawn.spec, drawn.lay, found, drawn.pins.places, drawn.hole)
+
+    under = [box_feature(*filament.groove(drawn.spec, drawn.lay, cell)) for cell in drawn.lay.cells]
+    bases = sized(array, (-plate[0], -plate[1], *plate), clear, close, under)
+    try:
+        base = seams(bases, what, play, fault=lambda found: levers(found)[1])
+    except Refusal:
+        # The bed that would do must do for the cups too.
+        base = seams(bases, what, play, fault=lambda found: levers(found)[1] or fault(found))
+    what = f"a cup of {2 * x:.4g} x {2 * y:.4g} mm"
+    cups = seams(sized(array, (-x, -y, x, y), clear, close), what, play, base, fault)
+    cut_at = replace(drawn, base_seams=base, cup_seams=cups, pry=levers(base)[0])
+    return replace(cut_at, pins=replace(drawn.pins, places=(*drawn.pins.places, *_more_pins(cut_at))))
+
+
+def _beside(drawn: Drawing) -> list[Feature]:
+    """Return what stands beside the sheet: pins, the corners with their labels, pry slots."""
+    (x, y), plate, stroke = drawn.lay.cup, drawn.lay.plate, drawn.spec.moulds.engraving_stroke_mm
+    wide = row_width(["C1", "1"], stroke) + TEXT_MARGIN
+    high = drawn.lay.label_height + TEXT_MARGIN
+    found = [Feature((place,), drawn.hole) for place in drawn.pins.places]
+    for side in (1, -1):
+        ends = sorted((side * (x - PRY_UNDER), side * plate[0]))
+        found.append(box_feature(ends[0], -PRY_HALF_WIDTH, ends[1], PRY_HALF_WIDTH))
+        ends = sorted((side * (x - wide), side * plate[0]))
+        for up in (1, -1):
+            edges = sorted((up * (y - high), up * plate[1]))
+            found.append(box_feature(ends[0], edges[0], ends[1], edges[1]))
+    return found
+
+
+def _more_pins(drawn: Drawing) -> tuple[tuple[float, float], ...]:
+    """Return pins for the pieces of base and cups that stand on fewer than two: on the sides that they have."""
+    (x, y), units, cut_at = drawn.lay.cup, drawn.array.places, (*drawn.base_seams, *drawn.cup_seams)
+    out_y = drawn.pins.places[-1][1]
+    out_x = x - (y - out_y)
+    standing = list(drawn.pins.places)
+    for low_y, high_y in intervals((-y, y), cut_at, "y"):
+        for low_x, high_x in intervals((-x, x), cut_at, "x"):
+            if sum(low_x < at < high_x and low_y < up < high_y for at, up in standing) < 2:
+                ends = [side * out_y for side in (-1, 1) if low_y < side * out_y < high_y]
+                sides = [side * out_x for side in (-1, 1) if low_x < side * out_x < high_x]
+                each = 2 if len(ends) + len(sides) == 1 else 1
+                across, along = (low_x, high_x), (low_y, high_y)
+                new = [
+                    (at, end)
+                    for end in ends
+                    for at in _beside_slots(drawn, "back" if end > 0 else "front", [p.x for p in units], across, each)
+                ]
+                new += [
+                    (side, at)
+                    for side in sides
+                    for at in _beside_slots(drawn, "right" if side > 0 else "left", [p.y for p in units], along, each)
+                ]
+                standing += [at for at in new if all(math.dist(at, pin) > 4 * PIN_RADIUS for pin in standing)]
+    return tuple(standing[len(drawn.pins.places) :])
+
+
+def _beside_slots(
+    drawn: Drawing, side: Side, middles: Sequence[float], within: tuple[float, float], count: int
+) -> list[float]:
+    """Return where pins stand on a side, as `_spots`, clear of its pry slots: at units' middles, else anywhere."""
+    by = PRY_HALF_WIDTH + drawn.hole + drawn.spec.moulds.least_wall_mm
+    slots = [slot.middle for slot in drawn.pry if slot.side == side]
+    steps = (within[0] + STEP * i for i in range(math.ceil((within[1] - within[0]) / STEP)))
+    for tried in (middles, (*steps, *(at + sign * by for at in slots for sign in (-1, 1)))):
+        found = _spots([at for at in tried if all(abs(at - slot) >= by - 1e-9 for slot in slots)], within, count)
+        if found:
+            return found
+    return []
+
+
+def _spots(middles: Sequence[float], within: tuple[float, float], count: int) -> list[float]:
+    """Return as many units' middles as asked for, the nearest to places spread evenly within an interval."""
+    low, high = within[0] + 2 * PIN_RADIUS, within[1] - 2 * PIN_RADIUS
+    inside = [middle for middle in middles if low < middle < high]
+    wanted = [low + (high - low) * (2 * k + 1) / (2 * count) for k in range(count)]
+    return sorted({min(inside, key=lambda middle, at=at: abs(middle - at)) for at in wanted}) if inside else []
+
+
+def _slot(drawn: Drawing, fin: Fin) -> Feature:
+    """Return what a fin's slot takes."""
+    clearance = drawn.spec.moulds.plinth_clearance_mm
+    return box_feature(*fin.taken(drawn.array, fin.reach + clearance, clearance))
+
+
+UP, DOWN = (0, 0, 1), (0, 0, -1)
+
+
+def core_top(spec: Spec) -> float:
+    """Return the height of cores and fins over the skin, mm: motor and circuit lie under it."""
+    return dimensions(spec).core_height
+
+
+def slot_roof(spec: Spec) -> float:
+    """Return the height of the slots that the cups have for the fins, mm."""
+    return core_top(spec) + spec.moulds.plinth_clearance_mm
+
+
+def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
+    """Return tools and pours of an array whose silicone is drawn as `cast`, pour by pour.
+
+    Tools larger than the bed are cut. Raises Refusal where they can't be, and for lids.
+    """
+    if array.unit.moulds.pour == "injected":
+        raise Refusal("moulds.pour", "injected", "a back sheet is struck off, its cups have no lids", "open")
+    return replace(_flat_plan(drawing_of(array), cast, last=True), stretches=bent_stretches(array))
+
+
+def inner_tools(array: Array, cast: Sequence[tuple[Shape, ...]], label: str) -> Plan:
+    """Return flat tools and pours of the inner layers alone, drawn as `cast`: they are taken out and laid in elsewhere.
+
+    `label` is that of the whole set. Raises Refusal as `tools_plan`.
+    """
+    return _flat_plan(drawing_of(array), cast, last=False, label=label)
+
+
+def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: bool, label: str = "") -> Plan:
+    """Return tools and pours of layers drawn as `cast`; `last`: the last of them is the sheet's."""
+    spec, dims, lay = drawing.spec, drawing.dims, drawing.lay
+    pours = range(1, len(cast) + 1)
+    sheets = [last and pour == len(cast) for pour in pours]
+    blanks = [_base(drawing), *(_cup(drawing, pour - 1, last=sheets[pour - 1]) for pour in pours)]
+    label = label or set_label((*blanks, *(shape for shapes in cast for shape in shapes)))
+    base = base_piece(engraved(blanks[0], _base_letters(drawing, f"B{label}")))
+    base = replace(base, removal=DOWN) if last else base
+    cups = []
+    for pour, blank in zip(pours, blanks[1:], strict=True):
+        cup = cup_piece(pour, engraved(blank, _cup_letters(drawing, pour, label)))
+        # The last cup is a tray for the sheet: printed as it stands, and the patch leaves it, not it the patch.
+        cups.append(replace(cup, upside_down=False, removal=None) if sheets[pour - 1] else cup)
+    stubs = stub_pieces([filament.stub(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
+    steps = tuple(_step(drawing, cast, pour, base, cups[pour - 1], stubs, sheet=sheets[pour - 1]) for pour in pours)
+    holes = [("base", len(stubs)), *((cup.name, len(lay.cells)) for cup in cups)]
+    bar = blade(lay, dims.heights[len(cast) - 1])
+    return Plan(
+        (base, *cups, *stubs, blade_piece(bar, too_long=longer_than_bed(spec, 2 * lay.plate[1]))),
+        steps,
+        lay,
+        label,
+        dims,
+        concentric=False,
+        pins=drawing.pins,
+        pry_slots=tuple((slot.piece, slot.side, slot.middle) for slot in drawing.pry),
+        genus=tuple(holes),
+        splits=tuple(_splits(drawing, base, cups)),
+    )
+
+
+def _splits(drawing: Drawing, base: Body, cups: Sequence[Body]) -> Iterator[Split]:
+    """Yield the tools that are larger than the bed, cut."""
+    for tool, where in ((base, drawing.base_seams), *((cup, drawing.cup_seams) for cup in cups)):
+        if where:
+            yield split(tool, where)
+
+
+def _base_letters(drawing: Drawing, label: str) -> list[Shape]:
+    """Draw the base's label; on a base that is cut, on each piece with its number, or that alone."""
+    spec, (x, y) = drawing.spec, drawing.lay.plate
+    strip = Strip((-x, -y, x, y), LABEL_MARGIN, spec.moulds.engraving_stroke_mm, _engraving(spec, 0.0), "top")
+    if all(slot.customary for slot in drawing.pry):
+        return on_pieces(strip, [(label,)], drawing.base_seams)
+    beside = strip._replace(taken=[slot.taken(drawing.lay) for slot in drawing.pry])
+    return on_pieces(beside, [(label,), (label[0],), ()], drawing.base_seams)
+
+
+def _cup_letters(drawing: Drawing, pour: int, label: str) -> list[Shape]:
+    """Draw a cup's letters in its corners; the pieces of one that is cut have its name, the label and their number."""
+    spec, lay, rim = drawing.spec, drawing.lay, drawing.dims.heights[pour - 1]
+    own, (x, y), stroke = f"C{pour:X}", lay.cup, spec.moulds.engraving_stroke_mm
+    if not drawing.cup_seams:
+        return corner_labels(spec, lay, rim, (own, label[:2], label[2:]))
+    hole = drawing.hole
+    taken = [(x - MARK, y - MARK, x, y)]
+    taken += [(at - hole, beside - hole, at + hole, beside + hole) for at, beside in drawing.pins.places]
+    strip = Strip((-x, -y, x, y), TEXT_MARGIN, stroke, _engraving(spec, rim), "top", taken)
+    return on_pieces(strip, [(own, label), (own,)], drawing.cup_seams)
+
+
+def _engraving(spec: Spec, top: float) -> tuple[float, float]:
+    return top - spec.moulds.engraving_depth_mm, top + BEYOND
+
+
+def _step(
+    drawing: Drawing,
+    cast: Sequence[tuple[Shape, ...]],
+    pour: int,
+    base: Body,
+    cup: Body,
+    stubs: Sequence[Body],
+    *,
+    sheet: bool,
+) -> Step:
+    """Return a pour; the last of them casts the sheet, or its layers are taken out to be laid in elsewhere."""
+    last, rim = pour == len(cast), drawing.dims.heights[pour - 1]
+    pulled = [Removal(stub.name, DOWN) for stub in stubs] if last else []
+    # The last cup can't be lifted past the sheet.
+    first = Removal(base.name, DOWN) if sheet else Removal(cup.name, UP)
+    order = [*pulled, first, *([Removal(CAST, UP)] if last else [])]
+    return Step(
+        index=pour,
+        name=f"layer{pour}",
+        material=drawing.array.sheet.material if sheet else drawing.spec.layers[pour - 1].material,
+        tools=(base.name, cup.name, *(stub.name for stub in stubs)),
+        layer=cast[pour - 1],
+        earlier=tuple(shape for shapes in cast[: pour - 1] for shape in shapes),
+        seals=tuple(_seals(drawing, pour - 1, last=sheet)),
+        rim=rim,
+        top=rim,
+        removals=tuple(order),
+    )
+
+
+def _bottom(spec: Spec) -> float:
+    """Return z of the base's lower face: its plate has no plinth."""
+    return -spec.moulds.plate_mm
+
+
+def _base(drawing: Drawing) -> Shape:
+    """Draw the base: plate, cores, fins and pins in one piece, with pry slots and the filaments' ways."""
+    spec, dims, lay, array = drawing.spec, drawing.dims, drawing.lay, drawing.array
+    plate = Extrude(outline(lay.plate, MARK), _bottom(spec), 0.0)
+    cores = [moved(core(dims), cell.x, cell.y) for cell in lay.cells]
+    ridges = [fin.drawn(array, fin.reach, 0.0, -BEYOND, dims.core_height) for fin in drawing.fins]
+    ways = [filament.way(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells]
+    # Drawn for a plate under a plinth.
+    slots = [moved(pry_slot(spec, lay, side), z=-plate_top(spec)) for side in (1, -1)]
+    slots += [slot.drawn(lay) for slot in drawing.pry if not slot.customary]
+    return cut(union((plate, *cores, *ridges, *standing_pins(drawing.pins))), [*slots, *ways])
+
+
+def _cup(drawing: Drawing, layer: int, *, last: bool) -> Shape:
+    """Draw the cup of a pour (from 0); the last one holds the sheet."""
+    spec, dims, lay, sheet = drawing.spec, drawing.dims, drawing.lay, drawing.array.sheet
+    rim = dims.heights[layer]
+    tools = [*_bores(drawing, layer, last=last), *_slots(drawing), *pin_holes(drawing.pins)]
+    if last:
+        land, depth = spec.moulds.land_mm, groove_depth_of(spec, rim)
+        around = rounded(sheet.outline, sheet.corner_mm, land + spec.moulds.groove_width_mm)
+        tools.append(Extrude(around, rim - depth, rim + BEYOND, (rounded(sheet.outline, sheet.corner_mm, land),)))
+    else:
+        tools += _grooves(drawing, layer)
+    return cut(Extrude(outline(lay.cup, MARK), 0.0, rim), tools)
+
+
+def _bores(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
+    """Draw what the silicone of a pour takes from its cup: a bore a unit, the sheet round the straps' posts."""
+    dims, sheet = drawing.dims, drawing.array.sheet
+    rim = dims.heights[layer]
+    top = sheet.low + (rim - sheet.low) / 2 if last else rim + BEYOND
+    shapes = [moved(cylinder(dims.radii[layer], -BEYOND, top), cell.x, cell.y) for cell in drawing.lay.cells]
+    if last:
+        posts = tuple(slot_profile(slot) for slot in sheet.strap_slots)
+        shapes.append(Extrude(rounded(sheet.outline, sheet.corner_mm), sheet.low, rim + BEYOND, posts))
+    return shapes
+
+
+def _slots(drawing: Drawing) -> list[Shape]:
+    """Draw the slots for the fins, open downwards."""
+    spec = drawing.spec
+    clearance = spec.moulds.plinth_clearance_mm
+    return [
+        fin.drawn(drawing.array, fin.reach + clearance, clearance, -BEYOND, slot_roof(spec)) for fin in drawing.fins
+    ]
+
+
+def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
+    """Draw a groove round each bore; it stops at seams, over slots and beside its neighbours: walls would be thin."""
+    spec, dims, cells = drawing.spec, drawing.dims, drawing.lay.cells
+    moulds, rim = spec.moulds, dims.heights[layer]
+    inner = dims.radii[layer] + moulds.land_mm
+    outer, depth = inner + moulds.groove_width_mm, groove_depth_of(spec, rim)
+    low, high = rim - depth, rim + BEYOND
+    stops: list[list[Shape]] = [[] for _ in cells]
+    for i, cell in enumerate(cells):
+        for other in cells:
+            apart = math.hypot(other.x - cell.x, other.y - cell.y)
+            if other is not cell and apart < outer + inner:
+                stops[i].append(moved(cylinder(inner, low - BEYOND, high + BEYOND), other.x, other.y))
+            if other is not cell and apart < 2 * outer + moulds.least_wall_mm:
+                between = _halfway((cell.x, cell.y), (other.x, other.y), outer, moulds.least_wall_mm)
+                stops[i].append(Extrude(between, low - BEYOND, high + BEYOND))
+    for fin in drawing.fins if low - slot_roof(spec) < moulds.least_wall_mm else ():
+        wider = moulds.plinth_clearance_mm + moulds.least_wall_mm
+        over = fin.drawn(drawing.array, outer + BEYOND, wider, low - BEYOND, high + BEYOND)
+        stops[fin.place].append(over)
+    for seam in drawing.cup_seams:
+        for strip in strips(seam, moulds.least_wall_mm + seam.play / 2):
+            over = Extrude(polygon(*strip), low - BEYOND, high + BEYOND)
+            for i, cell in enumerate(cells):
+                if nearer([seen((cell.x, cell.y), seam.across)], strip, outer):
+                    stops[i].append(over if seam.across == "x" else turned(over, "z", 1))
+    return [cut(moved(ring(inner, outer, low, high), c.x, c.y), stops[i]) for i, c in enumerate(cells)]
+
+
+def _halfway(a: Point, b: Point, half: float, width: float) -> Profile:
+    """Return a strip across the middle of the way from a to b, `half` long to either side of it, mm."""
+    apart = math.dist(a, b)
+    way = (b[0] - a[0]) / apart, (b[1] - a[1]) / apart
+    at = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
+    sides = [(along * width / 2, across * half) for along, across in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return polygon(*((at[0] + u * way[0] - v * way[1], at[1] + u * way[1] + v * way[0]) for u, v in sides))
+
+
+def _seals(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
+    """Draw what silicone is kept from though no tool fills it: grease round the fins, the ring round a filament."""
+    spec, dims, lay, rim = drawing.spec, drawing.dims, drawing.lay, drawing.dims.heights[layer]
+    x, y = lay.cup
+    wall = cut(box(-x, x, -y, y, -BEYOND, rim), _bores(drawing, layer, last=last))
+    ridges = [fin.drawn(drawing.array, fin.reach, 0.0, -2 * BEYOND, dims.core_height) for fin in drawing.fins]
+    seals = [cut(Common((wall, union(_slots(drawing)))), ridges)] if drawing.fins else []
+    return seals + [filament.annulus(spec, dims, cell) for cell in lay.cells]
+
+
+SEAL = 1.2
+"""How far a fin runs on in the wall of the outermost cup, mm: the slit beside it, greased, is the pour's seal."""
+_EPS = 1e-6
+
+
+class Fin(NamedTuple):
+    """A way of the circuit out of a place's unit: along +x, -x, +y or -y, `half` wide to either side.
+
+    `reach` is from the unit's centre to the fin's end, mm.
+    """
+
+    place: int
+    direction: tuple[int, int]
+    half: float
+    reach: float
+
+    def drawn(self, array: Array, reach: float, wider: float, low: float, high: float) -> Shape:
+        """Draw a box along the way, from the unit's centre to `reach`, `wider` to either side, from z to z."""
+        x0, y0, x1, y1 = self.taken(array, reach, wider)
+        return box(x0, x1, y0, y1, low, high)
+
+    def taken(self, array: Array, reach: float, wider: float) -> Box:
+        """Return what that box takes in the plane, mm."""
+        at, (x0, x1, y0, y1) = array.places[self.place], self._sides(reach, wider)
+        return at.x + x0, at.y + y0, at.x + x1, at.y + y1
+
+    def about_the_axis(self, reach: float, wider: float, low: float, high: float) -> Shape:
+        """Draw the same with the unit's axis at x = y = 0."""
+        return box(*self._sides(reach, wider), low, high)
+
+    def _sides(self, reach: float, wider: float) -> tuple[float, float, float, float]:
+        half, (dx, dy) = self.half + wider, self.direction
+        x0, x1 = (min(0.0, dx * reach), max(0.0, dx * reach)) if dx else (-half, half)
+        y0, y1 = (min(0.0, dy * reach), max(0.0, dy * reach)) if dy else (-half, half)
+        return x0, x1, y0, y1
+
+
+def fins(array: Array, circuit: Wiring) -> tuple[Fin, ...]:
+    """Return the fins of an array's units, for every strip of the circuit that leaves a unit.
+
+    A fin ends a seal's length outside its unit.
+    """
+    wider = array.unit.moulds.slot_width_clearance_mm / 2
+    return tuple(
+        Fin(place, direction, half + wider, array.places[place].radius + SEAL)
+        for place, direction, half in sorted(set(_ways(array, circuit)))
+    )
+
+
+def least_apart(spec: Spec) -> float:
+    """Return the least distance between the edges of two units whose fins come to meet each other, mm."""
+    return 2 * (SEAL + spec.moulds.plinth_clearance_mm) + spec.moulds.least_wall_mm
+
+
+def _ways(array: Array, circuit: Wiring) -> Iterator[tuple[int, tuple[int, int], float]]:
+    """Yield place, direction and the strip's half width for every way out of a unit."""
+    for strip in circuit.strips:
+        (x0, y0), (x1, y1) = strip.start, strip.end
+        length = math.hypot(x1 - x0, y1 - y0)
+        ux, uy = (x1 - x0) / length, (y1 - y0) / length
+        for i, place in enumerate(array.places):
+            along, across = (place.x - x0) * ux + (place.y - y0) * uy, (place.y - y0) * ux - (place.x - x0) * uy
+            if abs(across) < _EPS and -_EPS < along < length + _EPS:
+                for sense, rest in ((1, length - along), (-1, along)):
+                    if rest > place.radius:
+                        yield i, (round(sense * ux), round(sense * uy)), strip.half
+
+
+STEP = 0.5
+"""Between two places that are tried for a slot, mm."""
+LEAST_DEPTH = 0.8
+"""Of a slot over a filament's groove, mm: the tip of a thin screwdriver still gets in (assumed)."""
+Side = Literal["left", "right", "front", "back"]
+_PAIRS: tuple[tuple[Side, Side], ...] = (("left", "right"), ("front", "back"))
+
+
+class PrySlot(NamedTuple):
+    """A slot: the piece of the base (from 1; of one that is whole 1), its side, its middle along it, its depth, mm."""
+
+    piece: int
+    side: Side
+    middle: float
+    depth: float
+
+    @property
+    def customary(self) -> bool:
+        """Whether it is one of the two that every base has."""
+        return self.side in _PAIRS[0] and self.middle == 0.0
+
+    def taken(self, lay: Layout) -> Box:
+        """Return what it takes of the plate, from under the cup to beyond the edge, mm."""
+        axis = int(self.side in ("front", "back"))
+        sign = 1 if self.side in ("right", "back") else -1
+        low, high = sorted((sign * (lay.cup[axis] - PRY_UNDER), sign * (lay.plate[axis] + BEYOND)))
+        ends = self.middle - PRY_HALF_WIDTH, self.middle + PRY_HALF_WIDTH
+        return (ends[0], low, ends[1], high) if axis else (low, ends[0], high, ends[1])
+
+    def drawn(self, lay: Layout) -> Shape:
+        """Draw it in a plate whose upper face is z = 0."""
+        x0, y0, x1, y1 = self.taken(lay)
+        return box(x0, x1, y0, y1, -self.depth, BEYOND / 4)
+
+
+class Piece(NamedTuple):
+    """A piece of the base: its number, and from where to where it reaches between the teeth, along x and y (mm)."""
+
+    number: int
+    across: Interval
+    along: Interval
+
+    def sides(self, lay: Layout) -> Iterator[Side]:
+        """Yield the sides of the base that it has."""
+        (x, y), ends = lay.plate, (*self.across, *self.along)
+        for side, end, edge in zip(("left", "right", "front", "back"), ends, (-x, x, -y, y), strict=True):
+            if end == edge:
+                yield side
+
+
+def pieces(lay: Layout, seams: Sequence[Seam]) -> list[Piece]:
+    """Return the pieces of a base that is cut at seams, row by row from the top."""
+    x, y = lay.plate
+    rows, columns = intervals((-y, y), seams, "y")[::-1], intervals((-x, x), seams, "x")
+    return [Piece(n, column, row) for n, (row, column) in enumerate(((r, c) for r in rows for c in columns), 1)]
+
+
+def pry_slots(
+    spec: Spec, lay: Layout, seams: Sequence[Seam], pins: Sequence[Point], hole: float
+) -> tuple[tuple[PrySlot, ...], str]:
+    """Return the slots of a base, and why a piece of it can't be freed, "" where all can.
+
+    A slot stands in the middle of the left and of the right edge. A piece that has neither of the two gets its own:
+    at its left and right edge, or at the front and the back. `pins` that stand already have holes of the radius
+    `hole` (mm).
+    """
+    depth = plate_top(spec) - pry_floor(spec)
+    found: list[PrySlot] = []
+    for piece in pieces(lay, seams):
+        sides = set(piece.sides(lay))
+        own = [
+            PrySlot(piece.number, side, 0.0, depth)
+            for side in ("right", "left")
+            if side in sides and piece.along[0] < 0.0 < piece.along[1]
+        ]
+        for pair in () if own else _PAIRS:
+            own = own or [slot for side in pair if side in sides for slot in _at(spec, lay, piece, side, pins, hole)]
+        if not own:
+            what = "has no edge of the base" if not sides else "has no room at its edges"
+            return tuple(
+                found
+            ), f"piece {piece.number} of the base {what} for a pry slot, and nothing would lever it off"
+        found += own
+    return tuple(found), ""
+
+
+def _at(
+    spec: Spec, lay: Layout, piece: Piece, side: Side, pins: Sequence[tuple[float, float]], hole: float
+) -> Iterator[PrySlot]:
+    """Yield the slot at a piece's side, the nearest to its middle that leaves room for a pin beside it; or none."""
+    axis = int(side in ("left", "right"))
+    ends, edge = (piece.along if axis else piece.across), lay.plate[axis]
+    low, high = (end + sign * (BESIDE if abs(end) < edge else MARK) for end, sign in zip(ends, (1, -1), strict=True))
+    near = PRY_HALF_WIDTH + hole + spec.moulds.least_wall_mm
+    sign = 1 if side in ("right", "back") else -1
+    standing = [pin[axis] for pin in pins if sign * pin[1 - axis] > 0]
+    count = math.floor((high - low - 2 * PRY_HALF_WIDTH) / STEP + 1e-9)
+    places = (low + PRY_HALF_WIDTH + STEP * i for i in range(count + 1))
+    for middle in sorted(places, key=lambda place: (abs(place - (low + high) / 2), place)):
+        beside = (ends[0] + 2 * PIN_RADIUS < middle - near, middle + near < ends[1] - 2 * PIN_RADIUS)
+        depth = _depth(spec, lay, side, middle)
+        if any(beside) and depth and all(abs(middle - pin) >= near for pin in standing):
+            yield PrySlot(piece.number, side, middle, depth)
+            return
+
+
+def _depth(spec: Spec, lay: Layout, side: Side, middle: float) -> float:
+    """Return a slot's depth, mm: less where a filament's groove lies under it; 0 where it would be too little."""
+    moulds, wall = spec.moulds, spec.moulds.least_wall_mm
+    most = moulds.plate_mm
+    if side == "front":
+        grooves = (filament.groove(spec, lay, cell) for cell in lay.cells)
+        reach = PRY_HALF_WIDTH + wall
+        if any(x0 - reach < middle < x1 + reach and y0 < -lay.cup[1] for x0, y0, x1, _ in grooves):
+            most -= filament_groove(spec)
+    depth = min(PRY_DEPTH, most - wall)
+    # The floor on a whole layer from the plate's lower face.
+    floor = math.ceil((moulds.plate_mm - depth) / moulds.layer_mm - 1e-6) * moulds.layer_mm
+    return moulds.plate_mm - floor if moulds.plate_mm - floor >= LEAST_DEPTH - 1e-6 else 0.0
+
+
+def apart(unit: Spec) -> tuple[float, str]:
+    """Return the least distance of two units' edges, mm, and why."""
+    spine = unit.fpcb.tail_width_mm + 2 * CLEAR if unit.fpcb else 0.0
+    gap = least_apart(unit)
+    if spine > gap:
+        return spine, f"between two units a spine of the circuit, as wide as a tail, takes {spine:.4g} mm"
+    return gap, f"between two units the fins of the circuit's notches and a wall of the cups take {gap:.4g} mm"
+
+
+def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Level:
+    """Return where the sheet lies: flush with the units' backs, over the notches of the circuit.
+
+    Raises Refusal for units that have no cap, or no flexible circuit.
+    """
+    unit = units[0]
+    if not design_of(unit).caps:
+        fits = next(name for name, design in shipped().items() if design.caps)
+        raise Refusal("unit.design", unit.design, "a back sheet is one piece with the caps of its units", fits)
+    if unit.fpcb is None:
+        raise Refusal("unit.fpcb", None, "the units of a back sheet share a flexible circuit, so they have one")
+    top = dimensions(unit).heights[-1]
+    return Level(top - thickness, top, top - slot_roof(unit) - unit.moulds.least_wall_mm)
+
+
+def layers(array: Array) -> tuple[tuple[Shape, ...], ...]:
+    """Draw the silicone of each pour: a layer of every unit at its place; the last with the sheet, in one piece."""
+    spec, sheet = array.unit, array.sheet
+    dims = dimensions(spec)
+    whole = replace(dims, exit=None, sides=())
+    of_unit = design_of(spec).layers(spec, whole)
+    drawn = [of_unit[f"layer{i + 1}"] for i in range(len(spec.layers))]
+    ways = fins(array, wiring(array))
+    notches = [way.drawn(array, dims.outer_radius + BEYOND, 0.0, -BEYOND, core_top(spec)) for way in ways]
+    of_place = [
+        [notch for way, notch in zip(ways, notches, strict=True) if way.place == i] for i in range(len(array.places))
+    ]
+    pours = [
+        tuple(
+            cut(moved(shape, place.x, place.y), notched) for place, notched in zip(array.places, of_place, strict=True)
+        )
+        for shape in drawn
+    ]
+    holes = tuple(slot_profile(slot) for slot in sheet.strap_slots)
+    back = Extrude(rounded(sheet.outline, sheet.corner_mm), sheet.low, sheet.high, holes)
+    if len(drawn) > 1 and sheet.low < dims.heights[-2]:
+        inner = [moved(cylinder(dims.radii[-2], -BEYOND, dims.heights[-2]), p.x, p.y) for p in array.places]
+        back = cut(back, inner)
+    return (*pours[:-1], (union((back, *pours[-1])),))
+
+
+def bodies(array: Array) -> tuple[Body, ...]:
+    """Return the silicone, a body a pour."""
+    return tuple(
+        Body(f"layer{i + 1}", "unit", "layer", union(shapes), layer_colour(i), made="cast", step=i + 1)
+        for i, shapes in enumerate(layers(array))
+    )
+
+
+def plan(array: Array) -> Plan:
+    """Return tools and pours. Raises Refusal for tools that are larger than the bed, and for a pour by injection."""
+    return tools_plan(array, layers(array))
+
+
+def greased(array: Array, pour: int) -> str:
+    """Say where the slits beside the fins are sealed before the cup of a pour (from 1) is put on."""
+    ridges = fins(array, wiring(array))
+    if not ridges:
+        return ""
+    length = max(fin.reach for fin in ridges) - dimensions(array.unit).radii[pour - 1]
+    layer = "" if pour == 1 else f", none on Layer {pour - 1}"
+    return (
+        "every fin, the ridge that runs out from a core: both upright sides, the top and the end face, on its "
+        f"outermost {number(length, 3)} mm alone. None nearer the core, where silicone is cast against the fin"
+        f"{layer}"
+    )
+
+
+def assembly(array: Array) -> tuple[Fitting, ...]:
+    """Write how the circuit is laid in, with all motors on it."""
+    solder = (
+        f"Solder the {len(array.places)} motors to the circuit's pads, their backs on it, and try each one. Lay the "
+        "patch on its back, the cavities up."
+    )
+    lay_in = (
+        "Put a smear of Layer 1's silicone on each pad, where the cap of Layer 1 will touch it (assumed: silicone "
+        "bonds poorly to bare metal and polyimide; a primer or a silicone adhesive holds better). Lay the circuit in "
+        "from the skin's side, motor by motor, its rows in the notches, and push each motor in until its pad lies "
+        "against that cap. The spine lies free between the units. The notches may be filled with the same silicone."
+    )
+    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, silicone=1, mixed="smear")
+
+
+CONSTRUCTION = Construction(
+    name="back-sheet",
+    about="the units' outer layer and a sheet on their backs in one pour; the common circuit is laid in from the skin",
+    mixed=False,
+    own_tails=False,
+    thickness_mm=1.25,
+    apart=apart,
+    level=level,
+    bodies=bodies,
+    plan=plan,
+    assembly=assembly,
+    greased=greased,
+)
