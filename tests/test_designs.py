@@ -9,7 +9,7 @@ from manifold3d import Manifold
 from msgspec.structs import replace
 
 from unitcad.designs.limits import SLOT_CLEARANCE
-from unitcad.pipeline import Variant
+from unitcad.pipeline.variant import Variant
 from unitcad.validation import templates
 
 NAMES = sorted(templates())

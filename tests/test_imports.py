@@ -241,14 +241,6 @@ def test_nothing_needless_is_loaded(run: list[str], tmp_path: Path) -> None:
     assert done.stderr.splitlines()[-1] == "[]", done.stderr
 
 
-def test_the_plan_of_a_shipped_design_loads_no_kernel() -> None:
-    code = (
-        "import sys\nfrom unitcad.moulds.plan import plan\nfrom unitcad.validation import load\n"
-        "plan(load('encapsulating'))\nprint('manifold3d' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
-
-
 def test_importing_reads_no_file_of_ours() -> None:
     code = (
         "import sys, builtins, io\n"

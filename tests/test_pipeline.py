@@ -22,8 +22,8 @@ from unitcad import cli
 from unitcad.errors import UnitcadError
 from unitcad.kernels import mesh
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline import Variant
 from unitcad.pipeline import make as artifacts
+from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.write import build, placing, replacing, subject
 from unitcad.validation import load, templates
 

@@ -19,7 +19,7 @@ from unitcad.moulds.filament import FLARE, STUB_TAIL
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN
 from unitcad.moulds.ribs import ROOT, ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
-from unitcad.pipeline import Variant
+from unitcad.pipeline.variant import Variant
 from unitcad.shape import mm
 from unitcad.shape.lettering import HEIGHT, outlines, text_width
 from unitcad.spec import printer_of

@@ -11,7 +11,7 @@ pytest.importorskip("cadquery")
 from unitcad.accuracy import tessellation
 from unitcad.accuracy.measures import mesh_volume
 from unitcad.accuracy.timing import timing
-from unitcad.pipeline import Variant
+from unitcad.pipeline.variant import Variant
 from unitcad.shape import Revolve
 
 

@@ -12,7 +12,7 @@ pytest.importorskip("OCP")
 import step_reader
 
 from unitcad.export import step
-from unitcad.pipeline import Variant
+from unitcad.pipeline.variant import Variant
 
 SCRIPTS = Path(__file__).parents[2] / "benchmarks" / "encapsulating"
 

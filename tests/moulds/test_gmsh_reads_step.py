@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.pipeline import Variant
+from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.write import build
 from unitcad.validation import load
 

@@ -18,7 +18,7 @@ from unitcad.designs import shipped
 from unitcad.errors import Refusal
 from unitcad.kernels import bounds, build123d, cadquery, mesh, occt
 from unitcad.kernels.occt import Measures
-from unitcad.pipeline import Variant
+from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape
 from unitcad.validation import from_data, templates
 

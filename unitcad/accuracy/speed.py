@@ -17,7 +17,7 @@ from unitcad.accuracy.measures import mesh_volume
 from unitcad.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.errors import Missing, UnitcadError
-from unitcad.pipeline import Variant
+from unitcad.pipeline.variant import Variant
 from unitcad.validation import default_template, load
 
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ from unitcad.accuracy.measures import mesh_volume
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
 from unitcad.accuracy.timing import Timing, interleaved, machine
 from unitcad.kernels import bounds, mesh
-from unitcad.pipeline import Variant
+from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape
 from unitcad.spec.asked import OutputTable
 from unitcad.validation import default_template, load

@@ -11,10 +11,11 @@ from typing import Protocol
 
 from unitcad import notebook
 from unitcad.arguments import path, texts
-from unitcad.pipeline import Variant
 from unitcad.pipeline.subjects import load_subject
+from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.write import PAGE, Built, held
 from unitcad.pipeline.write import build as build_whole
+from unitcad.report import write_report
 from unitcad.spec import Spec
 from unitcad.spec.asked import OUTPUTS, Format
 from unitcad.validation import Changes, Source
@@ -98,8 +99,6 @@ def build(
         wanted = load_subject(wanted.of, {"output.formats": texts("formats", formats)})
     built = build_whole(wanted.of, into, only=texts("only", only), check=check, say=say)
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
-        from unitcad.report import write_report
-
         with held(built.folder):
             write_report(built.folder)
     return BuildResult(built.folder, built.manifest, built.sha256, wanted.unit)

@@ -17,6 +17,7 @@ import msgspec
 
 from unitcad.arrays.array import Array, Placed, Sheet
 from unitcad.arrays.array_tables import AskedArray, PlaceTable
+from unitcad.arrays.circuit.outline import outline
 from unitcad.arrays.construction import Construction, construction_of
 from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
 from unitcad.arrays.layouts.ring import RingTable
@@ -222,8 +223,6 @@ def made_plan(array: Array) -> Plan:
     way = construction_of(array.construction, array.cast)
     made = way.plan(array)
     if not way.own_tails:
-        from unitcad.arrays.circuit.outline import outline  # the mesh kernel: reading an array does without
-
         outline(array)
     return made
 

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from manifold3d import Manifold
 from msgspec import structs
 
 from unitcad.arrays.array import Array, Placed
@@ -20,16 +21,13 @@ from unitcad.arrays.offers import offered, with_other_ways
 from unitcad.designs import Dimensions, unit_bodies
 from unitcad.designs.design import Fitting
 from unitcad.errors import Refusal
+from unitcad.kernels.mesh import segment_count
 from unitcad.moulds.mould_set import MouldSet, geometric
 from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import Shape, cut, cylinder, moved, rotated
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, to_json, with_formats
 from unitcad.spec.effective import CastLayer
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
-
 
 SHEET = "sheet"
 
@@ -255,7 +253,6 @@ class PatchMoulds(MouldSet):
     @cached_property
     def segments(self) -> int:
         """Sides of every full turn: as fine as the largest round of units and corners needs."""
-        from unitcad.kernels.mesh import segment_count
 
         array = self.arranged
         radius = max(array.sheet.corner_mm, *(unit.diameter_mm / 2 for unit in array.units))

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold, OpType
+from scipy.spatial import KDTree
 
 from unitcad.checks.check import MouldCheck
 from unitcad.checks.finding import MouldFinding, at_least
@@ -114,7 +115,6 @@ def _tiles(moulds: MouldSet, groove: CrossSection, beside: float, ends: tuple[fl
     lay = moulds.plan.layout
     if len(lay.cells) == 1:
         return []
-    from scipy.spatial import KDTree
 
     middles = np.array([(cell.x, cell.y) for cell in lay.cells])
     reach = float(KDTree(middles).query(_border(groove))[0].max()) + SLACK

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold
@@ -22,12 +21,10 @@ from unitcad.checks.gap import least_play, too_tight
 from unitcad.checks.overlap import OVERLAP
 from unitcad.kernels.mesh import arrays
 from unitcad.moulds.cavities import united
+from unitcad.moulds.dovetails import Split
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.profile import GRID_PER_MM
-
-if TYPE_CHECKING:
-    from unitcad.moulds.dovetails import Split
 
 WEEP = 0.01
 """Silicone in the seams of a pour, at most, as a share of its layer (assumed): far less than what is mixed over."""

@@ -16,6 +16,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device
 from unitcad.shape import ProfileError, Shape, cut
 from unitcad.spec import Spec
+from unitcad.spec.body_file import bodies_in
 from unitcad.spec.custom_code import is_allowed, is_body_file, name_in_file
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
@@ -76,7 +77,6 @@ def _held(name: str, source: str) -> Any:
 @lru_cache(maxsize=16)
 def _of_file(name: str, source: str) -> Mapping[str, Shape]:
     """Return the bodies of a file; where layers share space, the earlier one has it."""
-    from unitcad.spec.body_file import bodies_in  # numpy: the plan of a shipped design does without
 
     held = bodies_in(name, source)
     cast = [key for key in (f"layer{i + 1}" for i in range(len(held))) if key in held]

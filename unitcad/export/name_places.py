@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from unitcad.export import drawing
 
@@ -75,7 +76,6 @@ def _seen(mask: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]] |
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return None
-    from scipy.ndimage import distance_transform_edt
 
     window = np.pad(mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], 1)
     inside = np.asarray(distance_transform_edt(window))

@@ -8,14 +8,13 @@ from pathlib import Path
 import msgspec
 
 from unitcad.errors import UnitcadError
-from unitcad.lab.measured_files import fault_page
+from unitcad.lab.campaign import read_campaign
+from unitcad.lab.measured_files import charts_of, fault_page, page
+from unitcad.lab.measuring import measure
 
 
 def measured(path: bytes) -> bytes:
     """Return {"page": HTML} of a campaign file, or {"refused": why}. Runs in a worker process."""
-    from unitcad.lab.campaign import read_campaign
-    from unitcad.lab.measured_files import charts_of, page
-    from unitcad.lab.measuring import measure
 
     file = Path(path.decode())
     try:

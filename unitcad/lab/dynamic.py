@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import t
 
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError
@@ -119,7 +121,6 @@ def evaluate_dynamic(curve: DynamicCurve, frequency_hz: float, poisson_ratio: fl
         hint = ": the loss is above the storage modulus; are the columns swapped?" if over else ""
         limit = f"{curve.name}: no fractional Kelvin-Voigt law comes nearer than {100 * residual:.3g} %{hint}"
         raise Refusal("--dma", None, limit)
-    from scipy.stats import t
 
     at = np.array([2.0 * np.pi * frequency_hz])
     (storage_at, loss_at), gradient = np.exp(_logs(constants, at)), _jacobian(constants, at)
@@ -178,7 +179,6 @@ def _jacobian(p: np.ndarray, omega: np.ndarray) -> np.ndarray:
 
 def _fit(omega: np.ndarray, storage: np.ndarray, loss: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the constants, their covariance and the rms misfit of the logarithms."""
-    from scipy.optimize import least_squares
 
     wanted = np.log(np.concatenate([storage, loss]))
     middle = math.log(math.sqrt(omega[0] * omega[-1]))

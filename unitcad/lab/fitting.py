@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from msgspec import Meta, field
 from msgspec.structs import replace
+from scipy.special import stdtrit
 
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
@@ -314,7 +315,6 @@ def _input(unit: OwnUnit, moduli: Moduli) -> EstimateInput:
 
 
 def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
-    from scipy.special import stdtrit
 
     judged, found, campaigns = compared.judged[name], compared.fitted[name], compared.campaigns
     assert campaigns is not None

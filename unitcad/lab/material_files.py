@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.edge.estimates import rounded
+from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.catalogue import MaterialEntry, materials
 from unitcad.export.chart import Series, chart
 from unitcad.lab.dynamic import DynamicResult
 from unitcad.lab.tensile import TensileResult, quasistatic
+from unitcad.spec import convert
 from unitcad.text import toml, toml_key
 
 _NAMED = 3
@@ -42,7 +44,6 @@ def table(tensile: TensileResult | None, dynamic: DynamicResult | None, like: st
 
 def expect_loadable(name: str, entry: Mapping[str, Any]) -> None:
     """Hold the entry to the catalogue's own types and limits, as a spec would. Raises Refusal."""
-    from unitcad.spec import convert
 
     materials({name: convert(dict(entry), MaterialEntry, f"materials.{name}")})
 
@@ -118,7 +119,6 @@ def tensile_chart(name: str, result: TensileResult) -> str:
 
 def dynamic_chart(name: str, result: DynamicResult, factor: float) -> str:
     """Draw storage and loss with the law, on to the motor's frequency; `factor` makes shear moduli Young's."""
-    from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 
     curve, law = result.curve, FractionalKelvinVoigt(result.tau, result.n)
     ends = min(curve.frequency[0], result.frequency_hz), max(curve.frequency[-1], result.frequency_hz)

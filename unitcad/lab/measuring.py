@@ -16,6 +16,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from scipy.stats import norm, t
 
 from unitcad.errors import Refusal
 from unitcad.files import sha256
@@ -68,7 +69,6 @@ def level(amplitudes: Sequence[float], references: Sequence[float] | None = None
     differ (Welch 1947, Satterthwaite 1946). `shared` is a relative standard uncertainty that all repeats have in
     common. Raises Refusal for fewer than three repeats of either.
     """
-    from scipy.stats import norm, t
 
     sides = []
     for field, values in (("points", amplitudes), ("reference", references)):

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import t
 
 from unitcad import files
 from unitcad.catalogue import Material
@@ -238,7 +240,6 @@ def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None
 
     None with fewer than three points, or no solution.
     """
-    from scipy.optimize import least_squares
 
     toe, up_to = None, high
     for _ in range(1 + _PASSES):
@@ -389,8 +390,6 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
         raise Refusal("FILES", None, f"differ by a factor of {ratio:.3g} ({shown}): {why}")
     scatter = None
     if len(by_specimen) > 1:
-        from scipy.stats import t
-
         count = len(by_specimen)
         scatter = float(t.ppf(0.975, count - 1) * np.std(np.log(by_specimen), ddof=1) / math.sqrt(count))
     geometry = max(_area_error(curve.specimen) for curve in curves)

@@ -5,26 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
+from manifold3d import Manifold
 from msgspec import structs
 
 from unitcad.designs import Design, Dimensions, design_of, unit_bodies
 from unitcad.designs.design import Fitting
+from unitcad.kernels import mesh
+from unitcad.kernels.mesh import realise, segment_count
 from unitcad.moulds.base import plate_top
+from unitcad.moulds.cavities import Cavity, cavities, united
 from unitcad.moulds.plan import Plan, Step, plan
 from unitcad.moulds.ribs import rib_spaces
+from unitcad.moulds.surroundings import Surroundings, surroundings
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, from_json, to_json, with_formats
 from unitcad.spec.asked import CastingTable
 from unitcad.spec.effective import Estimate
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
-
-    from unitcad.moulds.cavities import Cavity
-    from unitcad.moulds.surroundings import Surroundings
 
 _T = TypeVar("_T")
 
@@ -58,7 +57,6 @@ def _kept(geometry: str) -> dict[str, Any]:
 
 def forget() -> None:
     """Drop plans, meshes and all else that is kept for the next call: what a measurement of times needs."""
-    from unitcad.kernels import mesh
 
     _drawn.cache_clear()
     _kept.cache_clear()
@@ -135,7 +133,6 @@ class MouldSet:
     @cached_property
     def segments(self) -> int:
         """Sides of every full turn in this set's meshes: one number, so that mating faces mate."""
-        from unitcad.kernels.mesh import segment_count
 
         return segment_count(self.dimensions.outer_radius, self.spec.output.tolerance_mm)
 
@@ -145,7 +142,6 @@ class MouldSet:
 
     def mesh_of(self, shape: Shape) -> Manifold:
         """Return a shape's mesh in the frame of the tools, kept once made."""
-        from unitcad.kernels.mesh import realise
 
         if shape not in self._meshes:
             self._meshes[shape] = realise(shape, self.segments)
@@ -212,7 +208,6 @@ class MouldSet:
     @cached_property
     def surroundings(self) -> tuple[Surroundings, ...]:
         """What stands round each place, by the pours in their order; the same of pours that leave all where it is."""
-        from unitcad.moulds.surroundings import surroundings
 
         return surroundings(self.plan, self.solids, rib_spaces(self.spec, self.plan.layout), self.segments)
 
@@ -224,7 +219,6 @@ class MouldSet:
     @cached_property
     def rib_spaces(self) -> Manifold:
         """The boxes round the ribs that centre the cups; empty without ribs."""
-        from unitcad.moulds.cavities import united
 
         return united(self.meshes(rib_spaces(self.spec, self.plan.layout)))
 
@@ -244,7 +238,6 @@ class MouldSet:
     @cached_property
     def cavities(self) -> tuple[Cavity, ...]:
         """The cavities of all pours in their order, one a cell."""
-        from unitcad.moulds.cavities import cavities
 
         return cavities(self.plan, self.solids, self.segments, self.cells)
 

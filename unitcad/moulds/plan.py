@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
 from unitcad.designs.tooling import Cell, Layout, Tooling
 from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
 from unitcad.moulds import lid
 from unitcad.moulds.base import plate_top
+from unitcad.moulds.complement import complement
 from unitcad.moulds.concentric import concentric
+from unitcad.moulds.dovetails import Split
 from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved, set_label
+from unitcad.moulds.pins import Pins
 from unitcad.moulds.removal import Removal, customary
 from unitcad.shape import Shape, moved, turned, union
 from unitcad.shape.body import Body, Kind
 from unitcad.spec import Spec
 from unitcad.text import spaced
-
-if TYPE_CHECKING:
-    from unitcad.moulds.dovetails import Split
-    from unitcad.moulds.pins import Pins
 
 
 @dataclass(frozen=True)
@@ -183,8 +181,6 @@ def _tooling(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     if way == "concentric":
         return concentric(spec, cast)
     if way == "complement":
-        from unitcad.moulds.complement import complement  # it meshes: the other designs' plans load no kernel
-
         return complement(spec, cast)
     made = way(spec, cast)
     names, injected = [tool.name for tool in made.tools], spec.moulds.pour == "injected"

@@ -25,6 +25,7 @@ from unitcad.casting.written import step_section
 from unitcad.designs import design_of, no_estimate
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.export import glb, stl, svg, threemf
+from unitcad.export.picture import draw
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import mould_set
@@ -106,8 +107,6 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
             path = picture_path(name)
             yield Planned(path, partial(bench.picture, name), partial(geometry_key, moulds, path), "step pictures")
     if "png" in moulds.spec.output.formats:
-        from unitcad.export.picture import draw
-
         scenes = pictures(moulds, only)
         drawn = cache(lambda: dict(zip(scenes, draw([scene() for scene in scenes.values()]), strict=True)))
         for path in scenes:

@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+from manifold3d import Manifold
 
 from unitcad.export.picture import Drawn, Scene
 from unitcad.kernels.mesh import arrays, bounds
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.shape.body import Body
 from unitcad.text import spaced
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
-
-    from unitcad.moulds.mould_set import MouldSet
-    from unitcad.shape.body import Body
 
 GAP = 7.0
 """Between two pieces taken apart, mm."""

@@ -4,19 +4,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import Any, Literal, overload
+
+from manifold3d import Manifold
 
 from unitcad import notebook
 from unitcad.catalogue import materials
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
+from unitcad.kernels import build123d, cadquery
+from unitcad.kernels.mesh import as_trimesh
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import unit_section
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
 from unitcad.validation import Source, load
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,19 +67,16 @@ class Variant(MouldSet):
         solid = super().mesh(self._body(body) if isinstance(body, str) else body)
         if library == "manifold3d":
             return solid
-        from unitcad.kernels.mesh import as_trimesh
 
         return as_trimesh(solid)
 
     def to_build123d(self) -> Any:
         """Return unit and moulds as a named, coloured build123d Compound, mm. Raises UnitcadError without the extra."""
-        from unitcad.kernels import build123d
 
         return build123d.compound((*self.bodies.values(),))
 
     def to_cadquery(self) -> Any:
         """Return unit and moulds as a named, coloured CadQuery Assembly, mm. Raises UnitcadError without the extra."""
-        from unitcad.kernels import cadquery
 
         return cadquery.assembly((*self.bodies.values(),))
 

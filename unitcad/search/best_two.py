@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtr, stdtrit
 
 from unitcad.attenuation.edge.predictive import Predictive, stack_of
 from unitcad.attenuation.edge.variant_units import stacked
@@ -56,7 +57,6 @@ def best_two(target: Target, specs: Sequence[Spec], data: Sequence[dict[str, Any
 
 def below_by_ranking(both: Sequence[Predictive]) -> float:
     """Return the probability that the first unit's level is the lower one, each model missing the two independently."""
-    from scipy.special import stdtr, stdtrit
 
     first, second = both
     shares = (np.arange(_POINTS) + 0.5) / _POINTS

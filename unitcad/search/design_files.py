@@ -15,8 +15,8 @@ import numpy as np
 
 from unitcad import files
 from unitcad.errors import UnitcadError
-from unitcad.pipeline import Variant
 from unitcad.pipeline import write as folders
+from unitcad.pipeline.variant import Variant
 from unitcad.search import design_words as words
 from unitcad.search.design_page import design_page
 from unitcad.search.front_plot import front_svg, quantities

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize
 
 from unitcad.errors import Refusal
 from unitcad.search.candidates import Candidates, tabulate
@@ -33,7 +34,6 @@ def refined(found: Candidates, row: int) -> Candidates | None:
 
     The probability must rise by `ALIKE`, the lengths stay within the target's ranges and the limits be met.
     """
-    from scipy.optimize import minimize
 
     start, materials = found.lengths(row), found.materials(row)
     names, pack, unpack, bounds = _coordinates(found, start)

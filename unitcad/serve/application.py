@@ -27,6 +27,7 @@ from unitcad.serve.keys import Keys
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
+from unitcad.sweeps.result_folders import JOURNAL, stored_spec
 from unitcad.text import toml
 from unitcad.workers import NoWorker, WorkerEnded
 
@@ -223,7 +224,6 @@ class Live:
 
     async def variant(self, request: Request) -> Response:
         """Answer with the spec of a variant of the batch, as text: of its folder, else from the batch's store."""
-        from unitcad.sweeps.result_folders import JOURNAL, stored_spec
 
         root, folder = self.setting.batch, request.path_params["folder"]
         path = _within(root, f"{folder}/spec.toml") if root else None

@@ -18,6 +18,8 @@ from unitcad.report.read_results import compound_in, is_variant
 from unitcad.rooms import FileKind, file_kinds
 from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown
 from unitcad.serve.answers import answers_about
+from unitcad.serve.application import Live, Setting, application
+from unitcad.serve.connections import Connection
 from unitcad.serve.jobs import RESULTS
 from unitcad.serve.messages import Source, Trusted
 from unitcad.spec import parse_toml, read_toml
@@ -47,8 +49,6 @@ def serve(
     spec whose design is code unless `code`, and UnitcadError for a port that is taken.
     """
     uvicorn = _uvicorn()
-    from unitcad.serve.application import Live, Setting, application
-    from unitcad.serve.connections import Connection
 
     check_address(host, token)
     token = token or secrets.token_urlsafe(24)

@@ -5,21 +5,28 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from unitcad import catalogue
+from unitcad.casting.procedure import Procedure, procedure
+from unitcad.casting.steps import in_short
+from unitcad.checks import check_moulds
+from unitcad.designs import design_of, no_estimate
 from unitcad.errors import Refusal
+from unitcad.estimating import closed_forms, estimate_spec, motor_mass
+from unitcad.export.svg import unit_section
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.plan import glb_content, is_printed
+from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
+from unitcad.report.viewer_models import cells
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Trusted
 from unitcad.spec import Spec, convert, to_data, to_toml
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, is_custom, with_source
-from unitcad.validation import from_data
+from unitcad.validation import from_data, warnings
 from unitcad.validation.defaults import effective
 from unitcad.validation.load import all_faults
-
-if TYPE_CHECKING:
-    from unitcad.casting.procedure import Procedure
-    from unitcad.moulds.mould_set import MouldSet
 
 form = groups
 as_data = to_data
@@ -45,7 +52,6 @@ def judge(data: dict[str, Any]) -> Mapping[str, Any]:
 
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
     """Return what `judge` does. Raises UnitcadError also for a unit that has no moulds."""
-    from unitcad.moulds.mould_set import MouldSet
 
     spec = effective(convert(data, AskedSpec))
     _ = MouldSet(spec).plan
@@ -91,13 +97,6 @@ def folder_for(data: Mapping[str, Any], trusted: Trusted) -> Path | None:
 
 
 def _unit(spec: Spec, answer: Answer) -> None:
-    from unitcad import catalogue
-    from unitcad.estimating import motor_mass
-    from unitcad.export.svg import unit_section
-    from unitcad.moulds.mould_set import MouldSet
-    from unitcad.pipeline.plan import glb_content
-    from unitcad.pipeline.scenes import unit_apart
-    from unitcad.validation import warnings
 
     moulds = MouldSet(spec)
     solids = {body.name: moulds.mesh(body) for body in moulds.unit}
@@ -121,7 +120,6 @@ def _unit(spec: Spec, answer: Answer) -> None:
 
 
 def _grams(spec: Spec, volumes: list[float]) -> list[float]:
-    from unitcad import catalogue
 
     known = catalogue.materials(spec.materials)
     if len(volumes) != len(spec.layers):
@@ -131,12 +129,6 @@ def _grams(spec: Spec, volumes: list[float]) -> list[float]:
 
 
 def _moulds(spec: Spec, answer: Answer) -> None:
-    from unitcad.casting.steps import in_short
-    from unitcad.checks import check_moulds
-    from unitcad.moulds.mould_set import MouldSet
-    from unitcad.pipeline.plan import glb_content
-    from unitcad.pipeline.scenes import moments, taken_apart
-    from unitcad.report.viewer_models import cells
 
     moulds = MouldSet(spec)
     answer.model = {
@@ -151,21 +143,17 @@ def _moulds(spec: Spec, answer: Answer) -> None:
 
 def unit_procedure(moulds: MouldSet) -> Procedure:
     """Return the casting procedure of a unit from its meshes."""
-    from unitcad.casting.procedure import procedure
 
     return procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps], printed_mm3(moulds))
 
 
 def printed_mm3(moulds: MouldSet) -> float:
     """Return the volume of all printed tools."""
-    from unitcad.pipeline.plan import is_printed
 
     return sum(moulds.mesh(tool).volume() for tool in moulds.plan.tools if is_printed(tool))
 
 
 def _estimate(spec: Spec, answer: Answer) -> None:
-    from unitcad.designs import design_of, no_estimate
-    from unitcad.estimating import closed_forms, estimate_spec
 
     if not design_of(spec).passes:
         answer.lines = [f"{spec.design} has no estimate: {no_estimate()}"]

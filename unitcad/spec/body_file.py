@@ -19,6 +19,9 @@ from unitcad.meshcheck.findings import Finding
 from unitcad.meshcheck.one_file import check_file
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.readers import sniff
+from unitcad.meshcheck.readers.step_bodies import step_bodies
+from unitcad.meshcheck.readers.threemf.opc import open_package
+from unitcad.meshcheck.readers.threemf.read_3mf import read_build
 from unitcad.meshcheck.rules import s_scale
 from unitcad.meshcheck.rules.f_limits import F011, Deadline, Limits, Unreadable
 from unitcad.shape import Polyhedron
@@ -102,13 +105,8 @@ def _bodies(path: Path) -> list[tuple[str, np.ndarray, np.ndarray]]:
     limits = Limits()
     deadline, data = Deadline(limits.seconds), memoryview(path.read_bytes())
     if _is_step(path):
-        from unitcad.meshcheck.readers.step_bodies import step_bodies
-
         return step_bodies(path, TOLERANCE, limits.seconds)
     if sniff.kind_of(path.name) == "3mf":
-        from unitcad.meshcheck.readers.threemf.opc import open_package
-        from unitcad.meshcheck.readers.threemf.read_3mf import read_build
-
         build = read_build(open_package(data, limits, deadline, strict=False), limits)
         instances = build.instances if build else []
         placed = [(one.object.attributes.get("name", ""), one.mesh(placed=True)) for one in instances]

@@ -13,6 +13,7 @@ from unitcad import notebook
 from unitcad.arguments import check_number, path, texts
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.pipeline.plan import checked_outputs
+from unitcad.report import write_report
 from unitcad.report.batch_table import read_batch
 from unitcad.spec.asked import OUTPUTS, Format
 from unitcad.sweeps.batch_options import BatchOptions
@@ -160,8 +161,6 @@ def batch(
     )
     summary = make(wanted, folder, options, Workers(jobs))
     if report:
-        from unitcad.report import write_report
-
         write_report(folder)
     return BatchResult(folder / options.shard.folder if options.shard else folder, summary)
 

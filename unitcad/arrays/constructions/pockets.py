@@ -21,7 +21,9 @@ from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, unit_bodies
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import UnitcadError
+from unitcad.kernels.mesh import realise, segment_count
 from unitcad.moulds.blade import bar
+from unitcad.moulds.cavities import united
 from unitcad.moulds.cuts import seams
 from unitcad.moulds.dovetails import Seam, split
 from unitcad.moulds.labels import engraved, set_label
@@ -167,8 +169,6 @@ def unfit(unit: Spec, sheet: Sheet) -> str:
     """
     if design_of(unit).tooling == "concentric":
         return ""  # rings of these radii: their tails leave where `level` looks
-    from unitcad.kernels.mesh import realise, segment_count
-    from unitcad.moulds.cavities import united
 
     try:
         bodies = unit_bodies(unit)

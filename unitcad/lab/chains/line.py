@@ -12,6 +12,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import make_lsq_spline
+from scipy.signal import oaconvolve
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from unitcad.geometry.arrays import Bools, Floats
 from unitcad.lab.chains.chain import Chain, ChainTable, Line, LineFit, Mains, Phase
@@ -215,7 +219,6 @@ def most_of_noise(count: int) -> float:
     One record in 1 / FALSE_ALARM exceeds it at most, with the deviation estimated from the same samples: three standard
     errors of a median of absolute values, 1.17 over the root of the count, are added.
     """
-    from scipy.stats import norm
 
     return float(norm.isf(FALSE_ALARM / 4 / count)) * (1 + 3 * 1.17 / np.sqrt(count))
 
@@ -391,7 +394,6 @@ def _length(count: int) -> int:
 
 def envelope(x: Floats, good: Bools, rate: float, frequency: float) -> tuple[Floats, Floats]:
     """Return times in s and the line's complex amplitude there; samples that are not `good` count for nothing."""
-    from scipy.signal import oaconvolve
 
     count = min(max(int(WINDOW_S * rate), 8), len(x) // 2)
     window = np.hanning(count + 2)[1:-1]
@@ -421,7 +423,6 @@ def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
 
     None at all where fewer than three points have a line. A spline has a point between any two of its knots.
     """
-    from scipy.interpolate import make_lsq_spline
 
     there = np.abs(line) > NO_LINE * np.abs(line).max(initial=0.0)
     time, line = time[there], line[there]
@@ -563,7 +564,6 @@ def of_mean(values: Floats, noise_variance: float) -> tuple[float, float]:
     The correlation of neighbours makes fewer of them independent; its estimate is too small in short series by about
     (1 + 3 r)/n (Kendall 1954). Few values make the deviation uncertain: it is widened as Student's t is.
     """
-    from scipy.stats import t as student
 
     count = len(values)
     left = values - values.mean()

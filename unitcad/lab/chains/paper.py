@@ -10,6 +10,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from scipy.signal import butter, filtfilt, freqz, iircomb, lfilter, resample_poly, sosfilt, sosfiltfilt, sosfreqz
 
 from unitcad.errors import Refusal
 from unitcad.geometry.arrays import Floats
@@ -25,7 +26,6 @@ MOST_MASKED = 2e-4
 
 def gain(table: ChainTable, frequency_hz: float) -> float:
     """Return the filters' gain of an amplitude at a frequency in Hz."""
-    from scipy.signal import freqz, sosfreqz
 
     band, comb = _filters(table)
     at: Any = np.array([frequency_hz])
@@ -39,7 +39,6 @@ def amplitude(table: ChainTable, x: Floats, rate: float) -> float:
     Samples of another rate than 2 kHz go through a polyphase filter. Raises Refusal for a record shorter than what is
     trimmed, or without a sample.
     """
-    from scipy.signal import filtfilt, lfilter, resample_poly, sosfilt, sosfiltfilt
 
     x = np.where(np.isfinite(x), x, 0.0)
     if abs(rate / RATE_HZ - 1) >= 1e-6:
@@ -84,7 +83,6 @@ def _unfit(fits: list[LineFit]) -> str:
 
 
 def _filters(table: ChainTable) -> tuple[Any, tuple[Any, Any]]:
-    from scipy.signal import butter, iircomb
 
     band = butter(table.order, (LOW_HZ, HIGH_HZ), "bandpass", fs=RATE_HZ, output="sos")
     return band, iircomb(COMB_HZ, table.q, fs=RATE_HZ)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.io import loadmat, whosmat
 
 from unitcad.lab.readers import Channel, Layout, Unreadable, expect_held
 
@@ -24,7 +25,6 @@ DEEPEST = 3
 
 def read(path: Path, layout: Layout) -> list[Channel]:
     """Return the numeric vectors and columns of a file; a struct's field x is named struct.x. Raises Unreadable."""
-    from scipy.io import loadmat, whosmat
 
     _expect_small(path)
     with warnings.catch_warnings():

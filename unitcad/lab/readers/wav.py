@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from scipy.io import wavfile
 
 from unitcad.lab.readers import Channel, Layout, Unreadable
 
@@ -16,7 +17,6 @@ LIBRARY = "scipy"
 
 def read(path: Path, layout: Layout) -> list[Channel]:
     """Return the channels of a WAV file. Raises Unreadable where its header contradicts itself or its length."""
-    from scipy.io import wavfile
 
     _expect_consistent(path)
     with warnings.catch_warnings():
