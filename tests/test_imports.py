@@ -49,8 +49,6 @@ OF_OTHERS = {
         "numpy.ma",
         "unitcad.meshcheck.rules.d_walls",
         "unitcad.meshcheck.rules.m_manifest",
-        "unitcad.meshcheck.geometry.rays",
-        "unitcad.meshcheck.geometry.small_shells",
         "tomllib",
     ),
     "build": ("unitcad.moulds.dovetails",),

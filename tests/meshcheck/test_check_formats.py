@@ -20,8 +20,7 @@ from shapes import box, stl, text_stl
 from unitcad.errors import Refusal
 from unitcad.meshcheck import FileReport, Options, check_file, check_mesh
 from unitcad.meshcheck.findings import SEVERITIES, Finding, Location, merge
-from unitcad.meshcheck.geometry.source import Source
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.many_files import check_files
 from unitcad.meshcheck.one_mesh import check_surface, in_file
 from unitcad.meshcheck.output import as_text

@@ -15,7 +15,7 @@ from polygon_files import every_way, obj, off, ply
 from shapes import CUBE_CORNERS
 
 from unitcad.meshcheck.findings import Finding
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.readers.sniff import reader_of
 from unitcad.meshcheck.rules.f_limits import Deadline, Limits
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+    from unitcad.meshcheck.geometry.mesh import Mesh
 
 SHOWN = 5
 """Locations of a finding unless more are asked for; its count says how many there are."""

@@ -12,7 +12,7 @@ from unitcad.meshcheck.detail import detail
 from unitcad.text import number
 
 if TYPE_CHECKING:
-    from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+    from unitcad.meshcheck.geometry.mesh import Mesh
 
 SEVERITIES = ("info", "warning", "error")
 _MOST_CODES = 5

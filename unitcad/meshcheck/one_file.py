@@ -15,7 +15,7 @@ import numpy as np
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.detail import detailed
 from unitcad.meshcheck.findings import Facts, FileReport, Finding, ending, merge
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.readers import sniff
 from unitcad.meshcheck.rules.f_file import F001, F005, F012

@@ -13,10 +13,9 @@ from unitcad.geometry.arrays import distinct_values, extent
 from unitcad.geometry.ticks import Tick
 from unitcad.meshcheck.detail import detail
 from unitcad.meshcheck.findings import Facts, Finding, Location, ending, point
-from unitcad.meshcheck.geometry.arranged import arranged
-from unitcad.meshcheck.geometry.stars import stars_of
+from unitcad.meshcheck.geometry.mesh import Mesh, representable
+from unitcad.meshcheck.geometry.sieves import arranged, stars_of
 from unitcad.meshcheck.geometry.topology import surface_of, topology_on, works_on
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, representable
 from unitcad.meshcheck.rules import registry
 from unitcad.meshcheck.rules.f_file import F001
 from unitcad.meshcheck.rules.f_limits import Deadline, keeping

@@ -12,7 +12,7 @@ import numpy as np
 from unitcad.geometry.arrays import extent
 from unitcad.geometry.boxes import box_pairs
 from unitcad.meshcheck.findings import Finding, Location, counted, point
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, solid_of
+from unitcad.meshcheck.geometry.mesh import Mesh, solid_of
 from unitcad.meshcheck.rules.f_limits import Deadline, Unreadable
 from unitcad.meshcheck.rules.g_shells import G002
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from unitcad.meshcheck.findings import Facts, Finding, counted, number
+from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
 from unitcad.meshcheck.geometry.topology import topology_of
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, weld_exact
 from unitcad.meshcheck.one_mesh import check_on_bed
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.overlaps import Solid, overlapping

@@ -16,8 +16,8 @@ import numpy as np
 
 from unitcad.geometry.arrays import Floats, cross, distinct_values, extent
 from unitcad.meshcheck.findings import Facts, Finding, ending, point
+from unitcad.meshcheck.geometry.mesh import LARGEST
 from unitcad.meshcheck.geometry.topology import diagonals, topology_of
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST
 from unitcad.meshcheck.one_mesh import CheckedMesh, check_on_bed, check_surface
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.overlaps import Solid, overlapping

@@ -13,8 +13,7 @@ import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, distinct_values
 from unitcad.meshcheck.findings import Finding, Location, counted, number
-from unitcad.meshcheck.geometry.source import Source
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST, Mesh, weld_points
+from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, Source, weld_points
 from unitcad.meshcheck.rules.f_file import F001, F002, F008, F013
 from unitcad.meshcheck.rules.f_limits import F011, Deadline, Limits
 from unitcad.meshcheck.rules.p_package import P011

@@ -7,8 +7,7 @@ import re
 import numpy as np
 
 from unitcad.meshcheck.findings import Finding, counted
-from unitcad.meshcheck.geometry.source import Source
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers import rows
 from unitcad.meshcheck.readers.polygons import Polygons, check_promise, mesh_of
 from unitcad.meshcheck.readers.rows import Rows

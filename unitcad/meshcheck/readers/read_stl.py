@@ -14,7 +14,7 @@ import numpy as np
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.detail import SHOWN
 from unitcad.meshcheck.findings import Finding, Location, counted
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, weld_exact
+from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
 from unitcad.meshcheck.readers import rows
 from unitcad.meshcheck.readers.rows import NUMBER
 from unitcad.meshcheck.rules.f_file import F001, F002, F003, F005, F006, F007, F008, F009, F010, not_a_number

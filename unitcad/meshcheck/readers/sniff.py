@@ -13,7 +13,7 @@ from pkgutil import iter_modules
 
 from unitcad.meshcheck import readers
 from unitcad.meshcheck.findings import Finding
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.rules.f_limits import Deadline, Limits
 from unitcad.meshcheck.units import UNITS_MM
 

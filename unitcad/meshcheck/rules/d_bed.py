@@ -13,8 +13,8 @@ import numpy as np
 
 from unitcad.geometry.arrays import distinct_values
 from unitcad.meshcheck.findings import Finding, counted, number
+from unitcad.meshcheck.geometry.rays import winding_number
 from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.geometry.volumes import winding_number
 from unitcad.meshcheck.rules.inspection import Inspection
 from unitcad.meshcheck.rules.places import at_region
 from unitcad.meshcheck.rules.rule import Rule

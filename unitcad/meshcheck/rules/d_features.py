@@ -16,9 +16,9 @@ from unitcad.geometry.arrays import Floats, Ints, distinct_values
 from unitcad.geometry.components import components
 from unitcad.geometry.ticks import Tick
 from unitcad.meshcheck.findings import Finding, Location, counted, number
+from unitcad.meshcheck.geometry.mesh import solid_of
 from unitcad.meshcheck.geometry.rays import Rays
 from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.geometry.triangle_mesh import solid_of
 from unitcad.meshcheck.rules.inspection import Inspection
 from unitcad.meshcheck.rules.places import at_region
 from unitcad.meshcheck.rules.rule import Rule

@@ -10,13 +10,21 @@ import numpy as np
 from unitcad.geometry.arrays import Floats, Ints, among, distinct, distinct_values
 from unitcad.meshcheck.detail import detail
 from unitcad.meshcheck.findings import Finding, Location, counted, point
-from unitcad.meshcheck.geometry.coverings import folded_edges, kinds, through_edges
-from unitcad.meshcheck.geometry.depths import covering_depths, crossing_depths, folded
-from unitcad.meshcheck.geometry.edges import edges_of, turns_of
-from unitcad.meshcheck.geometry.self_crossing import Crossings, Faces, facing, joined
-from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.geometry.triangle_mesh import float32_step, same_place
-from unitcad.meshcheck.geometry.triangles import common_point
+from unitcad.meshcheck.geometry.crossings import (
+    Crossings,
+    Faces,
+    covering_depths,
+    crossing_depths,
+    facing,
+    folded,
+    folded_edges,
+    joined,
+    kinds,
+    through_edges,
+)
+from unitcad.meshcheck.geometry.mesh import float32_step, same_place
+from unitcad.meshcheck.geometry.predicates import common_point
+from unitcad.meshcheck.geometry.topology import Topology, edges_of, turns_of
 from unitcad.meshcheck.rules.g_shells import SPECK
 from unitcad.meshcheck.rules.inspection import Inspection
 from unitcad.meshcheck.rules.places import at_edges

@@ -12,10 +12,10 @@ from unitcad.geometry.arrays import Bools, Floats, Ints, among, grouped
 from unitcad.geometry.boxes import box_pairs
 from unitcad.geometry.ticks import Interrupted, Tick, TooMany
 from unitcad.meshcheck.findings import Finding, Location, counted, number, point
+from unitcad.meshcheck.geometry.mesh import solid_of
+from unitcad.meshcheck.geometry.predicates import without_area
+from unitcad.meshcheck.geometry.rays import winding_numbers
 from unitcad.meshcheck.geometry.topology import Topology, diagonals
-from unitcad.meshcheck.geometry.triangle_mesh import solid_of
-from unitcad.meshcheck.geometry.triangles import without_area
-from unitcad.meshcheck.geometry.volumes import winding_numbers
 from unitcad.meshcheck.rules.inspection import Inspection
 from unitcad.meshcheck.rules.places import at_region
 from unitcad.meshcheck.rules.rule import Rule

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 from unitcad.geometry.ticks import Tick
 from unitcad.meshcheck.detail import detail
-from unitcad.meshcheck.geometry.arranged import Arranged, arranged
-from unitcad.meshcheck.geometry.self_crossing import Crossings, crossings_of
-from unitcad.meshcheck.geometry.stars import Stars, stars_of
+from unitcad.meshcheck.geometry.crossings import Crossings, crossings_of
+from unitcad.meshcheck.geometry.mesh import Mesh
+from unitcad.meshcheck.geometry.sieves import Arranged, Stars, arranged, stars_of
 from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer

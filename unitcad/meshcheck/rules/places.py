@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Location, point
-from unitcad.meshcheck.geometry.edges import Edges
+from unitcad.meshcheck.geometry.topology import Edges
 
 
 def at_faces(vertices: Floats, faces: Ints, kept: Ints, which: Iterable[int]) -> Iterator[Location]:

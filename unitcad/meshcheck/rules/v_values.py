@@ -8,8 +8,8 @@ import numpy as np
 
 from unitcad.geometry.arrays import Floats
 from unitcad.meshcheck.findings import Finding, Location, counted, ending, number
+from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, float32_steps
 from unitcad.meshcheck.geometry.topology import diagonals
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST, Mesh, float32_steps
 from unitcad.meshcheck.rules.inspection import Inspection
 from unitcad.meshcheck.rules.rule import Rule
 

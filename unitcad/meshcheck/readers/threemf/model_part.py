@@ -13,7 +13,7 @@ import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Location
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST
+from unitcad.meshcheck.geometry.mesh import LARGEST
 from unitcad.meshcheck.readers.threemf import elements
 from unitcad.meshcheck.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.meshcheck.readers.threemf.numeric_text import coordinate, transform
