@@ -11,7 +11,7 @@ from make_checks import markdown
 from shapes import box, stl
 
 from unitcad.meshcheck import check_bytes, rules
-from unitcad.meshcheck.output.render import render
+from unitcad.meshcheck.output import render
 from unitcad.meshcheck.rules import registry
 
 LONG = """

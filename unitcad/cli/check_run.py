@@ -54,9 +54,8 @@ class Asked:
 def run(asked: Asked) -> int:
     """Check the files and print or save the report; return the exit code. Raises UnitcadError or Refusal."""
     from unitcad.cli import check_settings
-    from unitcad.meshcheck import Options, detail, many_files
-    from unitcad.meshcheck.output import as_text
-    from unitcad.meshcheck.output.render import FORMATS, render
+    from unitcad.meshcheck import Options, detail, many_files, output
+    from unitcad.meshcheck.output import FORMATS, render
     from unitcad.meshcheck.rules.registry import check_prefixes, rules
     from unitcad.meshcheck.rules.registry import explain as explanation
     from unitcad.meshcheck.units import unit_named
@@ -122,7 +121,7 @@ def run(asked: Asked) -> int:
         known = baselines.write(base, known, reports) if asked.write_baseline else known
         reports = [baselines.apply(known, base, report) for report in reports]
     reports = [report.shortened(shown) for report in reports]
-    table = as_text.statistics(reports) if asked.statistics else ""
+    table = output.statistics(reports) if asked.statistics else ""
     used = None if base is None else base.as_posix()
     for format_, path in copies:
         _save(path, render(reports, format_, fail_on, configuration.shown, used))
