@@ -89,7 +89,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     from unitcad.meshcheck.geometry.mesh import Mesh
     from unitcad.meshcheck.geometry.sieves import arranged, stars_of
     from unitcad.meshcheck.geometry.topology import topology_of
-    from unitcad.meshcheck.rules.f_limits import Deadline
+    from unitcad.meshcheck.rules.f_file import Deadline
 
     vertices, faces = getattr(meshes, shape)(size)
     found = topology_of(Mesh(vertices, faces), Deadline(600).tick)
@@ -165,7 +165,7 @@ def measure(size: int, peer: str | None, rounds: int, folder: Path) -> list[str]
     from unitcad.meshcheck import check_file, check_mesh
     from unitcad.meshcheck.geometry.mesh import Mesh
     from unitcad.meshcheck.geometry.topology import topology_of
-    from unitcad.meshcheck.rules.f_limits import Deadline
+    from unitcad.meshcheck.rules.f_file import Deadline
 
     vertices, faces = torus(size)
     path = folder / f"torus-{size}.stl"

@@ -46,7 +46,6 @@ NEEDLESS = ("unitcad.arrays.array_file",)
 """What neither a unit's build nor a check needs, and takes longer to load than a small mesh takes to check."""
 OF_OTHERS = {
     "check": (
-        "numpy.ma",
         "unitcad.meshcheck.rules.d_walls",
         "unitcad.meshcheck.rules.m_manifest",
         "tomllib",

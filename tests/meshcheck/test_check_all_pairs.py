@@ -12,7 +12,7 @@ from unitcad.meshcheck.geometry import crossings, sieves
 from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
 from unitcad.meshcheck.geometry.sieves import arranged, stars_of
 from unitcad.meshcheck.geometry.topology import topology_of
-from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.rules.f_file import Deadline
 
 KINDS = ["lattice", "lattice of tenths", "random", "one tilted plane", "sheared lattice", "slivers", "about a vertex",
          "two heights", "boxes", "turned boxes", "block of boxes", "block of boxes and sheets", "far away"]  # fmt: skip

@@ -21,7 +21,7 @@ from unitcad.meshcheck.geometry.predicates import (
     orient2d_columns,
     orient3d,
 )
-from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.rules.f_file import Deadline
 from unitcad.meshcheck.rules.registry import explain
 
 

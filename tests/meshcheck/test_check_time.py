@@ -12,7 +12,7 @@ from unitcad.meshcheck import check_bytes
 from unitcad.meshcheck.findings import Facts, FileReport
 from unitcad.meshcheck.geometry import crossings
 from unitcad.meshcheck.options import Options
-from unitcad.meshcheck.rules.f_limits import Deadline, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import Deadline, OutOfTime, Unreadable
 
 
 def _open_and_crossing() -> tuple[np.ndarray, np.ndarray]:
@@ -117,7 +117,7 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
 
     from unitcad.meshcheck import many_files
     from unitcad.meshcheck.rules import g_shells
-    from unitcad.meshcheck.rules.f_limits import Limits
+    from unitcad.meshcheck.rules.f_file import Limits
 
     if not hasattr(signal, "setitimer"):
         pytest.skip("no interval timer")

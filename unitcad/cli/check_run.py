@@ -54,11 +54,12 @@ class Asked:
 def run(asked: Asked) -> int:
     """Check the files and print or save the report; return the exit code. Raises UnitcadError or Refusal."""
     from unitcad.cli import check_settings
-    from unitcad.meshcheck import Options, detail, many_files, output
+    from unitcad.meshcheck import Options, many_files, output
+    from unitcad.meshcheck.findings import MOST, SHOWN
     from unitcad.meshcheck.output import FORMATS, render
     from unitcad.meshcheck.rules.registry import check_prefixes, rules
     from unitcad.meshcheck.rules.registry import explain as explanation
-    from unitcad.meshcheck.units import unit_named
+    from unitcad.meshcheck.rules.s_scale import unit_named
 
     if asked.list_rules:
         sys.stdout.write("".join(f"{rule.code} {rule.severity}: {rule.title}\n" for rule in rules().values()))
@@ -99,7 +100,7 @@ def run(asked: Asked) -> int:
         limits=_limits(
             asked.max_faces or configuration.value("max_faces"), *configuration.chosen("timeout", asked.timeout)
         ),
-        locations=detail.MOST if asked.all_locations or base is not None or asked.show is not None else detail.SHOWN,
+        locations=MOST if asked.all_locations or base is not None or asked.show is not None else SHOWN,
         draw=asked.show is not None,
     )
     if not asked.files and asked.manifest is None:
@@ -116,7 +117,7 @@ def run(asked: Asked) -> int:
     left_out = configuration.left_out(asked.exclude or [])
     files, unread = many_files.expand(asked.files or [], left_out)
     reports = unread + _reports(files, configuration, options, asked.manifest, check_all)
-    shown = detail.MOST if asked.all_locations else detail.SHOWN
+    shown = MOST if asked.all_locations else SHOWN
     if base is not None:
         known = baselines.write(base, known, reports) if asked.write_baseline else known
         reports = [baselines.apply(known, base, report) for report in reports]

@@ -18,8 +18,7 @@ from urllib.parse import quote
 
 from unitcad import __version__
 from unitcad.meshcheck.findings import SEVERITIES, Facts, FileReport, Finding, counted, first_line, number, with_places
-from unitcad.meshcheck.rules.registry import rules
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule, rules
 from unitcad.text import markdown, printable, xml_attribute, xml_text
 
 

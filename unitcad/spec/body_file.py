@@ -20,7 +20,7 @@ from unitcad.meshcheck.one_file import check_file
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.readers import sniff
 from unitcad.meshcheck.rules import s_scale
-from unitcad.meshcheck.rules.f_limits import F011, Deadline, Limits, Unreadable
+from unitcad.meshcheck.rules.f_file import F011, Deadline, Limits, Unreadable
 from unitcad.shape import Polyhedron
 from unitcad.shape.profile import GRID_PER_MM
 

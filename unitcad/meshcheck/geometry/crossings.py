@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, distinct_values, sorted_with_order
+from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, sorted_with_order
 from unitcad.geometry.boxes import Slabs, box_pairs, meeting_parts
 from unitcad.geometry.ticks import Interrupted, Tick, TooMany
 from unitcad.meshcheck.geometry import predicates
@@ -87,7 +87,7 @@ def through_edges(turns: Turns | None, shells: Ints) -> Ints:
     np.minimum.at(low, of, level[between])
     np.maximum.at(high, of, level[between])
     evenly = np.add.reduceat(change, start) == 0
-    return turns.many[distinct_values(group[start][(high - low > 1) & evenly])]
+    return turns.many[np.unique(group[start][(high - low > 1) & evenly])]
 
 
 def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> tuple[Ints, Floats, Floats]:

@@ -7,15 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from unitcad.geometry.arrays import Floats, Ints, by_appearance, distinct, order_of_packed
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
 
 _NO_INDEX = np.empty(0, np.int64)
 
@@ -174,8 +171,6 @@ def float32_steps(places: Floats) -> Floats:
 
 def solid_of(vertices: Floats, faces: Ints) -> Manifold:
     """Make manifold3d's solid of a mesh, vertices (n, 3) mm and faces (m, 3); empty where it refuses the mesh."""
-    from manifold3d import Manifold, Mesh64
-
     return Manifold(Mesh64(vert_properties=vertices, tri_verts=faces.astype(np.uint64)))
 
 

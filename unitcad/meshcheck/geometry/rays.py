@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, distinct_values
+from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, morton_order
 from unitcad.geometry.ticks import Tick
 from unitcad.meshcheck.geometry.topology import Topology, max_side_squared
@@ -109,7 +109,7 @@ def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float)
     while (count * (count + 1) // 2)[sound].sum() > _SAMPLES and count.max() > 1:
         count = np.maximum(count - 1, 1)
     points, owner = [], []
-    for n in distinct_values(count[sound]):
+    for n in np.unique(count[sound]):
         which = np.flatnonzero(sound & (count == n))
         grid = [(i, j) for i in range(n) for j in range(n - i)]
         weights = np.array([[3 * i + 1, 3 * j + 1, 3 * (n - 1 - i - j) + 1] for i, j in grid]) / (3 * n)

@@ -19,16 +19,14 @@ from unitcad.geometry.arrays import (
     by_appearance,
     cross,
     distinct,
-    distinct_values,
     extent,
     extents,
     order_of_packed,
     sorted_with_order,
 )
 from unitcad.geometry.boxes import box_pairs
-from unitcad.geometry.components import components, scipy_pays
+from unitcad.geometry.components import components
 from unitcad.geometry.ticks import Tick
-from unitcad.lean_import import postpone_tools
 from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_steps, same_place
 
 _FACES = 1 << 14  # faces that stay in the processor's cache
@@ -100,8 +98,11 @@ def _sorted_edges(faces: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:
     """Return half-edges in the order of (low, high, half-edge), and these two ends in that order."""
     n, bits = 3 * len(faces), max(n_vertices - 1, 1).bit_length()
     room = max(n - 1, 1).bit_length()
-    if scipy_pays(n) or 2 * bits + room > 64:
-        return _by_transposing(faces, n_vertices)
+    if 2 * bits + room > 64:
+        start, end = half_edges(faces)
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        order = np.lexsort((high, low)).astype(np.int32)
+        return order, low[order], high[order]
     key = np.empty((len(faces), 3), np.uint64)
     for first in range(0, len(faces), _FACES):
         some = faces[first : first + _FACES]
@@ -117,21 +118,6 @@ def _sorted_edges(faces: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:
     np.right_shift(ends, np.uint64(bits), out=low, casting="unsafe")
     np.bitwise_and(ends, np.uint64((1 << bits) - 1), out=high, casting="unsafe")
     return order, low, high
-
-
-def _by_transposing(faces: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:
-    """Return what `_sorted_edges` does, of many half-edges: to transpose a sparse matrix is a counting sort.
-
-    First by the high end, then by the low one.
-    """
-    postpone_tools()
-    from scipy.sparse import csr_array
-
-    start, end = half_edges(faces)
-    n, low, high = len(start), np.minimum(start, end), np.maximum(start, end)
-    by_high = csr_array((low, high, np.arange(n + 1, dtype=np.int32)), shape=(n, n_vertices)).tocsc()
-    by_low = csr_array((by_high.indices, by_high.data, by_high.indptr), shape=(n_vertices, n_vertices)).tocsc()
-    return by_low.data, np.repeat(np.arange(n_vertices, dtype=np.int32), np.diff(by_low.indptr)), by_low.indices
 
 
 def opposite(edges: Edges, n_half: int) -> Ints:
@@ -277,7 +263,7 @@ def _around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> Turns:
 def _order_within(size: Ints, starts: Ints, values: Floats) -> Ints:
     """Return the order of values by size within each of some groups that follow each other; equal ones stay."""
     order = np.arange(len(values))
-    for n in distinct_values(size).tolist():
+    for n in np.unique(size).tolist():
         places = starts[size == n][:, None] + np.arange(n)
         order[places] = np.take_along_axis(places, np.argsort(values[places], axis=1, kind="stable"), axis=1)
     return order
@@ -341,7 +327,7 @@ def join(vertices: Floats, faces: Ints, loose: Ints) -> Seams:
     place[loose] = loose[same_place(vertices[loose])]
     stored = place[faces]
     whole = _three(stored)
-    points = distinct_values(place[loose])
+    points = np.unique(place[loose])
     short = _shortest_edges(vertices, stored[whole], points)
     step = 2 * float32_steps(vertices[points])
     part = connected(stored, n)
@@ -396,7 +382,7 @@ def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
     """
     near = [np.empty((0, 2), np.int64)]
     level = np.ceil(np.log2(np.maximum(reach, 1e-300)) / 2)
-    for size in distinct_values(level):
+    for size in np.unique(level):
         some = np.flatnonzero(level >= size)
         if len(some) > 1:
             pairs = some[_within(points[some], float(4.0**size))]
@@ -714,7 +700,7 @@ def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[In
     """Return the faces welded and as stored, what they are in the file, the edges of the former, and the open edges."""
 
     open_ = np.flatnonzero(edges.size == 1)
-    seams = join(vertices, faces, distinct_values(np.concatenate([edges.low[open_], edges.high[open_]])))
+    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])))
     joined, stored, whole = seams.joined, seams.stored, seams.whole
     if not whole.all():
         joined, stored, whole_kept = joined[whole], stored[whole], kept[whole]

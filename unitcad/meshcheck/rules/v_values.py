@@ -11,7 +11,7 @@ from unitcad.meshcheck.findings import Finding, Location, counted, ending, numbe
 from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, float32_steps
 from unitcad.meshcheck.geometry.topology import diagonals
 from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 V001 = Rule("""
     V001 error: NaN or infinity

@@ -19,7 +19,7 @@ from unitcad.meshcheck.readers.threemf.model_data import LINE, Model, Object, Re
 from unitcad.meshcheck.readers.threemf.numeric_text import coordinate, transform
 from unitcad.meshcheck.readers.threemf.uniform_blocks import UniformBlock, rest_for_parser
 from unitcad.meshcheck.readers.threemf.xml_stream import forbidden, new_parser, stream
-from unitcad.meshcheck.rules.f_limits import F011, Limits, Unreadable
+from unitcad.meshcheck.rules.f_file import F011, Limits, Unreadable
 from unitcad.meshcheck.rules.p_package import P010, P016, P017, P018
 from unitcad.meshcheck.rules.v_values import V001
 
