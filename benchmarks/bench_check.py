@@ -85,12 +85,11 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     """Processor seconds of the crossing test alone, and of ours over those of pymeshlab and MeshLib, interleaved."""
     import meshes
 
-    from unitcad.meshcheck.geometry import self_crossing
-    from unitcad.meshcheck.geometry.arranged import arranged
-    from unitcad.meshcheck.geometry.stars import stars_of
+    from unitcad.meshcheck.geometry import crossings
+    from unitcad.meshcheck.geometry.mesh import Mesh
+    from unitcad.meshcheck.geometry.sieves import arranged, stars_of
     from unitcad.meshcheck.geometry.topology import topology_of
-    from unitcad.meshcheck.geometry.triangle_mesh import Mesh
-    from unitcad.meshcheck.rules.f_limits import Deadline
+    from unitcad.meshcheck.rules.f_file import Deadline
 
     vertices, faces = getattr(meshes, shape)(size)
     found = topology_of(Mesh(vertices, faces), Deadline(600).tick)
@@ -101,7 +100,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     times: dict[str, list[float]] = {"ours": [], "pymeshlab": [], "meshlib": []}
     for _ in range(rounds):
         start = time.process_time()
-        self_crossing.crossings_of(found, arranged(found), stars_of(found), Deadline(600).tick)
+        crossings.crossings_of(found, arranged(found), stars_of(found), Deadline(600).tick)
         times["ours"].append(time.process_time() - start)
         for name in ("pymeshlab", "meshlib"):
             other.stdin.write(f"{name}\n")
@@ -164,9 +163,9 @@ def measure(size: int, peer: str | None, rounds: int, folder: Path) -> list[str]
     import trimesh
 
     from unitcad.meshcheck import check_file, check_mesh
+    from unitcad.meshcheck.geometry.mesh import Mesh
     from unitcad.meshcheck.geometry.topology import topology_of
-    from unitcad.meshcheck.geometry.triangle_mesh import Mesh
-    from unitcad.meshcheck.rules.f_limits import Deadline
+    from unitcad.meshcheck.rules.f_file import Deadline
 
     vertices, faces = torus(size)
     path = folder / f"torus-{size}.stl"

@@ -42,7 +42,7 @@ FLOORS = [
     {"workers"},
     {"errors"},
     {"text", "json_text", "notebook", "geometry"},
-    {"lean_import", "rooms"},
+    {"rooms"},
 ]
 ROOMS = {
     "accuracy": set(),
@@ -97,7 +97,6 @@ def test_attenuation_and_check_know_nothing_of_cad() -> None:
                 "workers",
                 "files",
                 "geometry",
-                "lean_import",
                 "notebook",
                 "text",
                 "errors",

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from unitcad.meshcheck.findings import Unreadable
 from unitcad.meshcheck.readers.threemf import elements, model_part, uniform_blocks
-from unitcad.meshcheck.rules.f_limits import Limits
+from unitcad.meshcheck.rules.f_file import Limits
 
 VERTICES = [
     '<vertex x="1" y="2.5" z="-3e-2"/>',

@@ -8,12 +8,11 @@ from exact_pairs import counts
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.geometry import boxes
-from unitcad.meshcheck.geometry import self_crossing, small_shells
-from unitcad.meshcheck.geometry.arranged import arranged
-from unitcad.meshcheck.geometry.stars import stars_of
+from unitcad.meshcheck.geometry import crossings, sieves
+from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
+from unitcad.meshcheck.geometry.sieves import arranged, stars_of
 from unitcad.meshcheck.geometry.topology import topology_of
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, weld_exact
-from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.rules.f_file import Deadline
 
 KINDS = ["lattice", "lattice of tenths", "random", "one tilted plane", "sheared lattice", "slivers", "about a vertex",
          "two heights", "boxes", "turned boxes", "block of boxes", "block of boxes and sheets", "far away"]  # fmt: skip
@@ -67,24 +66,24 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
     faces, labels = top.stored[solid], top.shells[solid]
     if len(faces) < 2:
         return 0, 0, 0
-    crossings, overlaps, touching = counts(vertices, faces)
+    crossing, overlaps, touching = counts(vertices, faces)
     shells = {tuple(sorted((int(labels[i]), int(labels[j])))) for i, j in touching if labels[i] != labels[j]}
-    for least in (self_crossing.LEAST_SHELLS, 1):  # by a tree over all faces, and shell by shell
+    for least in (crossings.LEAST_SHELLS, 1):  # by a tree over all faces, and shell by shell
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(self_crossing, "LEAST_SHELLS", least)
-            patch.setattr(small_shells, "_MOST_FACES", 100)
-            patch.setattr(small_shells, "_MOST_PAIRS", 1000)
-            found = self_crossing.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick)
+            patch.setattr(crossings, "LEAST_SHELLS", least)
+            patch.setattr(sieves, "_MOST_FACES", 100)
+            patch.setattr(sieves, "_MOST_PAIRS", 1000)
+            found = crossings.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick)
         assert (found.meeting is not None) == (least == 1)
-        _agree(found, kind, crossings, overlaps)
+        _agree(found, kind, crossing, overlaps)
         assert {tuple(pair) for pair in found.touching().tolist()} == shells
-    return crossings, len(self_crossing.joined(found.covering)), len(shells)
+    return crossing, len(crossings.joined(found.covering)), len(shells)
 
 
-def _agree(found: self_crossing.Crossings, kind: str, crossings: int, overlaps: tuple[int, int]) -> None:
-    assert len(self_crossing.joined(found.crossing)) == crossings
+def _agree(found: crossings.Crossings, kind: str, crossing: int, overlaps: tuple[int, int]) -> None:
+    assert len(crossings.joined(found.crossing)) == crossing
     # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.
-    covers = len(self_crossing.joined(found.covering))
+    covers = len(crossings.joined(found.covering))
     assert (0 if kind == "slivers" else overlaps[0]) <= covers <= overlaps[1]
 
 
@@ -94,7 +93,7 @@ def test_every_pair_is_what_fractions_say(kind: str, monkeypatch: pytest.MonkeyP
     sums = np.zeros(3, int)
     for seed in range(8):
         if seed == 4:
-            monkeypatch.setattr(self_crossing, "_BLOCK", 3)
+            monkeypatch.setattr(crossings, "_BLOCK", 3)
             monkeypatch.setattr(boxes, "_STEP_BITS", 2)
             monkeypatch.setattr(boxes, "_STEP", 4)
         sums += _compare(kind, seed)

@@ -18,7 +18,6 @@ BELOW = (
     "errors.py",
     "text.py",
     "files.py",
-    "lean_import.py",
     "workers.py",
     "geometry",
     "catalogue",
@@ -29,7 +28,7 @@ import json, sys
 from unitcad.catalogue import printers
 from unitcad.meshcheck import Options, baseline, check_file, manifest
 from unitcad.meshcheck.many_files import check_files
-from unitcad.meshcheck.output.render import FORMATS, render
+from unitcad.meshcheck.output import FORMATS, render
 
 assert baseline.EMPTY.files == {} and callable(manifest.read)
 options = Options(printer=printers()["fdm-0.4"])

@@ -13,7 +13,7 @@ from shapes import box, stl
 
 from unitcad.geometry import boxes
 from unitcad.geometry.ticks import TooMany
-from unitcad.meshcheck.geometry import hubs, self_crossing
+from unitcad.meshcheck.geometry import crossings, sieves
 
 Points = np.ndarray
 
@@ -38,8 +38,8 @@ def test_faces_round_a_hub_are_judged_as_others_are(
     if through is not None:
         body = np.concatenate([body, box((through, 4, 60), (14, -2, -20))])
     content, found = stl(body), []
-    for least in (hubs.LEAST, 10**9):
-        monkeypatch.setattr(hubs, "LEAST", least)
+    for least in (sieves.HUB_FACES, 10**9):
+        monkeypatch.setattr(sieves, "HUB_FACES", least)
         found.append([(item.code, item.severity, item.count) for item in judge(content).findings])
     assert found[0] == found[1]
     assert [code for code, _, _ in found[0]] == ([] if through is None else ["G001", "G002"])
@@ -48,8 +48,8 @@ def test_faces_round_a_hub_are_judged_as_others_are(
 def test_a_cone_of_many_facets_is_looked_at_in_few_pairs(monkeypatch: pytest.MonkeyPatch, judge: Judge) -> None:
     """Each facet has 40,000 others at its tip, and few at its base."""
     looked = []
-    real = self_crossing._sieved
-    monkeypatch.setattr(self_crossing, "_sieved", lambda *given: looked.append(len(given[2][0])) or real(*given))
+    real = crossings._sieved
+    monkeypatch.setattr(crossings, "_sieved", lambda *given: looked.append(len(given[2][0])) or real(*given))
     report = judge(stl(cone(20_000)))
     assert report.findings == ()
     assert sum(looked) < 50 * 40_000
@@ -77,13 +77,13 @@ def test_one_face_many_times_is_a_face_and_its_duplicates(judge: Judge) -> None:
 
 @pytest.mark.parametrize(
     ("module", "bound", "name"),
-    [(self_crossing, "_MOST_LOOKS", "faces"), (boxes, "MOST_PAIRS", "boxes")],
+    [(crossings, "_MOST_LOOKS", "faces"), (boxes, "MOST_PAIRS", "boxes")],
 )
 def test_too_many_pairs_end_a_check_which_says_what_it_found(
     module: object, bound: str, name: str, monkeypatch: pytest.MonkeyPatch, judge: Judge
 ) -> None:
     monkeypatch.setattr(module, bound, 20)
-    monkeypatch.setattr(self_crossing, "_LOOKS", 0)
+    monkeypatch.setattr(crossings, "_LOOKS", 0)
     body = np.concatenate([box(at=(i, i, i)) for i in range(20)])
     report = judge(stl(np.concatenate([body, box()[2:] + 100])))
     limit = next(found for found in report.findings if found.code == "F011")

@@ -12,9 +12,16 @@ from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
 from unitcad.meshcheck import check_mesh
-from unitcad.meshcheck.geometry.predicates import integers, orient2d, orient2d_columns, orient3d
-from unitcad.meshcheck.geometry.triangles import common_point, coplanar, meet
-from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.geometry.predicates import (
+    common_point,
+    coplanar,
+    integers,
+    meet,
+    orient2d,
+    orient2d_columns,
+    orient3d,
+)
+from unitcad.meshcheck.rules.f_file import Deadline
 from unitcad.meshcheck.rules.registry import explain
 
 

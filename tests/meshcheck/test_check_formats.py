@@ -18,15 +18,13 @@ from make_checks import markdown
 from shapes import box, stl, text_stl
 
 from unitcad.errors import Refusal
-from unitcad.meshcheck import FileReport, Options, check_file, check_mesh
+from unitcad.meshcheck import FileReport, Options, check_file, check_mesh, output
 from unitcad.meshcheck.findings import SEVERITIES, Finding, Location, merge
-from unitcad.meshcheck.geometry.source import Source
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.many_files import check_files
 from unitcad.meshcheck.one_mesh import check_surface, in_file
-from unitcad.meshcheck.output import as_text
-from unitcad.meshcheck.output.render import FORMATS, render
-from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.output import FORMATS, render
+from unitcad.meshcheck.rules.f_file import Deadline
 from unitcad.meshcheck.rules.registry import FAMILIES, check_prefixes, explain, rules
 
 HERE = Path(__file__).parent
@@ -308,7 +306,7 @@ def test_merge_adds_counts_and_keeps_the_worst() -> None:
 
 def test_statistics_count_files_and_findings() -> None:
     once = FileReport("a.stl", (Finding("T001", "error", "x", 2), Finding("T004", "warning", "y")))
-    lines = as_text.statistics([once, FileReport("b.stl", once.findings[:1])]).splitlines()
+    lines = output.statistics([once, FileReport("b.stl", once.findings[:1])]).splitlines()
     assert [line.split() for line in lines] == [
         ["2", "files", "4", "x", "T001", "boundary", "edge"],
         ["1", "file", "1", "x", "T004", "pinch", "vertex"],
@@ -356,7 +354,7 @@ def test_select_and_ignore_by_longest_prefix(tmp_path: Path) -> None:
 def test_importing_is_light() -> None:
     code = (
         "import sys, unitcad.meshcheck as c; c.Options(); "
-        "heavy = {'scipy', 'trimesh', 'manifold3d', 'OCP', 'msgspec'} & {m.split('.')[0] for m in sys.modules}; "
+        "heavy = {'scipy', 'trimesh', 'OCP', 'msgspec'} & {m.split('.')[0] for m in sys.modules}; "
         "sys.exit(repr(heavy) if heavy else 0)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -17,7 +17,7 @@ from test_check_command import run
 from typer.main import get_command
 
 from unitcad.cli import app, check_settings
-from unitcad.meshcheck.output.as_json import as_dict
+from unitcad.meshcheck.output import json_report
 
 needs_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action's script is bash")
 ROOT = Path(__file__).parent.parent.parent
@@ -237,7 +237,7 @@ def test_the_page_on_ci_shows_the_json_that_is_written(judge) -> None:
     shown = json.loads(page[page.index("```json\n") + 8 : page.index("```\n", page.index("```json"))])
     content = re.search(r"open\('open.obj', 'w'\).write\('(.*)'\)", page)
     assert content is not None
-    found = as_dict([judge(content.group(1).replace("\\n", "\n"), "open.obj")])
+    found = json_report([judge(content.group(1).replace("\\n", "\n"), "open.obj")])
     found["files"][0]["path"] = "open.obj"
     del found["files"][0]["findings"][0]["locations"][1:]
     found["files"][0]["facts"]["area_mm2"] = round(found["files"][0]["facts"]["area_mm2"], 6)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, box, in_format, stl, turned
 
 from unitcad.meshcheck import check_bytes, check_mesh
-from unitcad.meshcheck.geometry.triangle_mesh import weld_exact
+from unitcad.meshcheck.geometry.mesh import weld_exact
 from unitcad.meshcheck.rules.registry import explain
 
 BEAM = box((30_000, 10, 10), (0, 5, 0))

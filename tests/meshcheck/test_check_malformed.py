@@ -11,7 +11,7 @@ from malformed_files import good_text_meshes
 from shapes import box, model_xml, package, prism, stl, text_stl
 
 from unitcad.meshcheck import check_bytes
-from unitcad.meshcheck.output.render import FORMATS, render
+from unitcad.meshcheck.output import FORMATS, render
 from unitcad.meshcheck.rules.registry import rules
 
 CASES = cases()

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from unitcad.meshcheck.geometry import seams
+from unitcad.meshcheck.geometry import topology
 
 
 def _every(points: np.ndarray, reach: float) -> set[tuple[int, int]]:
@@ -16,7 +16,7 @@ def _every(points: np.ndarray, reach: float) -> set[tuple[int, int]]:
 
 
 def _found(points: np.ndarray, reach: float) -> set[tuple[int, int]]:
-    return {(min(a, b), max(a, b)) for a, b in seams._within(points, reach).tolist()}
+    return {(min(a, b), max(a, b)) for a, b in topology._within(points, reach).tolist()}
 
 
 @pytest.mark.parametrize("far", [0.0, 1e6, 1e30])

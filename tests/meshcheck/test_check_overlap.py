@@ -12,7 +12,7 @@ from manifold3d import triangulate
 from shapes import FORMATS, box, in_format, obj, stl, text_ply, turned
 
 from unitcad.meshcheck import check_bytes, check_mesh
-from unitcad.meshcheck.geometry.triangle_mesh import weld_exact
+from unitcad.meshcheck.geometry.mesh import weld_exact
 from unitcad.meshcheck.rules.registry import rules
 
 OVERLAP = {"G002", "G008", "T008", "G009", "T009"}

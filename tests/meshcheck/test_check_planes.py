@@ -6,15 +6,21 @@ import numpy as np
 import pytest
 
 from unitcad.geometry.boxes import frame_of, ranks_of, slabs_of
-from unitcad.meshcheck.geometry import self_crossing
-from unitcad.meshcheck.geometry.arranged import arranged
-from unitcad.meshcheck.geometry.contact import MOST_RANK, Contacts, face_boxes, ranked_boxes
-from unitcad.meshcheck.geometry.planes import Planes, planes_of
-from unitcad.meshcheck.geometry.stars import stars_of
+from unitcad.meshcheck.geometry import crossings
+from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors
+from unitcad.meshcheck.geometry.predicates import meet
+from unitcad.meshcheck.geometry.sieves import (
+    MOST_RANK,
+    Contacts,
+    Planes,
+    arranged,
+    face_boxes,
+    planes_of,
+    ranked_boxes,
+    stars_of,
+)
 from unitcad.meshcheck.geometry.topology import topology_of
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, area_vectors
-from unitcad.meshcheck.geometry.triangles import meet
-from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.rules.f_file import Deadline
 
 N = 4000
 
@@ -183,14 +189,12 @@ def test_few_pairs_and_many_are_sieved_alike(monkeypatch: pytest.MonkeyPatch) ->
     faces = np.arange(1800, dtype=np.int32).reshape(-1, 3)
     found = []
     for sparse in (0, 10**9):
-        monkeypatch.setattr(self_crossing, "_SPARSE", sparse)
+        monkeypatch.setattr(crossings, "_SPARSE", sparse)
         top = topology_of(Mesh(points, faces), Deadline(60).tick)
-        crossings = self_crossing.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick, every=True)
-        assert crossings.faces is not None
-        assert ("sieve" in vars(crossings.faces)) == (sparse > 0)
-        found.append(
-            (joined := self_crossing.joined)(crossings.crossing).tolist() + joined(crossings.covering).tolist()
-        )
-        found[-1] += crossings.contact.pairs()[1].tolist()
+        meeting = crossings.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick, every=True)
+        assert meeting.faces is not None
+        assert ("sieve" in vars(meeting.faces)) == (sparse > 0)
+        found.append((joined := crossings.joined)(meeting.crossing).tolist() + joined(meeting.covering).tolist())
+        found[-1] += meeting.contact.pairs()[1].tolist()
     assert sum(map(len, found[0])) > 100
     assert found[0] == found[1]

@@ -15,9 +15,9 @@ from polygon_files import every_way, obj, off, ply
 from shapes import CUBE_CORNERS
 
 from unitcad.meshcheck.findings import Finding
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.readers.sniff import reader_of
-from unitcad.meshcheck.rules.f_limits import Deadline, Limits
+from unitcad.meshcheck.rules.f_file import Deadline, Limits
 
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 HALF = [[0, 1, 3], [0, 3, 2], *QUADS[1:]]  # a cube of five quads and two triangles

@@ -15,7 +15,7 @@ from polygon_files import obj, off, ply
 from shapes import CUBE_CORNERS, box, text_stl
 
 from unitcad.meshcheck.readers.sniff import reader_of
-from unitcad.meshcheck.rules.f_limits import Deadline, Limits, Unreadable
+from unitcad.meshcheck.rules.f_file import Deadline, Limits, Unreadable
 
 FACET = "\n".join(text_stl(box()).split("\n")[1:8]) + "\n"
 CUBE = obj(CUBE_CORNERS, [[0, 1, 3], [0, 3, 2], [4, 6, 7]])

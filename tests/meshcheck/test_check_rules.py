@@ -11,12 +11,12 @@ from make_checks import markdown
 from shapes import box, stl
 
 from unitcad.meshcheck import check_bytes, rules
-from unitcad.meshcheck.output.render import render
+from unitcad.meshcheck.output import render
 from unitcad.meshcheck.rules import registry
 
 LONG = """
 from unitcad.meshcheck.findings import counted
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 G999 = Rule('''
     G999 warning: long shell

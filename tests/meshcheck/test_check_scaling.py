@@ -9,7 +9,7 @@ import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.meshcheck import check_mesh
-from unitcad.meshcheck.geometry import predicates, self_crossing, triangles
+from unitcad.meshcheck.geometry import crossings, predicates
 from unitcad.meshcheck.rules import g_shells
 
 Built = tuple[np.ndarray, np.ndarray]
@@ -53,8 +53,8 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Callable[[Built], dict[str, float]]
 
         monkeypatch.setattr(module, name, counted)
 
-    watch(self_crossing, "_decide_exactly", "sieved", lambda _, i, *others: len(i))
-    watch(triangles, "meet", "decided", lambda a, _: len(a))
+    watch(crossings, "_decide_exactly", "sieved", lambda _, i, *others: len(i))
+    watch(predicates, "meet", "decided", lambda a, _: len(a))
     watch(predicates, "integers", "integers", lambda values: values.shape[-1])
     watch(g_shells, "_shared", "booleans", lambda *_: 1)
 

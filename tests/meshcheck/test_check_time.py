@@ -10,9 +10,9 @@ from unitcad.catalogue import printers
 from unitcad.geometry import boxes
 from unitcad.meshcheck import check_bytes
 from unitcad.meshcheck.findings import Facts, FileReport
-from unitcad.meshcheck.geometry import self_crossing
+from unitcad.meshcheck.geometry import crossings
 from unitcad.meshcheck.options import Options
-from unitcad.meshcheck.rules.f_limits import Deadline, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import Deadline, OutOfTime, Unreadable
 
 
 def _open_and_crossing() -> tuple[np.ndarray, np.ndarray]:
@@ -40,7 +40,7 @@ def _threemf() -> bytes:
 @pytest.fixture
 def stopped(monkeypatch: pytest.MonkeyPatch):
     """Judge `data` with a clock that runs out at its n-th look."""
-    monkeypatch.setattr(self_crossing, "_BLOCK", 100)
+    monkeypatch.setattr(crossings, "_BLOCK", 100)
     monkeypatch.setattr(boxes, "_STEP_BITS", 4)
     monkeypatch.setattr(boxes, "_STEP", 16)
 
@@ -104,7 +104,7 @@ def test_no_memory_ends_as_a_limit_with_the_rest(monkeypatch: pytest.MonkeyPatch
     def fails(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(self_crossing, "_decide", fails)
+    monkeypatch.setattr(crossings, "_decide", fails)
     report = check_bytes(_stl(), "a.stl")
     assert report.has("F011")
     assert report.has("T001")
@@ -117,7 +117,7 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
 
     from unitcad.meshcheck import many_files
     from unitcad.meshcheck.rules import g_shells
-    from unitcad.meshcheck.rules.f_limits import Limits
+    from unitcad.meshcheck.rules.f_file import Limits
 
     if not hasattr(signal, "setitimer"):
         pytest.skip("no interval timer")

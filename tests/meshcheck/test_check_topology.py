@@ -11,10 +11,10 @@ from shapes import CUBE_CORNERS, CUBE_FACES, box, stl
 
 from unitcad.geometry.components import components
 from unitcad.meshcheck import check_mesh
-from unitcad.meshcheck.geometry import edges as mesh_edges
-from unitcad.meshcheck.geometry.edges import _order_within
-from unitcad.meshcheck.geometry.triangle_mesh import weld_exact
-from unitcad.meshcheck.geometry.volumes import winding_number
+from unitcad.meshcheck.geometry import topology
+from unitcad.meshcheck.geometry.mesh import weld_exact
+from unitcad.meshcheck.geometry.rays import winding_number
+from unitcad.meshcheck.geometry.topology import _order_within
 
 
 def _random_faces(seed: int, n_vertices: int, n_faces: int) -> np.ndarray:
@@ -32,31 +32,26 @@ def test_edges_are_counted_as_a_dictionary_counts_them(seed: int) -> None:
         for k in range(3):
             a, b = face[k], face[(k + 1) % 3]
             counted[min(a, b), max(a, b)] += 1
-    edges = mesh_edges.edges_of(faces, 12)
+    edges = topology.edges_of(faces, 12)
     found = {(int(a), int(b)): int(n) for a, b, n in zip(edges.low, edges.high, edges.size, strict=True)}
     assert found == dict(counted)
 
 
 @pytest.mark.parametrize(("n_vertices", "n_faces"), [(12, 0), (12, 20), (90, 4000), (70_000, 60_000)])
-def test_edges_are_sorted_alike_by_scipy_and_without(
-    n_vertices: int, n_faces: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_edges_are_sorted_by_their_ends(n_vertices: int, n_faces: int) -> None:
     faces = _random_faces(1, n_vertices, n_faces)
-    start, end = mesh_edges.half_edges(faces)
+    start, end = topology.half_edges(faces)
     low, high = np.minimum(start, end), np.maximum(start, end)
     order = np.lexsort((np.arange(len(low)), high, low))
-    for pays in (False, True):
-        monkeypatch.setattr(mesh_edges, "scipy_pays", lambda n, pays=pays: pays)
-        found = mesh_edges._sorted_edges(faces, n_vertices)
+    for room in (n_vertices, 2**31):  # packed into words, and by two keys
+        found = topology._sorted_edges(faces, room)
         for array, expected in zip(found, (order, low[order], high[order]), strict=True):
             assert array.dtype == np.int32
             assert (array == expected).all()
 
 
-@pytest.mark.parametrize("scipy", [False, True])
 @pytest.mark.parametrize("n", [1, 5, 300, 70_000])
-def test_components_as_a_search_finds_them(n: int, scipy: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("unitcad.geometry.components.scipy_pays", lambda n: scipy)
+def test_components_as_a_search_finds_them(n: int) -> None:
     rng = np.random.default_rng(n)
     left, right = rng.integers(0, n, (2, n // 2 + 1))
     label = components(n, left, right)
@@ -82,9 +77,7 @@ def test_components_as_a_search_finds_them(n: int, scipy: bool, monkeypatch: pyt
 @pytest.mark.parametrize("collisions", [False, True])
 def test_weld_joins_equal_corners_only_in_their_order(collisions: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if collisions:
-        monkeypatch.setattr(
-            "unitcad.meshcheck.geometry.triangle_mesh._mix", lambda bits: bits[:, 0].astype(np.uint64) % 3
-        )
+        monkeypatch.setattr("unitcad.meshcheck.geometry.mesh._mix", lambda bits: bits[:, 0].astype(np.uint64) % 3)
     rng = np.random.default_rng(0)
     corners = rng.integers(-2, 3, (500, 3, 3)).astype(np.float32) * np.float32(0.1)
     corners[corners == 0] = -0.0
@@ -96,7 +89,7 @@ def test_weld_joins_equal_corners_only_in_their_order(collisions: bool, monkeypa
 def test_weld_survives_a_hash_collision(monkeypatch: pytest.MonkeyPatch) -> None:
     corners = np.random.default_rng(1).normal(size=(50, 3, 3))
     expected = {tuple(row) for row in corners.reshape(-1, 3).tolist()}
-    monkeypatch.setattr("unitcad.meshcheck.geometry.triangle_mesh._mix", lambda bits: np.zeros(len(bits), np.uint64))
+    monkeypatch.setattr("unitcad.meshcheck.geometry.mesh._mix", lambda bits: np.zeros(len(bits), np.uint64))
     vertices, faces = weld_exact(corners)
     assert {tuple(row) for row in vertices.tolist()} == expected
     assert (vertices[faces] == corners).all()
@@ -104,12 +97,12 @@ def test_weld_survives_a_hash_collision(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_pinch_by_both_ways() -> None:
     faces = np.concatenate([CUBE_FACES, np.where(CUBE_FACES == 0, 7, CUBE_FACES + 8)]).astype(np.int32)
-    edges = mesh_edges.edges_of(faces, 16)
+    edges = topology.edges_of(faces, 16)
     assert edges.closed
-    across = mesh_edges.opposite(edges, 3 * len(faces))
-    assert mesh_edges.pinched_closed(faces, across, 16).tolist() == [7]
-    assert mesh_edges.pinched_open(faces, edges, 16).tolist() == [7]
-    assert mesh_edges.shells_of(faces, edges, mesh_edges.turns_of(np.zeros((16, 3)), faces, edges)).max() == 1
+    across = topology.opposite(edges, 3 * len(faces))
+    assert topology.pinched_closed(faces, across, 16).tolist() == [7]
+    assert topology.pinched_open(faces, edges, 16).tolist() == [7]
+    assert topology.shells_of(faces, edges, topology.turns_of(np.zeros((16, 3)), faces, edges)).max() == 1
 
 
 def _pinched_by_search(faces: list[list[int]]) -> list[int]:
@@ -145,7 +138,7 @@ def test_pinches_of_open_meshes_as_a_search_finds_them(seed: int) -> None:
     faces[flipped] = faces[flipped, ::-1]
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     faces = faces[whole].astype(np.int32)
-    found = mesh_edges.pinched_open(faces, mesh_edges.edges_of(faces, 40), 40)
+    found = topology.pinched_open(faces, topology.edges_of(faces, 40), 40)
     assert found.tolist() == _pinched_by_search(faces.tolist())
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from unitcad.meshcheck.geometry.common_corners import MOST_VERTICES, common_corners
+from unitcad.meshcheck.geometry.sieves import MOST_VERTICES, common_corners
 
 
 @pytest.mark.parametrize("first", [0, MOST_VERTICES - 12, MOST_VERTICES - 11])

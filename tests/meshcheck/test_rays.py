@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from manifold3d import Manifold
 
 from unitcad.meshcheck.geometry import rays
+from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.geometry.topology import topology_of
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
 
 FLOORS, LEAST = (0.8, 0.5), 0.4
 

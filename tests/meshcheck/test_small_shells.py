@@ -9,7 +9,7 @@ import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.meshcheck import Options, check_mesh
-from unitcad.meshcheck.geometry import self_crossing, small_shells
+from unitcad.meshcheck.geometry import crossings, sieves
 
 Built = tuple[np.ndarray, np.ndarray]
 
@@ -53,7 +53,7 @@ def test_findings_are_those_of_a_tree_over_all_faces(
 
     by_shell = counts()
     assert used == [True]
-    monkeypatch.setattr(self_crossing, "LEAST_SHELLS", 10**9)
+    monkeypatch.setattr(crossings, "LEAST_SHELLS", 10**9)
     assert counts() == by_shell
     assert used == [True]
     assert by_shell.keys() >= {"G003", "G004"}
@@ -62,14 +62,14 @@ def test_findings_are_those_of_a_tree_over_all_faces(
 
 def _watched(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Return a list that gets whether a mesh was looked at shell by shell."""
-    real, used = small_shells.small_shells, list[bool]()
+    real, used = sieves.small_shells, list[bool]()
 
     def watched(*given: object) -> object:
         made = real(*given)
         used.append(made is not None)
         return made
 
-    monkeypatch.setattr(small_shells, "small_shells", watched)
+    monkeypatch.setattr(sieves, "small_shells", watched)
     return used
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from exact_pairs import reference
 
-from unitcad.meshcheck.geometry import stars
-from unitcad.meshcheck.geometry.triangle_mesh import area_vectors
+from unitcad.meshcheck.geometry import sieves
+from unitcad.meshcheck.geometry.mesh import area_vectors
 
 
 def _star(rng: np.random.Generator, rounds: int, fold: bool, rough: float) -> np.ndarray:
@@ -41,7 +41,7 @@ def test_faces_of_a_height_field_do_not_cross(rounds: int, fold: bool, rough: fl
         columns, corners, areas = _asked(_star(rng, rounds, fold, rough))
         asked = np.zeros(columns.shape[1], bool)
         asked[0] = True
-        if not stars.height_fields(columns, corners, areas, asked)[0]:
+        if not sieves.height_fields(columns, corners, areas, asked)[0]:
             continue
         taken += 1
         triangles = columns.T[corners.T]
@@ -57,7 +57,7 @@ def test_rims_are_seen_along_diagonals() -> None:
     axes, diagonals, means = 0, 0, 0
     for _ in range(200):
         columns, corners, areas = _asked(_star(rng, 1, True, 0.0))
-        axes += stars._along(stars._AXES, columns, corners, areas)[0]
-        diagonals += stars._along(stars._DIAGONALS, columns, corners, areas)[0]
-        means += stars._along_means(columns, corners, areas)[0]
+        axes += sieves._along(sieves._AXES, columns, corners, areas)[0]
+        diagonals += sieves._along(sieves._DIAGONALS, columns, corners, areas)[0]
+        means += sieves._along_means(columns, corners, areas)[0]
     assert diagonals >= means > 3 * axes

@@ -16,7 +16,7 @@ from unitcad import text
 from unitcad.export import finding_pictures
 from unitcad.meshcheck import baseline, check_file
 from unitcad.meshcheck.findings import FileReport, Finding, Location
-from unitcad.meshcheck.output.render import render
+from unitcad.meshcheck.output import render
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such names")
 OPEN = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nf 1 3 2\nf 1 2 4\nf 2 3 4\n"

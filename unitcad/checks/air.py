@@ -17,7 +17,6 @@ from manifold3d import Manifold
 from unitcad.checks.check import MouldCheck
 from unitcad.checks.each_cavity import each_cavity
 from unitcad.checks.finding import MouldFinding, at_most
-from unitcad.geometry.arrays import distinct_values
 from unitcad.geometry.components import components
 from unitcad.kernels.mesh import arrays
 from unitcad.moulds.cavities import Cavity
@@ -105,7 +104,7 @@ class _Boundary:
     def of(cls, solid: Manifold) -> _Boundary:
         vertices, faces = arrays(solid)
         sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges = np.stack(np.divmod(distinct_values(sides[:, 0] * len(vertices) + sides[:, 1]), len(vertices)), axis=1)
+        edges = np.stack(np.divmod(np.unique(sides[:, 0] * len(vertices) + sides[:, 1]), len(vertices)), axis=1)
         corners = vertices[faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

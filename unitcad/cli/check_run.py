@@ -14,14 +14,14 @@ from unitcad.cli import check_settings
 from unitcad.cli.check_settings import Configuration
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.export import finding_pictures
-from unitcad.meshcheck import FileReport, Limits, Options, detail, many_files
+from unitcad.meshcheck import FileReport, Limits, Options, many_files, output
 from unitcad.meshcheck import baseline as baselines
 from unitcad.meshcheck import manifest as listing
-from unitcad.meshcheck.output import as_text
-from unitcad.meshcheck.output.render import FORMATS, render
+from unitcad.meshcheck.findings import MOST, SHOWN
+from unitcad.meshcheck.output import FORMATS, render
 from unitcad.meshcheck.rules.registry import check_prefixes, rules
 from unitcad.meshcheck.rules.registry import explain as explanation
-from unitcad.meshcheck.units import unit_named
+from unitcad.meshcheck.rules.s_scale import unit_named
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +98,7 @@ def run(asked: Asked) -> int:
         limits=_limits(
             asked.max_faces or configuration.value("max_faces"), *configuration.chosen("timeout", asked.timeout)
         ),
-        locations=detail.MOST if asked.all_locations or base is not None or asked.show is not None else detail.SHOWN,
+        locations=MOST if asked.all_locations or base is not None or asked.show is not None else SHOWN,
         draw=asked.show is not None,
     )
     if not asked.files and asked.manifest is None:
@@ -113,12 +113,12 @@ def run(asked: Asked) -> int:
     left_out = configuration.left_out(asked.exclude or [])
     files, unread = many_files.expand(asked.files or [], left_out)
     reports = unread + _reports(files, configuration, options, asked.manifest, check_all)
-    shown = detail.MOST if asked.all_locations else detail.SHOWN
+    shown = MOST if asked.all_locations else SHOWN
     if base is not None:
         known = baselines.write(base, known, reports) if asked.write_baseline else known
         reports = [baselines.apply(known, base, report) for report in reports]
     reports = [report.shortened(shown) for report in reports]
-    table = as_text.statistics(reports) if asked.statistics else ""
+    table = output.statistics(reports) if asked.statistics else ""
     used = None if base is None else base.as_posix()
     for format_, path in copies:
         _save(path, render(reports, format_, fail_on, configuration.shown, used))

@@ -23,7 +23,7 @@ from unitcad import files
 from unitcad.export import drawing, raster, threemf
 from unitcad.export.marks import Marks, marks_of
 from unitcad.meshcheck.findings import SEVERITIES, FileReport, Finding, Location
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST, Mesh, weld_exact
+from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, weld_exact
 from unitcad.meshcheck.rules.registry import rules
 from unitcad.text import printable, xml_attribute, xml_text
 

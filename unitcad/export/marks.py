@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from unitcad.meshcheck.findings import Location
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh
 
 _EDGES = {"T001", "T002", "T003", "T005", "T006", "T007", "G008", "G009"}
 _POINTS = {"T004", "G003"}

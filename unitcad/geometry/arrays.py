@@ -47,15 +47,6 @@ def distinct(ordered: Ints) -> Bools:
     return fresh
 
 
-def distinct_values(numbers: Ints) -> Ints:
-    """Return the distinct ones of numbers of any shape, sorted.
-
-    As numpy.unique, which loads masked arrays first: as long as a check of a small mesh.
-    """
-    ordered = np.sort(numbers, axis=None)
-    return ordered[distinct(ordered)]
-
-
 def by_appearance(first: Ints, n: int) -> tuple[Ints, Ints]:
     """Return the places among `first`, of `n`, in their order, and where in it each of `first` stands."""
     appears = np.zeros(n, bool)

@@ -18,7 +18,7 @@ from unitcad.lab.chains.chain import LineFit, Mains
 from unitcad.lab.chains.line import clip_level, fit_line, spectrum
 from unitcad.lab.readers import TIME_NAMES, Layout, Recording, open_recording
 from unitcad.lab.units import UNITS, plain, ratio, seconds, to_si
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 RULES = {
     rule.code: rule

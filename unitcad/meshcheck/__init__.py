@@ -9,7 +9,7 @@ from unitcad.meshcheck.check_call import CheckResult, check
 from unitcad.meshcheck.findings import Facts, FileReport, Finding, Location
 from unitcad.meshcheck.one_file import check_bytes, check_file, check_mesh
 from unitcad.meshcheck.options import Options
-from unitcad.meshcheck.rules.f_limits import Limits
+from unitcad.meshcheck.rules.f_file import Limits
 
 __all__ = [
     "CheckResult",

@@ -20,7 +20,7 @@ from unitcad import files
 from unitcad.errors import UnitcadError, misfit
 from unitcad.geometry.arrays import Bools, Floats
 from unitcad.meshcheck.findings import SEVERITIES, Facts, FileReport, Finding, Location, Point, rounded
-from unitcad.meshcheck.rules.f_limits import F011
+from unitcad.meshcheck.rules.f_file import F011
 from unitcad.meshcheck.rules.registry import rules
 
 NEAR = 1e-4

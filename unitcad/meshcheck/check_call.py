@@ -13,8 +13,8 @@ from unitcad.arguments import check_number, path, texts
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.meshcheck.findings import FileReport, Finding
 from unitcad.meshcheck.options import Options
-from unitcad.meshcheck.rules.f_limits import Limits
-from unitcad.meshcheck.units import unit_named
+from unitcad.meshcheck.rules.f_file import Limits
+from unitcad.meshcheck.rules.s_scale import unit_named
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer

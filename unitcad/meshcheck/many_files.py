@@ -15,8 +15,7 @@ from unitcad.meshcheck.findings import FileReport
 from unitcad.meshcheck.one_file import check_file
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.readers.sniff import kind_of
-from unitcad.meshcheck.rules.f_file import F012
-from unitcad.meshcheck.rules.f_limits import F011, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import F011, F012, OutOfTime, Unreadable
 from unitcad.workers import Pool, WorkerEnded, limit_memory
 
 _GRACE = 5.0  # s, beyond half of the limit more, until code that never looks at the clock is interrupted

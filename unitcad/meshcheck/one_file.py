@@ -13,15 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
-from unitcad.meshcheck.detail import detailed
-from unitcad.meshcheck.findings import Facts, FileReport, Finding, ending, merge
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.findings import Facts, FileReport, Finding, detailed, ending, merge
+from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.readers import sniff
-from unitcad.meshcheck.rules.f_file import F001, F005, F012
-from unitcad.meshcheck.rules.f_limits import Deadline, Limits, Unreadable, keeping
+from unitcad.meshcheck.rules.f_file import F001, F005, F012, Deadline, Limits, Unreadable, keeping
 from unitcad.meshcheck.rules.p_package import P011
-from unitcad.meshcheck.units import UNITS_MM
+from unitcad.meshcheck.rules.s_scale import UNITS_MM
 
 _KINDS = {
     stat.S_IFDIR: "a folder",

@@ -5,26 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.geometry.arrays import distinct_values, extent
+from unitcad.geometry.arrays import extent
 from unitcad.geometry.ticks import Tick
-from unitcad.meshcheck.detail import detail
-from unitcad.meshcheck.findings import Facts, Finding, Location, ending, point
-from unitcad.meshcheck.geometry.arranged import arranged
-from unitcad.meshcheck.geometry.stars import stars_of
+from unitcad.meshcheck.findings import Facts, Finding, Location, detail, ending, point
+from unitcad.meshcheck.geometry.mesh import Mesh, representable
+from unitcad.meshcheck.geometry.sieves import arranged, stars_of
 from unitcad.meshcheck.geometry.topology import surface_of, topology_on, works_on
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, representable
 from unitcad.meshcheck.rules import registry
-from unitcad.meshcheck.rules.f_file import F001
-from unitcad.meshcheck.rules.f_limits import Deadline, keeping
-from unitcad.meshcheck.rules.inspection import Inspection
+from unitcad.meshcheck.rules.f_file import F001, Deadline, keeping
+from unitcad.meshcheck.rules.inspection import Inspection, Printer
 from unitcad.meshcheck.rules.v_values import not_finite
-
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +39,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict:
         return CheckedMesh(in_file(broken, mesh), facts)
     if not len(mesh.faces):
         return CheckedMesh(ending([F001.finding("the mesh has no face")]), facts)
-    low, high = extent(mesh.vertices[distinct_values(mesh.faces)] if mesh.indexed else mesh.vertices)
+    low, high = extent(mesh.vertices[np.unique(mesh.faces)] if mesh.indexed else mesh.vertices)
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):

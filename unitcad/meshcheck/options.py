@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-from unitcad.meshcheck.detail import SHOWN
-from unitcad.meshcheck.rules.f_limits import Limits
-
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
+from unitcad.meshcheck.findings import SHOWN
+from unitcad.meshcheck.rules.f_file import Limits
+from unitcad.meshcheck.rules.inspection import Printer
 
 
 @dataclass(frozen=True)

@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING
 
 import numpy as np
+from manifold3d import Manifold
 
 from unitcad.geometry.arrays import extent
 from unitcad.geometry.boxes import box_pairs
 from unitcad.meshcheck.findings import Finding, Location, counted, point
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, solid_of
-from unitcad.meshcheck.rules.f_limits import Deadline, Unreadable
+from unitcad.meshcheck.geometry.mesh import Mesh, solid_of
+from unitcad.meshcheck.rules.f_file import Deadline, Unreadable
 from unitcad.meshcheck.rules.g_shells import G002
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
 
 MOST = 2000
 """At most this many solids are compared."""

@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from unitcad.meshcheck.findings import Facts, Finding, counted, number
+from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
 from unitcad.meshcheck.geometry.topology import topology_of
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, weld_exact
 from unitcad.meshcheck.one_mesh import check_on_bed
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.overlaps import Solid, overlapping
 from unitcad.meshcheck.readers.read_step import Measured, measured
-from unitcad.meshcheck.rules.f_file import F012
-from unitcad.meshcheck.rules.f_limits import Deadline, keeping
+from unitcad.meshcheck.rules.f_file import F012, Deadline, keeping
 from unitcad.meshcheck.rules.g_crossing import G001
 from unitcad.meshcheck.rules.g_shells import G007, T008, expected
 from unitcad.meshcheck.rules.inspection import Inspection

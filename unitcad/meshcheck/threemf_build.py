@@ -10,14 +10,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import compress
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, cross, distinct_values, extent
+from unitcad.geometry.arrays import Floats, cross, extent
 from unitcad.meshcheck.findings import Facts, Finding, ending, point
+from unitcad.meshcheck.geometry.mesh import LARGEST
 from unitcad.meshcheck.geometry.topology import diagonals, topology_of
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST
 from unitcad.meshcheck.one_mesh import CheckedMesh, check_on_bed, check_surface
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.overlaps import Solid, overlapping
@@ -27,12 +26,9 @@ from unitcad.meshcheck.readers.threemf.placement import Instance, Key
 from unitcad.meshcheck.readers.threemf.read_3mf import Build, read_build
 from unitcad.meshcheck.readers.threemf.references import SOLID
 from unitcad.meshcheck.rules import g_shells, s_scale, v_values
-from unitcad.meshcheck.rules.f_limits import Deadline, Unreadable, keeping
-from unitcad.meshcheck.rules.inspection import Inspection
+from unitcad.meshcheck.rules.f_file import Deadline, Unreadable, keeping
+from unitcad.meshcheck.rules.inspection import Inspection, Printer
 from unitcad.meshcheck.rules.v_values import V001
-
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
 
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
 _FILLED = {"G001", "G002", "G008"}
@@ -79,7 +75,7 @@ def _turned(instance: Instance) -> _Turned:
         corners = instance.triangles.rows[:, :3]
         a, b, c = (points[corner] for corner in corners.T)
         area = float(np.linalg.norm(cross(b - a, c - a), axis=1).sum()) / 2
-        return _Turned(np.stack(extent(points[distinct_values(corners)])), area, abs(float(np.linalg.det(linear))))
+        return _Turned(np.stack(extent(points[np.unique(corners)])), area, abs(float(np.linalg.det(linear))))
 
 
 def _geometry(

@@ -23,7 +23,7 @@ from unitcad.meshcheck.readers.step_bodies import step_bodies
 from unitcad.meshcheck.readers.threemf.opc import open_package
 from unitcad.meshcheck.readers.threemf.read_3mf import read_build
 from unitcad.meshcheck.rules import s_scale
-from unitcad.meshcheck.rules.f_limits import F011, Deadline, Limits, Unreadable
+from unitcad.meshcheck.rules.f_file import F011, Deadline, Limits, Unreadable
 from unitcad.shape import Polyhedron
 from unitcad.shape.profile import GRID_PER_MM
 

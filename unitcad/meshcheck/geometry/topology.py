@@ -1,4 +1,7 @@
-"""The topology of a mesh: edges, shells, what is open, wound wrongly or pinched."""
+"""The topology of a mesh: edges, shells, what is open, wound wrongly or pinched, and what welding closes.
+
+A half-edge is 3 * face + side; side k runs from corner k to corner k + 1. Everything is sorting and gathering.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,498 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, distinct, distinct_values, extent, sorted_with_order
+from unitcad.geometry.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    by_appearance,
+    cross,
+    distinct,
+    extent,
+    extents,
+    order_of_packed,
+    sorted_with_order,
+)
+from unitcad.geometry.boxes import box_pairs
+from unitcad.geometry.components import components
 from unitcad.geometry.ticks import Tick
-from unitcad.meshcheck.geometry import edges as mesh_edges
-from unitcad.meshcheck.geometry import volumes
-from unitcad.meshcheck.geometry.edges import Edges, Turns
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, area_vectors
+from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_steps, same_place
+
+_FACES = 1 << 14  # faces that stay in the processor's cache
+_SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Half-edges of `faces` sorted by their undirected edge. `first` and `size` describe the groups in `order`.
+
+    `closed` is true where every edge has exactly two faces that run along it in opposite directions.
+    """
+
+    faces: Ints
+    order: Ints
+    first: Ints
+    size: Ints
+    low: Ints
+    high: Ints
+    closed: bool
+
+    @cached_property
+    def balanced(self) -> Bools:
+        """Whether at each edge as many faces run one way as the other, as they do round a solid."""
+        last = self.first + self.size - 1
+        count = np.cumsum(self.faces.reshape(-1)[self.order] == np.repeat(self.low, self.size), dtype=np.int32)[last]
+        return 2 * np.diff(count, prepend=np.int32(0)) == self.size
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """The half-edges of the edges `many` by edge and angle, and what is known of each.
+
+    `group` is the place of its edge in `many`, `ends` whether the solid ends at its face, `turn` the rank of its angle,
+    the same for faces in one plane. By angle about the edge, the solid begins at faces that run from its high vertex to
+    its low one and ends at the others.
+    """
+
+    many: Ints
+    half: Ints
+    group: Ints
+    ends: Bools
+    turn: Ints
+
+
+def half_edges(faces: Ints) -> tuple[Ints, Ints]:
+    """Return start and end vertex of every half-edge, (3 m,) each."""
+    start = np.ascontiguousarray(faces).reshape(-1)
+    end = np.ascontiguousarray(faces[:, [1, 2, 0]]).reshape(-1)
+    return start, end
+
+
+def edges_of(faces: Ints, n_vertices: int) -> Edges:
+    """Group the half-edges of `faces` (no face may use a vertex twice)."""
+    start = np.ascontiguousarray(faces).reshape(-1)
+    order, low, high = _sorted_edges(faces, n_vertices)
+    n = len(order)
+    fresh = np.empty(n, bool)
+    fresh[:1] = True
+    np.not_equal(low[1:], low[:-1], out=fresh[1:])
+    fresh[1:] |= high[1:] != high[:-1]
+    first = np.flatnonzero(fresh).astype(np.int32)
+    size = np.diff(np.append(first, np.int32(n)))
+    closed = n > 0 and bool((size == 2).all()) and not (start[order[0::2]] == start[order[1::2]]).any()
+    return Edges(faces, order, first, size, low[first], high[first], bool(closed))
+
+
+def _sorted_edges(faces: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:
+    """Return half-edges in the order of (low, high, half-edge), and these two ends in that order."""
+    n, bits = 3 * len(faces), max(n_vertices - 1, 1).bit_length()
+    room = max(n - 1, 1).bit_length()
+    if 2 * bits + room > 64:
+        start, end = half_edges(faces)
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        order = np.lexsort((high, low)).astype(np.int32)
+        return order, low[order], high[order]
+    key = np.empty((len(faces), 3), np.uint64)
+    for first in range(0, len(faces), _FACES):
+        some = faces[first : first + _FACES]
+        for side in range(3):
+            start, end = some[:, side], some[:, (side + 1) % 3]
+            ends = np.minimum(start, end).astype(np.uint64)
+            ends <<= np.uint64(bits)
+            ends |= np.maximum(start, end).astype(np.uint64)
+            np.left_shift(ends, np.uint64(room), out=key[first : first + _FACES, side])
+    ends = key.reshape(-1)
+    order = order_of_packed(ends, room)
+    low, high = np.empty((2, n), np.int32)
+    np.right_shift(ends, np.uint64(bits), out=low, casting="unsafe")
+    np.bitwise_and(ends, np.uint64((1 << bits) - 1), out=high, casting="unsafe")
+    return order, low, high
+
+
+def opposite(edges: Edges, n_half: int) -> Ints:
+    """Return for each half-edge the one across its edge; itself where an edge has other than two faces."""
+    across = np.arange(n_half, dtype=np.int32)
+    pairs = edges.first[edges.size == 2]
+    one, other = edges.order[pairs], edges.order[pairs + 1]
+    across[one] = other
+    across[other] = one
+    return across
+
+
+def surrounded(edges: Edges, n_vertices: int) -> Bools:
+    """Return which vertices have two faces, wound alike, at all their edges."""
+    whole = np.ones(n_vertices, bool)
+    if not edges.closed:
+        wrong = (edges.size != 2) | ~edges.balanced
+        whole[edges.low[wrong]] = whole[edges.high[wrong]] = False
+    return whole
+
+
+def pinched_closed(faces: Ints, across: Ints, n_vertices: int) -> Ints:
+    """Return vertices of a closed, consistently wound mesh whose faces form more than one fan."""
+    return np.flatnonzero(_fans(faces, across, np.ones(n_vertices, bool)) > 1).astype(np.int32)
+
+
+def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
+    """Return such vertices of any mesh, without those of edges that have more than two faces.
+
+    Fans are joined across edges of two faces.
+    """
+    whole = surrounded(edges, n_vertices)
+    rest, many = ~whole, edges.size > 2
+    rest[edges.low[many]] = rest[edges.high[many]] = False
+    several = _fans(faces, opposite(edges, 3 * len(faces)), whole) > 1
+    if rest.any():
+        first = edges.first[(edges.size == 2) & (rest[edges.low] | rest[edges.high])]
+        start = np.ascontiguousarray(faces).reshape(-1)
+        several |= _joined_fans(start, edges.order[first], edges.order[first + 1], rest) > 1
+    return np.flatnonzero(several).astype(np.int32)
+
+
+def _fans(faces: Ints, across: Ints, asked: Bools) -> Ints:
+    """Return how many fans the faces of each vertex form, of those that are `asked`, where all edges have two faces.
+
+    The half-edges leaving a vertex are permuted by turning to the next face; a fan is one cycle. Cycles are counted
+    by pointer doubling, in as many rounds as the largest valence has binary digits.
+    """
+    start, places = np.ascontiguousarray(faces).reshape(-1), np.arange(3 * len(faces), dtype=np.int32)
+    turn = across.reshape(-1, 3)[:, [2, 0, 1]].reshape(-1)
+    valence = np.bincount(start, minlength=len(asked))
+    if not asked.all():
+        turn = np.where(asked.take(start), turn, places)
+    label = places.copy()
+    rounds = int(valence.max(initial=1, where=asked)).bit_length()
+    for i in range(rounds):
+        np.minimum(label, label.take(turn), out=label)
+        if i < rounds - 1:
+            turn = turn.take(turn)
+    fresh = label == places
+    if np.count_nonzero(fresh) == np.count_nonzero(valence):
+        return np.minimum(valence, 1)
+    fans = np.bincount(start[fresh], minlength=len(asked))
+    fans[~asked] = 0
+    return fans
+
+
+def _joined_fans(start: Ints, one: Ints, other: Ints, asked: Bools) -> Ints:
+    """Return how many fans the faces of each vertex form, of those that are `asked`.
+
+    `one` and `other` are half-edges in pairs, at least all of edges of two faces at these vertices.
+    """
+    half = np.flatnonzero(asked.take(start))
+    number = np.full(len(start), -1)
+    number[half] = np.arange(len(half))
+    one_on, other_on = (side // 3 * 3 + (side + 1) % 3 for side in (one, other))  # the next half-edge of its face
+    alike = start[one] == start[other]
+    left = number[np.concatenate([one, one_on])]
+    right = number[np.concatenate([np.where(alike, other, other_on), np.where(alike, other_on, other)])]
+    kept = left >= 0
+    fans = components(len(half), left[kept], right[kept])
+    _, where = np.unique(fans, return_index=True)
+    return np.bincount(start[half[where]], minlength=len(asked))
+
+
+def shells_of(faces: Ints, edges: Edges, turns: Turns | None) -> Ints:
+    """Return the shell of each face, numbered by their first face.
+
+    Faces are joined across edges of two faces, and in pairs across edges of four, six and so on, by their `turns`.
+    """
+    pairs = edges.first[edges.size == 2]
+    left, right = edges.order[pairs], edges.order[pairs + 1]
+    if turns is not None:
+        one, other = _paired(edges, turns)
+        left, right = np.concatenate([left, one]), np.concatenate([right, other])
+    return components(len(faces), left // 3, right // 3)
+
+
+def shells_by_vertex(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
+    """Return the same where no vertex has faces of two shells."""
+    shells = components(n_vertices, edges.low, edges.high).take(faces[:, 0])
+    n = int(shells.max(initial=0)) + 1
+    if n == 1:
+        return shells
+    first = np.full(n, len(shells))  # of a vertex that no face uses: after all
+    first[shells[::-1]] = np.arange(len(shells))[::-1]
+    return by_appearance(first, len(shells) + 1)[1].take(shells)
+
+
+def turns_of(vertices: Floats, faces: Ints, edges: Edges) -> Turns | None:
+    """Return the turns at the edges of four, six and so on faces that are balanced; None where there are none."""
+    if edges.closed:
+        return None
+    many = np.flatnonzero((edges.size > 2) & edges.balanced)
+    return _around(vertices, faces, edges, many) if len(many) else None
+
+
+def _around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> Turns:
+    size = edges.size[many]
+    group = np.repeat(np.arange(len(many), dtype=np.int32), size)
+    starts = np.cumsum(size) - size
+    half = edges.order[edges.first[many][group] + np.arange(len(group)) - starts[group]]
+    face, side = half // 3, half % 3
+    ends = faces[face, side] == edges.low[many][group]
+    origin = vertices[edges.low[many]]
+    axis = vertices[edges.high[many]] - origin
+    length = np.sqrt(np.einsum("ij,ij->i", axis, axis))
+    axis /= np.where(length > 0, length, 1.0)[:, None]  # two vertices of one place have an edge without direction
+    axis = axis[group]
+    out = vertices[faces[face, (side + 2) % 3]] - origin[group]
+    out -= axis * np.einsum("ij,ij->i", out, axis)[:, None]
+    zero = out[starts][group]
+    angle = np.arctan2(np.einsum("ij,ij->i", cross(zero, out), axis), np.einsum("ij,ij->i", zero, out))
+    angle[angle < -_SAME_ANGLE] += 2 * np.pi
+    angle[angle > 2 * np.pi - _SAME_ANGLE] -= 2 * np.pi
+    order = _order_within(size, starts, angle)
+    angle, half, ends = angle[order], half[order], ends[order]
+    fresh = np.diff(angle, prepend=-np.inf) > _SAME_ANGLE
+    fresh[starts] = True
+    return Turns(many, half, group, ends, np.cumsum(fresh, dtype=np.int32) - np.int32(1))
+
+
+def _order_within(size: Ints, starts: Ints, values: Floats) -> Ints:
+    """Return the order of values by size within each of some groups that follow each other; equal ones stay."""
+    order = np.arange(len(values))
+    for n in np.unique(size).tolist():
+        places = starts[size == n][:, None] + np.arange(n)
+        order[places] = np.take_along_axis(places, np.argsort(values[places], axis=1, kind="stable"), axis=1)
+    return order
+
+
+def _paired(edges: Edges, turns: Turns) -> tuple[Ints, Ints]:
+    """Return half-edges at the edges of `turns` in pairs that have the solid between them.
+
+    Where it begins twice before it ends (solids that overlap), first begun is first ended, so that faces in one place
+    need no order. Where it begins and ends in one plane, one solid ends and the next one begins.
+    """
+    half, group, ends, turn = turns.half, turns.group, turns.ends, turns.turn
+    size = edges.size[turns.many]
+    starts = np.cumsum(size) - size
+    place = np.arange(len(group)) - starts[group]
+    bits = int(half.max()).bit_length()
+    key = (turn.astype(np.uint64) * np.uint64(2) + ~ends) << np.uint64(bits)  # an edge has no turn of another
+    key |= half.astype(np.uint64)
+    key.sort()
+    half, ends = (key & np.uint64((1 << bits) - 1)).astype(half.dtype), (key >> np.uint64(bits)) % 2 == 0
+    inside = np.cumsum(np.where(ends, -1, 1))  # solids that have begun and not ended; zero at each edge's last face
+    outermost = np.flatnonzero(inside == np.minimum.reduceat(inside, starts)[group])
+    outermost = outermost[distinct(group[outermost])]
+    rank = (place + starts[group] - outermost[group] - 1) % size[group]
+    order = np.empty(len(group), np.int64)
+    order[starts[group] + rank] = np.arange(len(group))
+    half, ends = half[order], ends[order]
+    return half[~ends], half[ends]
+
+
+WELD = 1e-5  # of the shell's diagonal
+NARROW = 0.1  # of the shortest edge at a vertex
+_CROWD = 30  # points within reach of a vertex, itself too: more means points that lie everywhere, not a seam
+_BLOCK = 1024  # pairs of boxes looked at: of so many for each of a crowd the rest is not looked at
+_BLOCKS = 64  # blocks that a few points may take
+
+
+@dataclass(frozen=True)
+class Seams:
+    """Faces with vertices joined: in `stored` those in one place, in `joined` also those within reach.
+
+    `whole` are the faces that keep three vertices in `stored`. `reach`: how near to a vertex another one counts as the
+    same, mm; 0 where the vertex is on no open edge.
+    """
+
+    stored: Ints
+    joined: Ints
+    whole: Bools
+    reach: Floats
+
+
+def join(vertices: Floats, faces: Ints, loose: Ints) -> Seams:
+    """Join the vertices `loose` (those of open edges).
+
+    Two are joined where they are nearer than a tenth of the shortest edge at either, and than 1e-5 of the diagonal of
+    their shell (or two float32 steps). A shell is here what faces and these joins connect: of all ways to choose it the
+    largest that agrees with itself. No face collapses: joins that would do that are left out.
+    """
+    n = len(vertices)
+    place = np.arange(n, dtype=np.int32)
+    place[loose] = loose[same_place(vertices[loose])]
+    stored = place[faces]
+    whole = _three(stored)
+    points = np.unique(place[loose])
+    short = _shortest_edges(vertices, stored[whole], points)
+    step = 2 * float32_steps(vertices[points])
+    part = connected(stored, n)
+    boxes = extents(vertices, part, int(part.max()) + 1)
+    mine = part[points]
+
+    def reaches(shell: Ints) -> Floats:
+        low = extents(boxes[0][mine], shell[mine], len(shell))[0]
+        high = extents(boxes[1][mine], shell[mine], len(shell))[1]
+        size = np.linalg.norm((high - low)[shell[mine]], axis=1)
+        return np.minimum(NARROW * short, np.maximum(WELD * size, step))
+
+    reach = reaches(np.zeros(len(boxes[0]), np.int64))
+    pairs, distance = _near(vertices[points], reach)
+    while True:
+        reach = reaches(components(len(boxes[0]), mine[pairs[:, 0]], mine[pairs[:, 1]]))
+        fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
+        if fits.all():
+            break
+        pairs, distance = pairs[fits], distance[fits]
+    everywhere = np.zeros(n)
+    everywhere[points] = reach
+    return Seams(stored, _joined(place, stored, points, pairs), whole, everywhere)
+
+
+def _three(faces: Ints) -> Bools:
+    return (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+
+
+def connected(faces: Ints, n: int) -> Ints:
+    """Return for each of `n` vertices which part of the mesh it belongs to: faces connect their vertices."""
+    spokes = np.concatenate([faces[:, 0], faces[:, 0]]), np.concatenate([faces[:, 1], faces[:, 2]])
+    return components(n, *spokes)
+
+
+def _shortest_edges(vertices: Floats, faces: Ints, points: Ints) -> Floats:
+    """Return the length of the shortest edge at each of `points`, mm."""
+    asked = np.zeros(len(vertices), bool)
+    asked[points] = True
+    start, end = half_edges(faces[asked[faces].any(axis=1)])
+    length = np.linalg.norm(vertices[end] - vertices[start], axis=1)
+    short = np.full(len(vertices), np.inf)
+    np.minimum.at(short, start, length)
+    np.minimum.at(short, end, length)
+    return short[points]
+
+
+def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
+    """Return pairs of points within both their reaches, and their distances.
+
+    Points of like reach are searched together, so that a coarse shell does not make a fine one a crowd.
+    """
+    near = [np.empty((0, 2), np.int64)]
+    level = np.ceil(np.log2(np.maximum(reach, 1e-300)) / 2)
+    for size in np.unique(level):
+        some = np.flatnonzero(level >= size)
+        if len(some) > 1:
+            pairs = some[_within(points[some], float(4.0**size))]
+            near.append(pairs[level[pairs].min(axis=1, initial=np.inf) == size])
+    pairs = np.concatenate(near)
+    distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
+    return pairs[fits], distance[fits]
+
+
+class _Crowd(Exception):
+    """Points that lie close on the scale of all of them."""
+
+
+def _within(points: Floats, reach: float) -> Ints:
+    """Return pairs (k, 2) of points no farther from each other than `reach`; none of a crowd."""
+    n = len(points)
+    blocks = iter(range(_BLOCKS + _CROWD * n // _BLOCK))
+
+    def tick() -> None:
+        if next(blocks, None) is None:
+            raise _Crowd
+
+    try:
+        half = 0.5000001 * reach
+        pairs = box_pairs(points - half, points + half, tick)
+    except _Crowd:
+        # The boxes' steps are too coarse for them.
+        from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
+
+        tree = cKDTree(points)
+        if tree.count_neighbors(tree, reach) > _CROWD * n:
+            return np.empty((0, 2), np.int64)
+        return tree.query_pairs(reach, output_type="ndarray")
+    pairs = pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
+    return pairs if n + 2 * len(pairs) <= _CROWD * n else pairs[:0]
+
+
+def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
+    """Return the faces with the points of each group of pairs made one, but for groups that would collapse a face."""
+    group = components(len(points), pairs[:, 0], pairs[:, 1])
+    _, first = np.unique(group, return_index=True)
+    target = np.arange(len(place), dtype=np.int32)
+    target[points] = points[first[group]]
+    joined = target[stored]
+    spoilt = joined[_three(stored) & ~_three(joined)].reshape(-1)
+    if len(spoilt):
+        back = np.isin(target, spoilt)
+        target[back] = np.flatnonzero(back)
+        joined = target[stored]
+    return joined
+
+
+def t_junctions(vertices: Floats, low: Ints, high: Ints, reach: Floats) -> Bools:
+    """Return which open edges (low, high) have another vertex of the open border on them, within its `reach`.
+
+    Where a long open edge meets a chain of short ones, the first short one starts at an end of the long one and lies
+    along it; so only open edges that share a vertex are compared.
+    """
+    n = len(low)
+    here = np.concatenate([low, high])
+    there = np.concatenate([high, low])
+    edge = np.concatenate([np.arange(n), np.arange(n)])
+    order = np.argsort(here, kind="stable")
+    here, there, edge = here[order], there[order], edge[order]
+    hit = np.zeros(n, bool)
+    for shift in range(1, 9):
+        if shift >= len(here):
+            break
+        together = np.flatnonzero(here[shift:] == here[:-shift])
+        if not len(together):
+            break
+        for a, b in ((together, together + shift), (together + shift, together)):
+            near = reach[here[a]]
+            origin = vertices[here[a]]
+            along = vertices[there[a]] - origin
+            other = vertices[there[b]] - origin
+            length = np.linalg.norm(along, axis=1)
+            part = np.einsum("ij,ij->i", along, other) / np.maximum(length, 1e-300)
+            off = np.linalg.norm(other - along * (part / np.maximum(length, 1e-300))[:, None], axis=1)
+            on = (off <= near) & (part > near) & (part < length - near)
+            hit[edge[a[on]]] = True
+    return hit
+
+
+def closed_shells(edges: Edges, shells: Ints, n: int) -> Bools:
+    """Return whether each of `n` shells has an inside: at all its edges as many faces run one way as the other."""
+    inside = np.ones(n, bool)
+    if not edges.closed:
+        wrong = np.repeat(~edges.balanced, edges.size)
+        inside[shells[edges.order[wrong] // 3]] = False
+    return inside
+
+
+def signed_volumes(vertices: Floats, faces: Ints, areas: Floats, shells: Ints, n: int) -> Floats:
+    """Return the volume of each of `n` shells, mm3: below zero where its faces look inwards.
+
+    It means nothing where the shell is not closed. Tetrahedra stand on the middle of all vertices, so that a part far
+    from the origin loses no digits.
+    """
+    corner = faces[:, 0]
+    tetra = np.zeros(len(faces))
+    for axis in range(3):
+        column = vertices[:, axis]
+        height = column.take(corner)
+        height -= (column.min() + column.max()) / 2 if n else 0.0
+        height *= areas[:, axis]
+        tetra += height
+    tetra /= 6
+    return np.bincount(shells, tetra, n).astype(float) if n > 1 else np.array([tetra.sum()] * n)
+
+
+def side_by_side(one: Floats, other: Floats) -> Bools:
+    """Return whether two closed shells that meet in faces which look opposite ways have material on both sides.
+
+    Arguments are their volumes, 0 for a shell that is not closed. Two solids have; a cavity and the wall's outer face
+    have not: the wall is without thickness there. What stands in a cavity has less volume than the cavity, whose volume
+    is below zero.
+    """
+    return np.asarray((one * other > 0) | ((one * other < 0) & (one + other < -1e-9 * np.abs(one))))
+
 
 Found = tuple[Any, ...]
 """Some of what a `Topology` has beside its surface."""
@@ -108,7 +597,7 @@ def surface_of(mesh: Mesh, tick: Tick) -> Surface:
     if repeated.any():
         kept = np.flatnonzero(~repeated).astype(np.int32)
         faces = faces[kept]
-    edges = mesh_edges.edges_of(faces, len(vertices))
+    edges = edges_of(faces, len(vertices))
     tick()
     stored, opened = faces, None
     if not edges.closed and (edges.size == 1).any():
@@ -155,24 +644,24 @@ def _by_vertex(surface: Surface, tick: Tick) -> Found:
 
     Then faces with a common vertex are of one shell, and there are half as many vertices as faces.
     """
-    shells = mesh_edges.shells_by_vertex(surface.mesh.faces, surface.edges, len(surface.mesh.vertices))
+    shells = shells_by_vertex(surface.mesh.faces, surface.edges, len(surface.mesh.vertices))
     return None, *_of_shells(surface, shells, tick)
 
 
 def _pinched_and_twice_of_closed(surface: Surface, tick: Tick) -> Found:
     """Return what `_pinched_and_twice` does of a surface whose edges have two faces each, wound alike."""
     faces = surface.mesh.faces
-    across = mesh_edges.opposite(surface.edges, 3 * len(faces))
+    across = opposite(surface.edges, 3 * len(faces))
     tick()
-    pinched = mesh_edges.pinched_closed(faces, across, len(surface.mesh.vertices))
+    pinched = pinched_closed(faces, across, len(surface.mesh.vertices))
     return pinched, np.flatnonzero(across[0::3] // 3 == across[1::3] // 3), None
 
 
 def _by_shell(surface: Surface, tick: Tick) -> Found:
     """Return `turns`, `shells`, `low`, `high`, `volumes` and `closed` of a `Topology`."""
     vertices, faces, edges = surface.mesh.vertices, surface.mesh.faces, surface.edges
-    turns = mesh_edges.turns_of(vertices, faces, edges)
-    return turns, *_of_shells(surface, mesh_edges.shells_of(faces, edges, turns), tick)
+    turns = turns_of(vertices, faces, edges)
+    return turns, *_of_shells(surface, shells_of(faces, edges, turns), tick)
 
 
 def _of_shells(surface: Surface, shells: Ints, tick: Tick) -> tuple[Ints, Floats, Floats, Floats, Bools]:
@@ -180,8 +669,8 @@ def _of_shells(surface: Surface, shells: Ints, tick: Tick) -> tuple[Ints, Floats
     vertices, faces = surface.mesh.vertices, surface.mesh.faces
     tick()
     low, high = _boxes(vertices, faces, shells)
-    volume = volumes.signed(vertices, faces, surface.areas, shells, len(low))
-    return shells, low, high, volume, volumes.closed(surface.edges, shells, len(low))
+    volume = signed_volumes(vertices, faces, surface.areas, shells, len(low))
+    return shells, low, high, volume, closed_shells(surface.edges, shells, len(low))
 
 
 def _pinched_and_twice(surface: Surface, tick: Tick) -> Found:
@@ -190,7 +679,7 @@ def _pinched_and_twice(surface: Surface, tick: Tick) -> Found:
     Shells that touch in a face are among the faces still.
     """
     faces = surface.mesh.faces
-    pinched = mesh_edges.pinched_open(faces, surface.edges, len(surface.mesh.vertices))
+    pinched = pinched_open(faces, surface.edges, len(surface.mesh.vertices))
     tick()
     same = _same_vertices(faces)
     return pinched, np.sort(same[0][same[1]]), same
@@ -209,10 +698,9 @@ def _referenced(mesh: Mesh) -> tuple[Mesh, int]:
 
 def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints, Ints, Ints, Edges, OpenEdges]:
     """Return the faces welded and as stored, what they are in the file, the edges of the former, and the open edges."""
-    from unitcad.meshcheck.geometry.seams import connected, join, t_junctions  # most meshes are closed
 
     open_ = np.flatnonzero(edges.size == 1)
-    seams = join(vertices, faces, distinct_values(np.concatenate([edges.low[open_], edges.high[open_]])))
+    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])))
     joined, stored, whole = seams.joined, seams.stored, seams.whole
     if not whole.all():
         joined, stored, whole_kept = joined[whole], stored[whole], kept[whole]
@@ -220,7 +708,7 @@ def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[In
         whole_kept = kept
     if np.array_equal(joined, stored):
         stored = joined
-    after = mesh_edges.edges_of(joined, len(vertices))
+    after = edges_of(joined, len(vertices))
     left = np.flatnonzero(after.size == 1)
     shut, split = open_, np.zeros(len(left), bool)
     if len(left):  # only what belongs to shells without a boundary left
@@ -283,7 +771,7 @@ def _facing(order: Ints, same: Bools, areas: Floats, shells: Ints, volume: Float
     one, other = order[first[alone]], order[first[alone] + 1]
     shell, beside = shells[one], shells[other]
     opposite = np.einsum("ij,ij->i", areas[one], areas[other]) < 0
-    touching = opposite & (shell != beside) & volumes.side_by_side(volume[shell], volume[beside])
+    touching = opposite & (shell != beside) & side_by_side(volume[shell], volume[beside])
     return np.concatenate([one[touching], other[touching]])
 
 

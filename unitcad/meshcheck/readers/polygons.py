@@ -10,13 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from manifold3d import triangulate
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, distinct_values
+from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location, counted, number
-from unitcad.meshcheck.geometry.source import Source
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST, Mesh, weld_points
-from unitcad.meshcheck.rules.f_file import F001, F002, F008, F013
-from unitcad.meshcheck.rules.f_limits import F011, Deadline, Limits
+from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, Source, weld_points
+from unitcad.meshcheck.rules.f_file import F001, F002, F008, F011, F013, Deadline, Limits
 from unitcad.meshcheck.rules.p_package import P011
 from unitcad.meshcheck.rules.t_topology import unreferenced
 from unitcad.meshcheck.rules.v_values import faces_not_finite
@@ -75,7 +74,7 @@ def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline, findings: li
     finite = ~used
     finite[used] = (np.abs(vertices[used]) <= LARGEST).all(axis=1)
     if not finite.all():
-        bad = distinct_values(np.searchsorted(np.cumsum(sizes), np.flatnonzero(~finite[corners]), "right"))
+        bad = np.unique(np.searchsorted(np.cumsum(sizes), np.flatnonzero(~finite[corners]), "right"))
         findings.append(faces_not_finite(len(bad), _places(source, bad)))
         return None
     faces, of, bent = _in_triangles(vertices, corners, sizes, deadline)
@@ -108,7 +107,7 @@ def _in_triangles(
     counts = np.maximum(sizes - 2, 0)
     first, offsets = np.cumsum(sizes) - sizes, np.cumsum(counts) - counts
     triangles = np.empty((int(counts.sum()), 3), corners.dtype)
-    for size in distinct_values(sizes[sizes >= 3]).tolist():
+    for size in np.unique(sizes[sizes >= 3]).tolist():
         alike = np.flatnonzero(sizes == size)
         step = max(1, _CHUNK // size)
         for at in range(0, len(alike), step):
@@ -163,8 +162,6 @@ def _proper(local: Floats, normal: Floats, fans: Ints, least: Floats) -> Bools:
 
 def _concave(local: Floats, normal: Floats, fan: Ints) -> Ints:
     """Return triangles of one polygon by manifold3d; the fan where its corners lie on a line or it crosses itself."""
-    from manifold3d import triangulate
-
     drop = int(np.argmax(np.abs(normal)))
     if not abs(normal[drop]) > 0:
         return fan

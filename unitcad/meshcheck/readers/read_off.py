@@ -7,13 +7,11 @@ import re
 import numpy as np
 
 from unitcad.meshcheck.findings import Finding, counted
-from unitcad.meshcheck.geometry.source import Source
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers import rows
 from unitcad.meshcheck.readers.polygons import Polygons, check_promise, mesh_of
 from unitcad.meshcheck.readers.rows import Rows
-from unitcad.meshcheck.rules.f_file import F002, F003, F005, F006
-from unitcad.meshcheck.rules.f_limits import Deadline, Limits
+from unitcad.meshcheck.rules.f_file import F002, F003, F005, F006, Deadline, Limits
 
 _START = re.compile(rb"(?:\s|#[^\n]*\n)*([A-Z0-9]*)OFF(?![A-Z])", re.IGNORECASE)
 _KINDS = re.compile(rb"(?:ST)?C?N?", re.IGNORECASE)

@@ -11,8 +11,7 @@ from typing import Any
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Point
 from unitcad.meshcheck.readers.step_bodies import triangles_of
-from unitcad.meshcheck.rules.f_file import F003, F012
-from unitcad.meshcheck.rules.f_limits import F011
+from unitcad.meshcheck.rules.f_file import F003, F011, F012
 from unitcad.workers import NoWorker, Pool, TimedOut, WorkerEnded
 
 _LEAST_MM, _PART = 0.01, 5e-5

@@ -12,14 +12,27 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
-from unitcad.meshcheck.detail import SHOWN
-from unitcad.meshcheck.findings import Finding, Location, counted
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, weld_exact
+from unitcad.meshcheck.findings import SHOWN, Finding, Location, counted
+from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
 from unitcad.meshcheck.readers import rows
 from unitcad.meshcheck.readers.rows import NUMBER
-from unitcad.meshcheck.rules.f_file import F001, F002, F003, F005, F006, F007, F008, F009, F010, not_a_number
-from unitcad.meshcheck.rules.f_limits import F011, Deadline, Limits, Unreadable
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.f_file import (
+    F001,
+    F002,
+    F003,
+    F005,
+    F006,
+    F007,
+    F008,
+    F009,
+    F010,
+    F011,
+    Deadline,
+    Limits,
+    Unreadable,
+    not_a_number,
+)
+from unitcad.meshcheck.rules.registry import Rule
 from unitcad.meshcheck.rules.v_values import faces_not_finite
 
 RECORD = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

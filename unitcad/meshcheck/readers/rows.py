@@ -16,8 +16,7 @@ import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location, Unreadable, counted
-from unitcad.meshcheck.rules.f_file import F003, F004, F009, not_a_number
-from unitcad.meshcheck.rules.f_limits import Deadline
+from unitcad.meshcheck.rules.f_file import F003, F004, F009, Deadline, not_a_number
 
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
 _MICROSOFT = r"1\.#(?:(?:ind|inf|qnan|snan)\w*(?:[+-]\d+)?|(?:io|j|qo|r)\d*)"  # rounded, INF is J and QNAN is R

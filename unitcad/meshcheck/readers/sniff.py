@@ -13,9 +13,9 @@ from pkgutil import iter_modules
 
 from unitcad.meshcheck import readers
 from unitcad.meshcheck.findings import Finding
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
-from unitcad.meshcheck.rules.f_limits import Deadline, Limits
-from unitcad.meshcheck.units import UNITS_MM
+from unitcad.meshcheck.geometry.mesh import Mesh
+from unitcad.meshcheck.rules.f_file import Deadline, Limits
+from unitcad.meshcheck.rules.s_scale import UNITS_MM
 
 Reader = Callable[[memoryview, Limits, Deadline, list[Finding]], Mesh | None]
 """A function that reads a mesh from bytes and adds what the file itself breaks to the findings.

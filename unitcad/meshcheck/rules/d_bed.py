@@ -7,20 +7,14 @@ support at both ends is a bridge.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.geometry.arrays import distinct_values
 from unitcad.meshcheck.findings import Finding, counted, number
+from unitcad.meshcheck.geometry.rays import winding_number
 from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.geometry.volumes import winding_number
-from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.places import at_region
-from unitcad.meshcheck.rules.rule import Rule
-
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
+from unitcad.meshcheck.rules.inspection import Inspection, Printer, at_region
+from unitcad.meshcheck.rules.registry import Rule
 
 D004 = Rule("""
     D004 warning: trapped volume
@@ -51,7 +45,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 def _stands(topology: Topology) -> Iterator[Finding]:
     """Apply D005: lowest point at z = 0, and a flat there that faces down."""
     vertices, faces = topology.mesh.vertices, topology.mesh.faces
-    low = float(vertices[distinct_values(faces), 2].min())
+    low = float(vertices[np.unique(faces), 2].min())
     if abs(low) > ON_BED:
         what = "floats above the bed, which a slicer corrects" if low > 0 else "reaches below the bed"
         yield D005.finding(f"{what}: lowest point at z = {number(low, 4)} mm")

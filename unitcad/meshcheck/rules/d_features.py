@@ -8,25 +8,19 @@ faces shows whether it is a whisker, or a rib or a wall, which goes on into the 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
+from manifold3d import CrossSection, Manifold
 
-from unitcad.geometry.arrays import Floats, Ints, distinct_values
+from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.components import components
 from unitcad.geometry.ticks import Tick
 from unitcad.meshcheck.findings import Finding, Location, counted, number
+from unitcad.meshcheck.geometry.mesh import solid_of
 from unitcad.meshcheck.geometry.rays import Rays
 from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.geometry.triangle_mesh import solid_of
-from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.places import at_region
-from unitcad.meshcheck.rules.rule import Rule
-
-if TYPE_CHECKING:
-    from manifold3d import CrossSection, Manifold
-
-    from unitcad.catalogue import Printer
+from unitcad.meshcheck.rules.inspection import Inspection, Printer, at_region
+from unitcad.meshcheck.rules.registry import Rule
 
 D002 = Rule("""
     D002 warning: feature below the printer's floor
@@ -63,7 +57,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 def _standing(topology: Topology, solid: Manifold, least: float, layer: float) -> list[Location]:
     """Return islands of level sections."""
     mesh = topology.mesh
-    heights = distinct_values(np.round(mesh.vertices[distinct_values(mesh.faces), 2], 3))
+    heights = np.unique(np.round(mesh.vertices[np.unique(mesh.faces), 2], 3))
     gaps = np.flatnonzero(np.diff(heights) >= layer * 0.99)
     if len(gaps) > _LEVELS:
         gaps = gaps[np.linspace(0, len(gaps) - 1, _LEVELS).astype(int)]
@@ -106,7 +100,7 @@ def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> Fl
     sides = corners[:, [1, 2, 0]] - corners
     lengths = np.sqrt(np.einsum("fkx,fkx->fk", sides, sides))
     longest_first = np.argsort(-lengths.max(axis=1), kind="stable")
-    for i in longest_first[distinct_values(np.linspace(0, len(faces) - 1, _FACES).astype(int))]:
+    for i in longest_first[np.unique(np.linspace(0, len(faces) - 1, _FACES).astype(int))]:
         middle = corners[i].mean(axis=0)
         for k in np.argsort(-lengths[i], kind="stable"):
             along = sides[i, k] / lengths[i, k]

@@ -7,20 +7,15 @@ meets supported borders on both sides within the printer's bridge; a free ledge 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, Ints, distinct_values
+from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.components import components
 from unitcad.meshcheck.findings import Finding, Location, number
 from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.places import at_region
-from unitcad.meshcheck.rules.rule import Rule
-
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
+from unitcad.meshcheck.rules.inspection import Inspection, Printer, at_region
+from unitcad.meshcheck.rules.registry import Rule
 
 D003 = Rule("""
     D003 info: overhang
@@ -43,7 +38,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
         return
     topology = part.topology
     mesh, areas = topology.mesh, topology.areas
-    bed = float(mesh.vertices[distinct_values(mesh.faces), 2].min())
+    bed = float(mesh.vertices[np.unique(mesh.faces), 2].min())
     double = np.sqrt(np.einsum("ij,ij->i", areas, areas))
     steep = -np.sin(np.radians(min(float(printer.overhang_deg) + _SLACK, 89.0)))
     leaning = areas[:, 2] < steep * double
@@ -61,7 +56,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     owner = region[np.where(leaning[left[rim]], left[rim], right[rim])]
     segments, supported = _border(topology, beyond, bed + float(printer.layer_mm) / 2)
     bad: list[tuple[float, Location]] = []
-    for label in distinct_values(region[leaning]):
+    for label in np.unique(region[leaning]):
         faces = np.flatnonzero(leaning & (region == label))
         area = float(double[faces].sum()) / 2
         part.tick()

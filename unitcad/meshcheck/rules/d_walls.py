@@ -7,20 +7,16 @@ directions; so bevels and wedges, tapered edges and the strips between engraved 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, distinct_values
+from unitcad.geometry.arrays import Floats
 from unitcad.geometry.components import components
 from unitcad.meshcheck.findings import Finding, Location, counted, number, point
 from unitcad.meshcheck.geometry.rays import SLACK, Rays, cast, lying
 from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.rule import Rule
-
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
+from unitcad.meshcheck.rules.inspection import Inspection, Printer
+from unitcad.meshcheck.rules.registry import Rule
 
 D001 = Rule("""
     D001 warning: wall below the printer's floor
@@ -83,14 +79,14 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
     through = thin[marked[rays.across[thin]]]
     wall = components(n, patch[owner[through]], patch[rays.across[through]])
     thinnest: dict[int, tuple[float, Location]] = {}
-    for label in distinct_values(group):
+    for label in np.unique(group):
         mine = thin[group == label]
         of = owner[mine]
         cloud = np.concatenate([points[mine], topology.mesh.vertices[faces[of[whole[of]]]].reshape(-1, 3)])
         if _reach(cloud, bool(level[of[0]])) < upright:
             continue
         worst = mine[np.argmin(thickness[mine])]
-        first, region = int(topology.kept[owner[worst]]), topology.kept[distinct_values(of)]
+        first, region = int(topology.kept[owner[worst]]), topology.kept[np.unique(of)]
         place = Location(face=first, xyz=point(points[worst]), region=region)
         here = (float(thickness[worst]), place)
         thinnest[int(wall[label])] = min(here, thinnest.get(int(wall[label]), here), key=lambda item: item[0])

@@ -7,20 +7,26 @@ from functools import partial
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, Ints, among, distinct, distinct_values
-from unitcad.meshcheck.detail import detail
-from unitcad.meshcheck.findings import Finding, Location, counted, point
-from unitcad.meshcheck.geometry.coverings import folded_edges, kinds, through_edges
-from unitcad.meshcheck.geometry.depths import covering_depths, crossing_depths, folded
-from unitcad.meshcheck.geometry.edges import edges_of, turns_of
-from unitcad.meshcheck.geometry.self_crossing import Crossings, Faces, facing, joined
-from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.geometry.triangle_mesh import float32_step, same_place
-from unitcad.meshcheck.geometry.triangles import common_point
+from unitcad.geometry.arrays import Floats, Ints, among, distinct
+from unitcad.meshcheck.findings import Finding, Location, counted, detail, point
+from unitcad.meshcheck.geometry.crossings import (
+    Crossings,
+    Faces,
+    covering_depths,
+    crossing_depths,
+    facing,
+    folded,
+    folded_edges,
+    joined,
+    kinds,
+    through_edges,
+)
+from unitcad.meshcheck.geometry.mesh import float32_step, same_place
+from unitcad.meshcheck.geometry.predicates import common_point
+from unitcad.meshcheck.geometry.topology import Topology, edges_of, turns_of
 from unitcad.meshcheck.rules.g_shells import SPECK
-from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.places import at_edges
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.inspection import Inspection, at_edges
+from unitcad.meshcheck.rules.registry import Rule
 
 G001 = Rule("""
     G001 error: self-crossing
@@ -140,7 +146,7 @@ def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterato
         begin, end = np.searchsorted(keys, [key, key + 1])
         shells = contact.shells_of(keys[begin : begin + 1])[0]
         x, y, z = (topology.low[shells].max(axis=0) + topology.high[shells].min(axis=0)).tolist()
-        return faces.original[distinct_values(touching[begin:end])], (x / 2, y / 2, z / 2)
+        return faces.original[np.unique(touching[begin:end])], (x / 2, y / 2, z / 2)
 
     places = _places(topology, faces, touching[first], region)
     some = " among those compared" if contact.full else ""

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
+from manifold3d import Manifold
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, among, grouped
 from unitcad.geometry.boxes import box_pairs
 from unitcad.geometry.ticks import Interrupted, Tick, TooMany
 from unitcad.meshcheck.findings import Finding, Location, counted, number, point
+from unitcad.meshcheck.geometry.mesh import solid_of
+from unitcad.meshcheck.geometry.predicates import without_area
+from unitcad.meshcheck.geometry.rays import winding_numbers
 from unitcad.meshcheck.geometry.topology import Topology, diagonals
-from unitcad.meshcheck.geometry.triangle_mesh import solid_of
-from unitcad.meshcheck.geometry.triangles import without_area
-from unitcad.meshcheck.geometry.volumes import winding_numbers
-from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.places import at_region
-from unitcad.meshcheck.rules.rule import Rule
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
+from unitcad.meshcheck.rules.inspection import Inspection, at_region
+from unitcad.meshcheck.rules.registry import Rule
 
 G002 = Rule("""
     G002 error: shells overlap

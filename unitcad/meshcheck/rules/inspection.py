@@ -1,22 +1,70 @@
-"""What the rules are given: a mesh, and what several of them need of it, worked out once and when it is asked for."""
+"""The input of the rules: a mesh, properties of it that several rules need, a printer; and the places of findings."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any, Protocol, SupportsFloat
 
+from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.ticks import Tick
-from unitcad.meshcheck.detail import detail
-from unitcad.meshcheck.geometry.arranged import Arranged, arranged
-from unitcad.meshcheck.geometry.self_crossing import Crossings, crossings_of
-from unitcad.meshcheck.geometry.stars import Stars, stars_of
-from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.findings import Location, detail, point
+from unitcad.meshcheck.geometry.crossings import Crossings, crossings_of
+from unitcad.meshcheck.geometry.mesh import Mesh
+from unitcad.meshcheck.geometry.rays import Rays, cast
+from unitcad.meshcheck.geometry.sieves import Arranged, Stars, arranged, stars_of
+from unitcad.meshcheck.geometry.topology import Edges, Topology
 
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
-    from unitcad.meshcheck.geometry.rays import Rays
+
+class Printer(Protocol):
+    """The properties of a printer that the rules read, as the catalogue's entries have them: mm, degrees.
+
+    `support` has the value "none" if the printer prints without support.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def bed_x_mm(self) -> SupportsFloat: ...
+    @property
+    def bed_y_mm(self) -> SupportsFloat: ...
+    @property
+    def bed_z_mm(self) -> SupportsFloat: ...
+    @property
+    def layer_mm(self) -> SupportsFloat: ...
+    @property
+    def xy_play_mm(self) -> SupportsFloat: ...
+    @property
+    def least_wall_mm(self) -> SupportsFloat: ...
+    @property
+    def least_flat_wall_mm(self) -> SupportsFloat: ...
+    @property
+    def least_feature_mm(self) -> SupportsFloat: ...
+    @property
+    def overhang_deg(self) -> SupportsFloat: ...
+    @property
+    def bridge_mm(self) -> SupportsFloat: ...
+    @property
+    def support(self) -> Any: ...
+
+
+def at_faces(vertices: Floats, faces: Ints, kept: Ints, which: Iterable[int]) -> Iterator[Location]:
+    """Return the middles of the faces `which`; `kept` maps faces to the file's."""
+    for i in which:
+        yield Location(face=int(kept[i]), xyz=point(vertices[faces[i]].mean(axis=0)))
+
+
+def at_edges(vertices: Floats, edges: Edges, kept: Ints, which: Iterable[int]) -> Iterator[Location]:
+    """Return the middles of the edges `which`, each with its first face; `kept` maps faces to the file's."""
+    for i in which:
+        middle = (vertices[edges.low[i]] + vertices[edges.high[i]]) / 2
+        yield Location(face=int(kept[edges.order[edges.first[i]] // 3]), xyz=point(middle))
+
+
+def at_region(faces: Ints, xyz: Floats) -> Location:
+    """Return a point with the faces, as the file has them, that make up the place; the first of them stands for it."""
+    return Location(face=int(faces[0]), xyz=point(xyz), region=faces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +100,6 @@ class Inspection:
     @cached_property
     def material(self) -> Rays:
         """How much material lies behind points of its faces, as far as matters for the printer."""
-        from unitcad.meshcheck.geometry.rays import cast
-
         assert self.printer is not None
         floors = float(self.printer.least_wall_mm), float(self.printer.least_flat_wall_mm)
         return cast(self.topology, floors, float(self.printer.least_feature_mm), self.tick, side=1)

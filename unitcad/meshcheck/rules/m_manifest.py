@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from unitcad.meshcheck.findings import FileReport, Finding, counted, number
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 M001 = Rule("""
     M001 error: volume differs from the manifest's

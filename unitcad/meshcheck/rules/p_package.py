@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 P001 = Rule("""
     P001 error: content types

@@ -1,17 +1,51 @@
-"""All rules, found in the files of this folder: for --explain, docs/checks.md and SARIF's list."""
+"""Rules by their texts, found in the files of this folder: for --explain, docs/checks.md and SARIF's list."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
+from itertools import islice
 from pkgutil import iter_modules
 from types import ModuleType
 
 from unitcad.errors import Refusal
 from unitcad.meshcheck import rules as folder
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.findings import SEVERITIES, Finding, Location, Unreadable, detail
+
+
+class Rule:
+    """A rule by its text: what is wrong, how bad it is, why it matters, an example, and how to fix it.
+
+    The text's first line is `CODE severity: title`; the cause, `Example: ...` and `Fix: ...` follow. The code is the
+    family's letter and three digits; the severity is error, warning or info. `count_is_size`: the count of a finding
+    says by how many bytes, facets or shells the file is wrong, not how often. Raises ValueError for another form.
+    """
+
+    def __init__(self, text: str, *, count_is_size: bool = False) -> None:
+        head, _, body = text.strip().partition("\n")
+        self.code, self.severity, self.title = head.replace(":", "", 1).split(" ", 2)
+        if self.severity not in SEVERITIES:
+            raise ValueError(f"{head!r} names none of the severities {', '.join(SEVERITIES)}")
+        self.cause, rest = " ".join(body.split()).split(" Example: ")
+        self.example, self.fix = rest.split(" Fix: ")
+        self.count_is_size = count_is_size
+
+    def finding(
+        self, message: str, count: int = 1, places: Iterable[Location] = (), severity: str | None = None
+    ) -> Finding:
+        """Make a finding, with the rule's severity unless another one is given."""
+        kept = tuple(islice(places, detail().locations))
+        return Finding(self.code, severity or self.severity, message, int(count), kept)
+
+    def unreadable(
+        self, message: str, count: int = 1, places: Iterable[Location] = (), severity: str | None = None
+    ) -> Unreadable:
+        """Make the error that ends the check of a file with such a finding."""
+        return Unreadable(self.finding(message, count, places, severity))
+
 
 FAMILIES = {
     "F": "File",
@@ -67,8 +101,6 @@ def check_prefixes(option: str, prefixes: Sequence[str] | None) -> tuple[str, ..
     for prefix in prefixes or ():
         wanted = prefix.strip().upper()
         if not wanted or not any(code.startswith(wanted) for code in rules()):
-            from difflib import get_close_matches  # which takes a millisecond to load, for a mistake alone
-
             near = get_close_matches(wanted, rules(), n=1, cutoff=0.5)
             raise Refusal(option, prefix, "begins no rule's code", near[0] if near else None)
         kept.append(wanted)

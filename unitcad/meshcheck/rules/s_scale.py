@@ -1,18 +1,32 @@
-"""The size of what a file holds: S001, and S002 for a printer."""
+"""The size of what a file holds: its unit of length, S001, and S002 for a printer."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from unitcad.geometry.arrays import distinct_values, extent
+import numpy as np
+
+from unitcad.errors import WrongArgument, unknown_name
+from unitcad.geometry.arrays import extent
 from unitcad.meshcheck.findings import Facts, Finding, number
-from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.rule import Rule
-from unitcad.meshcheck.units import UNITS_MM
+from unitcad.meshcheck.rules.inspection import Inspection, Printer
+from unitcad.meshcheck.rules.registry import Rule
 
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
+UNITS_MM = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
+_SHORT = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "in": "inch", "inches": "inch", "ft": "foot"}
+
+
+def unit_named(field: str, unit: str | None) -> str | None:
+    """Return the long name of a unit of length. Raises Refusal, naming `field`, for an unknown one."""
+    if unit is None:
+        return None
+    if not isinstance(unit, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise WrongArgument(field, unit, "takes a unit's name, such as mm")
+    known = _SHORT.get(unit.lower(), unit.lower())
+    if known not in UNITS_MM:
+        raise unknown_name(field, unit, UNITS_MM)
+    return known
+
 
 S001 = Rule("""
     S001 warning: size suggests another unit
@@ -53,7 +67,7 @@ def likely_unit(facts: Facts, unit: str | None) -> Iterator[Finding]:
 def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     """Apply S002 to the box of the mesh as it stands."""
     mesh = part.topology.mesh
-    low, high = extent(mesh.vertices[distinct_values(mesh.faces)])
+    low, high = extent(mesh.vertices[np.unique(mesh.faces)])
     size = high - low
     x, y, z = float(printer.bed_x_mm), float(printer.bed_y_mm), float(printer.bed_z_mm)
     upright = size[2] <= z

@@ -9,12 +9,11 @@ import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location, counted, point
+from unitcad.meshcheck.geometry.mesh import Mesh, float32_step, float32_steps
+from unitcad.meshcheck.geometry.predicates import without_area
 from unitcad.meshcheck.geometry.topology import Topology, diagonals, max_side_squared
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh, float32_step, float32_steps
-from unitcad.meshcheck.geometry.triangles import without_area
-from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.places import at_edges, at_faces
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.inspection import Inspection, at_edges, at_faces
+from unitcad.meshcheck.rules.registry import Rule
 
 T001 = Rule("""
     T001 error: boundary edge

@@ -8,10 +8,10 @@ import numpy as np
 
 from unitcad.geometry.arrays import Floats
 from unitcad.meshcheck.findings import Finding, Location, counted, ending, number
+from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, float32_steps
 from unitcad.meshcheck.geometry.topology import diagonals
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST, Mesh, float32_steps
 from unitcad.meshcheck.rules.inspection import Inspection
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 V001 = Rule("""
     V001 error: NaN or infinity

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 LINE = 7  # column of a triangle's line
 _NOTED = 200  # findings kept of one part

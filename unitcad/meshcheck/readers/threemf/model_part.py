@@ -13,13 +13,13 @@ import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Location
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST
+from unitcad.meshcheck.geometry.mesh import LARGEST
 from unitcad.meshcheck.readers.threemf import elements
 from unitcad.meshcheck.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.meshcheck.readers.threemf.numeric_text import coordinate, transform
 from unitcad.meshcheck.readers.threemf.uniform_blocks import UniformBlock, rest_for_parser
 from unitcad.meshcheck.readers.threemf.xml_stream import forbidden, new_parser, stream
-from unitcad.meshcheck.rules.f_limits import F011, Limits, Unreadable
+from unitcad.meshcheck.rules.f_file import F011, Limits, Unreadable
 from unitcad.meshcheck.rules.p_package import P010, P016, P017, P018
 from unitcad.meshcheck.rules.v_values import V001
 

@@ -8,7 +8,7 @@ import re
 import numpy as np
 
 from unitcad.geometry.arrays import Floats
-from unitcad.meshcheck.geometry.triangle_mesh import LARGEST
+from unitcad.meshcheck.geometry.mesh import LARGEST
 from unitcad.meshcheck.readers.rows import NOT_FINITE
 from unitcad.meshcheck.readers.threemf import elements
 from unitcad.meshcheck.readers.threemf.model_data import Model

@@ -16,10 +16,9 @@ from urllib.parse import unquote
 
 from unitcad.meshcheck.findings import Finding, Location, counted
 from unitcad.meshcheck.readers.threemf.xml_stream import Element, read_small
-from unitcad.meshcheck.rules.f_file import F003, F006
-from unitcad.meshcheck.rules.f_limits import F011, Deadline, Limits, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import F003, F006, F011, Deadline, Limits, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P004, P005, P007, P008
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 CONTENT_TYPES = "[Content_Types].xml"
 _PACKAGE = "http://schemas.openxmlformats.org/package/2006/"

@@ -9,12 +9,11 @@ import numpy as np
 
 from unitcad.geometry.arrays import Floats
 from unitcad.meshcheck.findings import Finding
-from unitcad.meshcheck.geometry.source import Source
-from unitcad.meshcheck.geometry.triangle_mesh import Mesh
+from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers.threemf.model_data import LINE, Model, Object, Triangles, Use
-from unitcad.meshcheck.rules.f_limits import F011, Limits
+from unitcad.meshcheck.rules.f_file import F011, Limits
 from unitcad.meshcheck.rules.p_package import P009, P012, P014
-from unitcad.meshcheck.units import UNITS_MM
+from unitcad.meshcheck.rules.s_scale import UNITS_MM
 
 Key = tuple[str, int]
 """A part of the package and the id of an object in it."""

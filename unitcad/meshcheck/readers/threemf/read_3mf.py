@@ -11,10 +11,9 @@ from unitcad.meshcheck.readers.threemf.model_data import Model
 from unitcad.meshcheck.readers.threemf.model_part import read_model
 from unitcad.meshcheck.readers.threemf.opc import Package, Relation
 from unitcad.meshcheck.readers.threemf.placement import Instance, expand
-from unitcad.meshcheck.rules.f_file import F003
-from unitcad.meshcheck.rules.f_limits import Limits, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.f_file import F003, Limits, OutOfTime, Unreadable
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P012, P014, P019, P020
-from unitcad.meshcheck.rules.rule import Rule
+from unitcad.meshcheck.rules.registry import Rule
 
 _IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
 _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from unitcad.geometry.arrays import Ints, distinct_values
+from unitcad.geometry.arrays import Ints
 from unitcad.meshcheck.findings import Location, counted
 from unitcad.meshcheck.readers.threemf import elements
 from unitcad.meshcheck.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
@@ -120,7 +120,7 @@ def _triangle_properties(model: Model, resource: Object, rows: Ints) -> None:
         model.add(P019, f"a triangle of {who} has p2 or p3 without p1")
     default = int(resource.attributes.get("pid", -1))
     pids = np.where(rows[:, 6] >= 0, rows[:, 6], default)
-    for pid in distinct_values(pids):
+    for pid in np.unique(pids):
         if pid < 0:
             continue
         group = _group(model, int(pid), resource.rank, f"a triangle of {who}")

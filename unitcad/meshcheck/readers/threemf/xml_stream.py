@@ -9,8 +9,7 @@ from typing import Any
 from xml.parsers import expat
 
 from unitcad.meshcheck.findings import Location
-from unitcad.meshcheck.rules.f_file import F003, F009
-from unitcad.meshcheck.rules.f_limits import F011
+from unitcad.meshcheck.rules.f_file import F003, F009, F011
 from unitcad.meshcheck.rules.p_package import P006
 
 XML_SPACE = "http://www.w3.org/XML/1998/namespace "

@@ -1,10 +1,4 @@
-"""Faces of a mesh that cross, touch or cover each other in one plane, decided exactly.
-
-Sieves, each a whole block of pairs at a time: boxes; faces round a vertex whose star is a height field, which can
-meet in that vertex only; slabs square to the diagonals of space; planes that set faces apart. What is left is decided
-by exact signs.
-A crossing is one of: two faces pass through each other; an edge lies in a face and its two faces leave to both sides.
-"""
+"""Faces of a mesh that cross, touch or cover each other in one plane, decided exactly, and how deep."""
 
 from __future__ import annotations
 
@@ -15,18 +9,121 @@ from functools import cached_property
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, distinct
+from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, sorted_with_order
 from unitcad.geometry.boxes import Slabs, box_pairs, meeting_parts
 from unitcad.geometry.ticks import Interrupted, Tick, TooMany
-from unitcad.meshcheck.geometry import coverings, triangles
-from unitcad.meshcheck.geometry.arranged import Arranged
-from unitcad.meshcheck.geometry.common_corners import CommonCorners, common_corners
-from unitcad.meshcheck.geometry.contact import MOST_CONTACTS, Contacts, FaceBoxes, face_boxes
-from unitcad.meshcheck.geometry.hubs import hub_walks
-from unitcad.meshcheck.geometry.planes import Planes, planes_of
-from unitcad.meshcheck.geometry.stars import Stars
-from unitcad.meshcheck.geometry.topology import Topology
-from unitcad.meshcheck.geometry.triangle_mesh import MANY, same_place
+from unitcad.meshcheck.geometry import predicates
+from unitcad.meshcheck.geometry.mesh import MANY, area_vectors, float32_steps, same_place
+from unitcad.meshcheck.geometry.predicates import orient3d
+from unitcad.meshcheck.geometry.sieves import (
+    MOST_CONTACTS,
+    Arranged,
+    CommonCorners,
+    Contacts,
+    FaceBoxes,
+    Planes,
+    Stars,
+    common_corners,
+    face_boxes,
+    hub_walks,
+    planes_of,
+)
+from unitcad.meshcheck.geometry.topology import Edges, Topology, Turns, max_side_squared, side_by_side
+
+_FACES = 1 << 14  # pairs of faces that stay in the processor's cache
+_FOLD = 2.0  # float32 steps: a fold thinner than that has no thickness
+_WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding
+
+
+def kinds(topology: Topology, shells: Ints, opposite: Bools) -> tuple[Bools, Bools]:
+    """Return which pairs that cover each other in one plane double a shell (G008), and which leave no room (G009).
+
+    `shells` (n, 2) are theirs; `opposite`: they look opposite ways. The others belong to two shells side by side, or to
+    one within the other, which G003 and G002 report.
+    """
+    volume, closed = topology.volumes[shells], topology.closed[shells].all(axis=1)
+    apart = shells[:, 0] != shells[:, 1]
+    bare = apart & closed & ~side_by_side(volume[:, 0], volume[:, 1])
+    return ~opposite & ~apart, opposite & (~apart | bare)
+
+
+def run_alike(a: Ints, b: Ints) -> Bools:
+    """Return which pairs of faces (n, 3) run along a common edge in one direction: they lie on one side of it."""
+    ends = [np.roll(face, -1, axis=1) for face in (a, b)]
+    same = (a[:, :, None] == b[:, None, :]) & (ends[0][:, :, None] == ends[1][:, None, :])
+    return np.asarray(same.any(axis=(1, 2)))
+
+
+def wide_pairs(a: Floats, b: Floats) -> Bools:
+    """Return which coplanar pairs that overlap are higher than four float32 steps both. Rounding makes lower ones."""
+    high = np.ones(len(a), bool)
+    least = 4 * float32_steps(np.concatenate([a, b], axis=1))
+    for corners in (a, b):
+        double = area_vectors(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        height = np.sqrt(np.einsum("ij,ij->i", double, double)) / np.sqrt(max_side_squared(corners))
+        high &= height > least
+    return high
+
+
+def through_edges(turns: Turns | None, shells: Ints) -> Ints:
+    """Return edges round which the winding number of one shell takes three values or more."""
+    if turns is None:
+        return np.empty(0, np.int64)
+    group, ends, turn = turns.group, turns.ends, turns.turn
+    shell = shells[turns.half // 3]
+    n = int(shell.max()) + 1  # the half-edges are in the order of turns already
+    bits = (len(turns.many) * n).bit_length()
+    order = sorted_with_order(group.astype(np.uint64) * np.uint64(n) + shell.astype(np.uint64), bits)[1]
+    group, ends, turn, shell = group[order], ends[order], turn[order], shell[order]
+    own = np.append(True, (group[1:] != group[:-1]) | (shell[1:] != shell[:-1]))
+    start = np.flatnonzero(own)
+    change = np.where(ends, -1, 1)
+    level = np.cumsum(change)
+    level -= np.repeat(level[start] - change[start], np.diff(np.append(start, len(level))))
+    last = np.append((turn[1:] != turn[:-1]) | own[1:], True)
+    between = np.flatnonzero(last)  # values in sectors that have a width, one shell of one edge after the other
+    of = (np.cumsum(own) - 1)[between]
+    low, high = np.full(len(start), 10**9), np.full(len(start), -(10**9))
+    np.minimum.at(low, of, level[between])
+    np.maximum.at(high, of, level[between])
+    evenly = np.add.reduceat(change, start) == 0
+    return turns.many[np.unique(group[start][(high - low > 1) & evenly])]
+
+
+def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> tuple[Ints, Floats, Floats]:
+    """Return edges of two faces that look opposite ways and are in one plane as float32 has it, though not exactly.
+
+    And for each of them the heights of its two faces, mm, the lower one first.
+    """
+    two = edges.size == 2
+    if not edges.closed:  # two faces that run alike are turned over, not folded
+        two &= edges.balanced
+    pair = edges.first[two]
+    left, right = edges.order[pair] // 3, edges.order[pair + 1] // 3
+    facing = np.empty(len(pair))
+    for start in range(0, len(pair), _FACES):
+        block = slice(start, start + _FACES)
+        one, other = areas.take(left[block], axis=0), areas.take(right[block], axis=0)
+        facing[block] = np.einsum("ij,ij->i", one, other)
+    against = np.flatnonzero(facing < 0)
+    if not len(against):
+        return against, np.empty(0), np.empty(0)
+    pair, left, right, facing = pair[against], left[against], right[against], facing[against]
+    square = [np.einsum("ij,ij->i", areas[face], areas[face]) for face in (left, right)]
+    flat = facing * facing > (1 - 1e-6) * square[0] * square[1]
+    pair, left, square = pair[flat], left[flat], [values[flat] for values in square]
+    ends = [faces[edges.order[pair] // 3, (edges.order[pair] % 3 + k) % 3] for k in range(3)]
+    tip = faces[edges.order[pair + 1] // 3, (edges.order[pair + 1] % 3 + 2) % 3]
+    corners = vertices[np.stack([*ends, tip], axis=1)]
+    step = float32_steps(corners)
+    length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+    height, higher = (np.sqrt(of(*square)) / length for of in (np.minimum, np.maximum))
+    apart = np.abs(np.einsum("ij,ij->i", areas[left], corners[:, 3] - corners[:, 0])) / np.sqrt(square[0])
+    thin = np.flatnonzero((height > _WIDE * step) & (apart <= _FOLD * step))
+    exact = orient3d(*(corners[thin, k] for k in range(4))) == 0
+    thin = thin[~exact]
+    return np.flatnonzero(two)[against][flat][thin], height[thin], higher[thin]
+
 
 LEAST_SHELLS = 200  # compared shell by shell, where they are small
 _BLOCK = 1 << 17
@@ -130,7 +227,7 @@ def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, 
     parts = _PARTS if len(ready.order) >= MANY else 1
     small = None
     if topology.n_shells >= LEAST_SHELLS and not every:
-        from unitcad.meshcheck.geometry.small_shells import small_shells
+        from unitcad.meshcheck.geometry.sieves import small_shells
 
         with suppress(TooMany):
             crossings.meeting = meeting = box_pairs(topology.low, topology.high, tick)
@@ -268,7 +365,7 @@ def _sieved(faces: Faces, sieve: Sieve, pair: tuple[Ints, Ints], i: Ints, j: Int
     if len(edge):
         open_ = facing(faces, *(f[rows[edge]] for f in pair)) > 0
         if faces.doubled:
-            open_ &= ~coverings.run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
+            open_ &= ~run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
         clear[edge] = open_
     left = np.flatnonzero(~clear & (common < 3))
     a, b = (planes.corners(ids.take(left, axis=1)) for ids in (ids_a, ids_b))
@@ -306,7 +403,7 @@ def _contacts(faces: Faces, i: Ints, j: Ints, crossings: Crossings) -> None:
     some = asked[~sharing]
     some = some[contact.open(keys[some])]
     a, b = (faces.vertices[faces.corners[:, f[some]].T] for f in (i, j))
-    some = some[triangles.meet(a, b).touches]
+    some = some[predicates.meet(a, b).touches]
     contact.add(keys[some], np.stack([i[some], j[some]], axis=1))
 
 
@@ -322,10 +419,10 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Cro
     pair, overlaps, meets = np.stack([i, j], axis=1), shared == 3, shared > 0
     a, b = (faces.vertices[faces.corners[:, f].T] for f in (i, j))
     some = np.flatnonzero(~overlaps)  # others are in one place
-    meeting = triangles.meet(a[some], b[some])
+    meeting = predicates.meet(a[some], b[some])
     overlaps[some] = meeting.overlaps
     wide = np.flatnonzero(overlaps)
-    crossings.covering.append(pair[wide[coverings.wide(a[wide], b[wide])]])
+    crossings.covering.append(pair[wide[wide_pairs(a[wide], b[wide])]])
     if faces.several:
         meets[some] |= meeting.touches | meeting.crosses
         _note(faces, i, j, np.flatnonzero(meets), crossings.contact)
@@ -366,7 +463,7 @@ def _edges_inside(faces: Faces, face: Ints, holder: Ints, one: Floats, other: Fl
     free = np.argmax(sides != 0, axis=1)
     rows = np.arange(len(face))
     u, v = (free + 1) % 3, (free + 2) % 3
-    kept = np.flatnonzero(triangles.segment_inside(one[rows, u], one[rows, v], other))
+    kept = np.flatnonzero(predicates.segment_inside(one[rows, u], one[rows, v], other))
     face, holder = face[kept], holder[kept]
     ids = np.stack([corner[face] for corner in faces.corners], axis=1)
     rows = rows[: len(kept)]
@@ -390,3 +487,107 @@ def _leaning(faces: Faces, crossings: Crossings) -> None:
 def joined(blocks: list[Ints]) -> Ints:
     """Return the pairs of all blocks, (k, 2)."""
     return np.concatenate(blocks) if blocks else np.empty((0, 2), np.int32)
+
+
+MOST_DEPTHS = 20_000
+"""Pairs whose depth is worked out; more of them are no rounding."""
+_MOST_NEIGHBOURS = 4_000_000
+_STEPS = 4  # float32 steps: no less is told from rounding
+_SEEN = 3  # pairs in which one fold shows
+_PART = 0.1  # of a face: of finer faces none reaches deep, though all of them together do
+
+
+def crossing_depths(vertices: Floats, corners: Ints, pairs: Ints, least: float) -> Floats:
+    """Return how deep pairs of faces (n, 2) that cross reach through each other, mm; infinity if that is not shallow.
+
+    A face reaches through another's plane as far as the neighbours of its corners there do. `corners` (3, m) are the
+    faces' vertices. No depth above `least` (mm) or a tenth of the face is shallow, unless float32 steps are larger.
+    """
+    depth = np.full(len(pairs), np.inf)
+    for face, holder in (pairs.T, pairs.T[::-1]) if 0 < len(pairs) <= MOST_DEPTHS else ():
+        a, b = (vertices[corners[:, f].T] for f in (face, holder))
+        depth = np.minimum(
+            depth, _shallow(_beyond(vertices, corners, face, a, b), a, b, np.sqrt(max_side_squared(a)), least)
+        )
+    return depth
+
+
+def _shallow(depth: Floats, a: Floats, b: Floats, size: Floats, least: float) -> Floats:
+    steps = float32_steps(np.concatenate([a, b], axis=1))
+    return np.where(depth <= np.maximum(_STEPS * steps, np.minimum(least, _PART * size)), depth, np.inf)
+
+
+def _beyond(vertices: Floats, corners: Ints, face: Ints, a: Floats, b: Floats) -> Floats:
+    """Return how far the surface round each face (n,), with corners `a`, reaches to the nearer side of b's plane.
+
+    It is without end if vertices have too many neighbours to look at.
+    """
+    normal = cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    near, first, count = _neighbours(corners, np.unique(corners[:, face]), len(vertices))
+    seeds = corners[:, face].T.reshape(-1)
+    if int(count[seeds].sum()) > _MOST_NEIGHBOURS:
+        return np.full(len(face), np.inf)
+    row = np.repeat(np.arange(len(seeds)), count[seeds])
+    place = np.arange(len(row)) - np.repeat(np.cumsum(count[seeds]) - count[seeds], count[seeds])
+    pair = row // 3
+    away = np.einsum("ij,ij->i", vertices[near[first[seeds][row] + place]] - b[pair, 0], normal[pair])
+    own = np.einsum("ikj,ij->ik", a - b[:, :1], normal)
+    step = float32_steps(np.concatenate([a, b], axis=1))[:, None]
+    reach = np.zeros((2, len(face)))
+    for side, sign in enumerate((1.0, -1.0)):
+        there = (sign * own >= -step).reshape(-1)[row]
+        np.maximum.at(reach[side], pair[there], sign * away[there])
+    return reach.min(axis=0)
+
+
+def _neighbours(corners: Ints, asked: Ints, n: int) -> tuple[Ints, Ints, Ints]:
+    """Return the vertices that share a face with those `asked`, themselves included; of each the first, how many."""
+    wanted = np.zeros(n, bool)
+    wanted[asked] = True
+    some = corners[:, wanted[corners].any(axis=0)]
+    start = np.concatenate([np.repeat(corner, 3) for corner in some])
+    end = np.concatenate([some.T.reshape(-1)] * 3)
+    order = sorted_with_order(start.astype(np.uint64), max(n, 1).bit_length())[1]
+    count = np.bincount(start, minlength=n)
+    return end[order], np.cumsum(count) - count, count
+
+
+def covering_depths(vertices: Floats, corners: Ints, pairs: Ints, least: float) -> Floats:
+    """Return how deep pairs of faces (n, 2) in one plane cover each other, mm; infinity if that is not shallow.
+
+    A pair's depth is the way in the plane by which the faces come apart, or the mean
+    width that all faces together cover of one of the two, by fold, if that is more. The others are as in
+    `crossing_depths`.
+    """
+    if not 0 < len(pairs) <= MOST_DEPTHS:
+        return np.full(len(pairs), np.inf)
+    a, b = (vertices[corners[:, f].T] for f in pairs.T)
+    normals = [cross(of[:, 1] - of[:, 0], of[:, 2] - of[:, 0]) for of in (a, b)]
+    double = [np.linalg.norm(normal, axis=1) for normal in normals]
+    normal = np.where((double[0] >= double[1])[:, None], *normals)
+    depth = np.min([_overlap(a, b, axis) for axis in _across(a, b, normal)], axis=0)
+    longest = [np.sqrt(max_side_squared(of)) for of in (a, b)]
+    strip, both = depth * np.minimum(*longest), pairs.T.reshape(-1)
+    covered = np.bincount(both, np.concatenate([strip, strip]))[pairs] / _SEEN
+    depth = np.max([depth, covered[:, 0] / longest[0], covered[:, 1] / longest[1]], axis=0)
+    height = np.maximum(double[0] / longest[0], double[1] / longest[1])
+    return _shallow(depth, a, b, height, least)
+
+
+def folded(low: Floats, high: Floats, least: float) -> Floats:
+    """Return `low`, the lesser height of two faces that fold onto each other, or infinity if that is not shallow."""
+    return np.where(low <= np.minimum(least, _PART * high), low, np.inf)
+
+
+def _across(a: Floats, b: Floats, normal: Floats) -> Iterator[Floats]:
+    """Yield unit vectors in the plane square to each side of both faces."""
+    for of in (a, b):
+        for k in range(3):
+            axis = cross(of[:, k] - of[:, k - 1], normal)
+            yield axis / np.maximum(np.linalg.norm(axis, axis=1), 1e-300)[:, None]
+
+
+def _overlap(a: Floats, b: Floats, axis: Floats) -> Floats:
+    one, other = (np.einsum("ikj,ij->ik", of - a[:, :1], axis) for of in (a, b))
+    return np.minimum(one.max(axis=1) - other.min(axis=1), other.max(axis=1) - one.min(axis=1))

@@ -1,21 +1,49 @@
-"""A mesh as the rules see it: vertices in mm, faces as indices, and what else the file has.
+"""A mesh as the rules see it: vertices in mm, faces as indices, and where in its file its triangles stand.
 
 Readers give a triangle soup or an indexed mesh; `weld_exact` makes the one into the other without moving a vertex.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
+from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from unitcad.geometry.arrays import Floats, Ints, by_appearance, distinct, order_of_packed
-from unitcad.meshcheck.geometry.source import Source
 
-if TYPE_CHECKING:
-    from manifold3d import Manifold
+_NO_INDEX = np.empty(0, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The places of a mesh's triangles (m) in its file, by polygon (p); what is None or empty is not known.
+
+    `polygons` (m,) gives the polygon of each triangle, None where every triangle is one by itself. `lines` (p,) are
+    line numbers from 1. `starts` (s,) are the first polygons of the file's objects, `names` their names, a line each.
+    """
+
+    polygons: Ints | None = None
+    lines: Ints | None = None
+    part: str | None = None
+    starts: Ints = field(default_factory=lambda: _NO_INDEX)
+    names: bytes = b""
+
+    @cached_property
+    def _names(self) -> list[str]:
+        return [name.strip() for name in self.names.decode("utf-8", "replace").split("\n")]
+
+    def line(self, polygon: int) -> int | None:
+        """Return the line on which a polygon stands."""
+        return None if self.lines is None else int(self.lines[polygon])
+
+    def object(self, polygon: int) -> str | None:
+        """Return the name of the object that a polygon belongs to."""
+        at = int(np.searchsorted(self.starts, polygon, "right")) - 1
+        return self._names[at] if at >= 0 and self._names[at] else None
+
 
 LARGEST = float(np.finfo(np.float32).max)
 """Coordinates beyond this, and NaN, are no numbers of a mesh (V001), in whatever precision a file has them."""
@@ -143,8 +171,6 @@ def float32_steps(places: Floats) -> Floats:
 
 def solid_of(vertices: Floats, faces: Ints) -> Manifold:
     """Make manifold3d's solid of a mesh, vertices (n, 3) mm and faces (m, 3); empty where it refuses the mesh."""
-    from manifold3d import Manifold, Mesh64
-
     return Manifold(Mesh64(vert_properties=vertices, tri_verts=faces.astype(np.uint64)))
 
 
