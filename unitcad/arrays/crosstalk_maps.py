@@ -14,7 +14,7 @@ from typing import Any
 from unitcad.arrays.array import Array
 from unitcad.arrays.circuit.circuit_svg import outline_path
 from unitcad.arrays.outlines import rounded, slot_profile
-from unitcad.export.drawing import number
+from unitcad.export.chart import number
 from unitcad.shape import Profile
 from unitcad.text import number as number_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from unitcad.arrays.circuit.wiring import Wiring
-from unitcad.export.drawing import number
+from unitcad.export.chart import number
 from unitcad.shape import Profile
 from unitcad.shape.profile import arc_centre, sides
 
