@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import combinations, pairwise
 from xml.etree import ElementTree
 
@@ -34,7 +35,8 @@ def texts(root: ElementTree.Element) -> dict[str, tuple[float, float, float, flo
 def drawn(template: str) -> str:
     variant = Variant.of(template)
     names = {f"layer{i + 1}": f"layer {i + 1}: {layer.material}" for i, layer in enumerate(variant.spec.layers)}
-    return svg.unit_section(variant.unit, variant.dimensions, variant.segments, template, names)
+    bodies = [replace(body, name=names.get(body.name, body.name)) for body in variant.unit]
+    return svg.unit_section(bodies, variant.dimensions, variant.segments)
 
 
 @pytest.mark.parametrize("template", sorted(templates()))
@@ -118,7 +120,7 @@ def test_leaders_end_in_what_they_name():
 
 def test_same_text_again_and_names_are_escaped():
     assert drawn("encapsulating") == drawn("encapsulating")
-    odd = svg.section(svg.cut([tube()], 48), title="a<b>&", labels={"tube": "<i>"}, ground="seat")
+    odd = svg.section(svg.cut([replace(tube(), name="<i>")], 48), title="a<b>&", ground="seat")
     said = {name.split("#")[0] for name in texts(ElementTree.fromstring(odd))}
     assert {"a<b>&", "<i>", "seat"} <= said
 

@@ -226,13 +226,12 @@ def _fragments(
     height, width = shape
     for begin in range(0, len(faces), _FACES):
         corners = points[faces[begin : begin + _FACES]]
-        one, two, three = (corners[:, k] for k in range(3))
-        first, second = two - one, three - one
-        area = first[:, 0] * second[:, 1] - second[:, 0] * first[:, 1]
-        low = np.clip(np.ceil(corners[:, :, 1].min(axis=1) - 0.5), 0, height).astype(int)
-        high = np.clip(np.floor(corners[:, :, 1].max(axis=1) - 0.5), -1, height - 1).astype(int)
-        across = (first[:, 2] * second[:, 1] - second[:, 2] * first[:, 1]) / np.where(area, area, 1.0)
-        down = (second[:, 2] * first[:, 0] - first[:, 2] * second[:, 0]) / np.where(area, area, 1.0)
+        one, heights = corners[:, 0], corners[:, :, 1]
+        normal = np.cross(corners[:, 1] - one, corners[:, 2] - one)
+        area = normal[:, 2]
+        across, down = -normal[:, :2].T / np.where(area, area, 1.0)
+        low = np.clip(np.ceil(heights.min(axis=1) - 0.5), 0, height).astype(int)
+        high = np.clip(np.floor(heights.max(axis=1) - 0.5), -1, height - 1).astype(int)
         which = np.flatnonzero((np.abs(area) > 1e-12) & (high >= low))
         rows = (high - low + 1)[which]
         for some in _blocks(rows):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -100,17 +100,16 @@ def section(
     measures: Sequence[Measure] = (),
     notes: Sequence[Note] = (),
     title: str = "",
-    labels: Mapping[str, str] | None = None,
     ground: str = "skin",
 ) -> str:
-    """Draw `regions`: every one named (by `labels`, else its own name), with its measures.
+    """Draw `regions`, every one named, with its measures.
 
     `ground` is what the line z = 0 is called, "" for no name. The same arguments give the same text.
     """
-    texts = [(labels or {}).get(region.name, region.name) for region in regions]
-    named = [*notes, *map(Note, texts, _anchors(regions, [text_width(text) for text in texts]))]
+    anchors = _anchors(regions, [text_width(region.name) for region in regions])
+    named = [*notes, *(Note(region.name, at) for region, at in zip(regions, anchors, strict=True))]
     page = _Page(regions, measures, named)
-    marks = [page.region(region, text) for region, text in zip(regions, texts, strict=True)]
+    marks = [page.region(region) for region in regions]
     marks += page.frame(ground)
     for side in ("below", "left", "right"):
         marks += page.measures([m for m in measures if m.side == side])
@@ -130,8 +129,6 @@ def unit_section(
     bodies: Sequence[Body],
     dims: Dimensions,
     segments: int,
-    title: str = "",
-    labels: Mapping[str, str] | None = None,
     concentric: bool = True,
 ) -> str:
     """Draw the unit cut along its tail, in the plane y = 0: main dimensions, layers and air named.
@@ -143,12 +140,12 @@ def unit_section(
         reach = max(
             (abs(x) for m in measures if m.side == "below" for x in (m.start, m.end)), default=dims.outer_radius
         )
-        return section(cut(bodies, segments, reach=reach + TAIL_MM), measures, (), title, labels)
+        return section(cut(bodies, segments, reach=reach + TAIL_MM), measures)
     regions = cut(bodies, segments, reach=dims.outer_radius + TAIL_MM)
     notes = []
     if dims.air_ring > 0:
         notes.append(Note("air", ((dims.motor_radius + dims.cavity_radius) / 2, dims.motor_height / 3)))
-    return section(regions, _unit_measures(dims), notes, title, labels)
+    return section(regions, _unit_measures(dims), notes)
 
 
 def _measured(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[Measure]:
@@ -219,12 +216,12 @@ class _Page:
         x, z = point
         return self.left + (x - self.low[0]) * self.scale, self.top + (self.high[1] - z) * self.scale
 
-    def region(self, region: Region, name: str) -> str:
+    def region(self, region: Region) -> str:
         """Draw a filled region with holes, titled."""
         loops = [[self.at(point) for point in loop] for loop in region.loops]
         path = "".join("M" + "L".join(f"{number(x)} {number(y)}" for x, y in loop) + "Z" for loop in loops)
         fill = xml_attribute(colour_hex(region.colour))
-        return f'<path d="{path}" fill={fill} fill-rule="evenodd"><title>{xml_text(name)}</title></path>'
+        return f'<path d="{path}" fill={fill} fill-rule="evenodd"><title>{xml_text(region.name)}</title></path>'
 
     def frame(self, ground: str) -> list[str]:
         """Draw the line z = 0 and the axis."""
