@@ -340,7 +340,7 @@ def finish(layers: Sequence[Layer], view: Camera, names: Sequence[Name] = (), la
 
 
 def name_layers(layers: Sequence[Layer], labels: Sequence[str], shown: np.ndarray, view: Camera) -> list[Name]:
-    """Name what is seen of each layer that has a label, well inside it near its left end.
+    """Name what is seen of each layer that has a label, well inside it near its left end; from left to right.
 
     `shown` (height, width): the number of the face of each pixel, as `compose` counts them.
     """
@@ -354,7 +354,7 @@ def name_layers(layers: Sequence[Layer], labels: Sequence[str], shown: np.ndarra
             at = int(np.argmin(np.hypot(columns - left - 3, rows - top - 3)))
             right, down = (np.array([columns[at], rows[at]]) + 0.5 - np.array(view.size) / 2) / view.scale
             names.append(Name(text, tuple((view.middle + right * view.right - down * view.up).tolist())))
-    return names
+    return sorted(names, key=lambda name: float(view.right @ name.at))
 
 
 def place_names(names: Sequence[Name], drawn: np.ndarray, view: Camera) -> list[Label]:
