@@ -56,7 +56,8 @@ def test_the_nearer_face_is_seen_and_a_cut_takes_it_away() -> None:
 
 def test_of_two_faces_in_one_place_the_later_one_is_seen() -> None:
     faces = np.concatenate([FRONT, FRONT[:, [1, 2, 0]]])
-    assert set(np.unique(raster.look(SQUARE, faces, view())[0])) == {-1, 2, 3}
+    for size in (100, 1200):  # in one block of pixels and in several
+        assert set(np.unique(raster.look(SQUARE, faces, view((size, size)))[0])) == {-1, 2, 3}
 
 
 @pytest.mark.parametrize("towards", [(1, -1.4, 0.9), (0, 0, 1), (0, 0, -1), (-0.1, 1, 0.15)])
@@ -196,10 +197,21 @@ def test_letters_lie_in_their_box_and_any_name_can_be_written() -> None:
         assert np.ptp(rows) < label.height
 
 
+def test_names_of_one_place_meet_neither_each_other_nor_the_drawing() -> None:
+    owner = np.full((400, 600), -1)
+    owner[120:280, 200:400] = 0
+    names = [raster.Name(f"name {i}", (0.01 * i, 0.0, 0.0)) for i in range(20)]
+    labels = raster.place_names(names, owner >= 0, view((600, 400)))
+    boxes = {i: (one.left, one.left + one.width, one.top, one.top + one.height) for i, one in enumerate(labels)}
+    ends = {i: one.start for i, one in enumerate(labels)}
+    assert [fault for fault in faults(owner, boxes, ends) if "elsewhere" not in fault] == []
+
+
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("parts", [0, 3, 9, 200])
-def test_a_name_takes_the_nearest_place_that_covers_least(parts):
+def test_a_name_takes_the_nearest_place_that_covers_least(parts, seed):
     """Counted pixel by pixel over every place, in pictures from empty to full."""
-    rng = np.random.default_rng(parts)
+    rng = np.random.default_rng(10 * parts + seed)
     height, width = rng.integers(80, 400, 2)
     drawn = np.zeros((height, width), bool)
     for _ in range(parts):

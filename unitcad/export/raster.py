@@ -139,7 +139,6 @@ class Name:
 
 def draw(surfaces: Sequence[Surface], towards_eye: Colour, size: tuple[int, int]) -> bytes:
     """Draw surfaces as a PNG, seen from one side; those with a label are named."""
-    surfaces = [surface for surface in surfaces if len(surface.faces)]
     view = aim(towards_eye, np.concatenate([surface.vertices for surface in surfaces]), size)
     layers = [render(surface, view) for surface in surfaces]
     return finish(layers, view, labels=[surface.label for surface in surfaces])
