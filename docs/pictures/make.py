@@ -29,6 +29,9 @@ from unitcad.arrays.crosstalk_files import crosstalk_files  # noqa: E402
 from unitcad.arrays.patch_moulds import patch_moulds  # noqa: E402
 from unitcad.arrays.patch_pictures import pictures as patch_pictures  # noqa: E402
 from unitcad.cache import MemoryStore  # noqa: E402
+from unitcad.lab.phantom import phantom_set  # noqa: E402
+from unitcad.lab.phantom.phantom_files import box_picture  # noqa: E402
+from unitcad.lab.phantom.recipe import load_phantom  # noqa: E402
 from unitcad.pipeline import Variant  # noqa: E402
 from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # noqa: E402
 from unitcad.pipeline.write import build  # noqa: E402
@@ -69,6 +72,7 @@ def pictures() -> dict[str, bytes]:
     made["film-closed-pour2.png"] = step_in_section(film, 2)
     made["dome-unit.png"] = unit_cut_open(dome)
     made["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)
+    made["phantom-box.png"] = box_picture(phantom_set(load_phantom("skin")))
     return {name: small(image) for name, image in made.items()}
 
 
