@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import combinations, pairwise
 from xml.etree import ElementTree
 
@@ -7,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sample_bodies import base, cup, layers, tube
 
-from unitcad.export import drawing, svg
+from unitcad.export import chart, svg
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, moved
 from unitcad.shape.body import Body
@@ -25,16 +26,17 @@ def texts(root: ElementTree.Element) -> dict[str, tuple[float, float, float, flo
     """Text by what it says, with the box that it takes (px)."""
     found = {}
     for index, node in enumerate(root.iter(f"{SVG}text")):
-        width, x, y = drawing.text_width(node.text or ""), float(node.get("x", "")), float(node.get("y", ""))
+        width, x, y = svg.text_width(node.text or ""), float(node.get("x", "")), float(node.get("y", ""))
         left = x - {"start": 0.0, "middle": 0.5, "end": 1.0}[node.get("text-anchor", "start")] * width
-        found[f"{node.text}#{index}"] = (left, y - 0.75 * drawing.TEXT_PX, left + width, y + 0.25 * drawing.TEXT_PX)
+        found[f"{node.text}#{index}"] = (left, y - 0.75 * svg.TEXT_PX, left + width, y + 0.25 * svg.TEXT_PX)
     return found
 
 
 def drawn(template: str) -> str:
     variant = Variant.of(template)
     names = {f"layer{i + 1}": f"layer {i + 1}: {layer.material}" for i, layer in enumerate(variant.spec.layers)}
-    return svg.unit_section(variant.unit, variant.dimensions, variant.segments, template, names)
+    bodies = [replace(body, name=names.get(body.name, body.name)) for body in variant.unit]
+    return svg.unit_section(bodies, variant.dimensions, variant.segments)
 
 
 @pytest.mark.parametrize("template", sorted(templates()))
@@ -118,7 +120,7 @@ def test_leaders_end_in_what_they_name():
 
 def test_same_text_again_and_names_are_escaped():
     assert drawn("encapsulating") == drawn("encapsulating")
-    odd = svg.section(svg.cut([tube()], 48), title="a<b>&", labels={"tube": "<i>"}, ground="seat")
+    odd = svg.section(svg.cut([replace(tube(), name="<i>")], 48), title="a<b>&", ground="seat")
     said = {name.split("#")[0] for name in texts(ElementTree.fromstring(odd))}
     assert {"a<b>&", "<i>", "seat"} <= said
 
@@ -126,7 +128,7 @@ def test_same_text_again_and_names_are_escaped():
 @given(st.lists(st.tuples(st.floats(-500, 500), st.floats(1, 90)), min_size=1, max_size=9))
 def test_spread_keeps_order_and_distance(items):
     wanted, sizes = [w for w, _ in items], [s for _, s in items]
-    found = drawing.spread(wanted, sizes, 4)
+    found = svg.spread(wanted, sizes, 4)
     order = sorted(range(len(items)), key=lambda i: found[i])
     for left, right in pairwise(order):
         assert wanted[left] <= wanted[right]
@@ -134,9 +136,9 @@ def test_spread_keeps_order_and_distance(items):
 
 
 def test_spread_leaves_alone_what_has_room():
-    assert drawing.spread([100, 0, 50], [10, 10, 10]) == [100, 0, 50]
+    assert svg.spread([100, 0, 50], [10, 10, 10]) == [100, 0, 50]
 
 
 @pytest.mark.parametrize(("value", "shown"), [(-0.001, "0"), (1.25, "1.25"), (12.0, "12"), (1 / 3, "0.33")])
 def test_numbers_have_one_form(value, shown):
-    assert drawing.number(value) == shown
+    assert chart.number(value) == shown

@@ -3,7 +3,7 @@
     python docs/pictures/make.py              unit, moulds and three pages, into this folder
     python docs/pictures/make.py --look DIR   the pages in light, dark and 390 pixels wide, into DIR
 
-Needs the extras `cadquery`, `serve` and `test`, and Chromium.
+Needs the extras `serve` and `test`, and Chromium.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ from unitcad.arrays.crosstalk_maps import crosstalk_files  # noqa: E402
 from unitcad.arrays.patch import patch_moulds  # noqa: E402
 from unitcad.arrays.patch_pictures import pictures as patch_pictures  # noqa: E402
 from unitcad.cache import MemoryStore  # noqa: E402
-from unitcad.export.picture import draw  # noqa: E402
+from unitcad.lab.phantom import phantom_set  # noqa: E402
+from unitcad.lab.phantom.phantom_files import box_picture  # noqa: E402
+from unitcad.lab.phantom.recipe import load_phantom  # noqa: E402
 from unitcad.pipeline import Variant  # noqa: E402
 from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # noqa: E402
 from unitcad.pipeline.write import build  # noqa: E402
@@ -60,17 +62,18 @@ def pictures() -> dict[str, bytes]:
     variants = {name: Variant.of(name) for name in ("encapsulating", "embedded")}
     custom = HERE.parents[1] / "templates" / "custom"
     dome, film, lugs = (Variant.of(str(custom / f"{name}.toml")) for name in ("dome", "film-closed", "strap-lugs"))
-    scenes = {f"{name}-unit.png": unit_cut_open(variant) for name, variant in variants.items()}
-    scenes |= {f"{name}-unit.png": unit_cut_open(Variant.of(name)) for name in ("chain", "three-layer")}
-    scenes |= {"strap-lugs-unit.png": unit_cut_open(lugs), "film-closed-unit.png": unit_cut_open(film)}
-    scenes["encapsulating-moulds.png"] = exploded(variants["encapsulating"])
-    scenes["strap-lugs-moulds.png"] = exploded(lugs)
-    scenes["strap-lugs-pour2.png"] = step_in_section(lugs, 2)
-    scenes["film-closed-moulds.png"] = exploded(film)
-    scenes["film-closed-pour2.png"] = step_in_section(film, 2)
-    scenes["dome-unit.png"] = unit_cut_open(dome)
-    scenes["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)
-    return {name: small(image) for name, image in zip(scenes, draw(list(scenes.values())), strict=True)}
+    made = {f"{name}-unit.png": unit_cut_open(variant) for name, variant in variants.items()}
+    made |= {f"{name}-unit.png": unit_cut_open(Variant.of(name)) for name in ("chain", "three-layer")}
+    made |= {"strap-lugs-unit.png": unit_cut_open(lugs), "film-closed-unit.png": unit_cut_open(film)}
+    made["encapsulating-moulds.png"] = exploded(variants["encapsulating"])
+    made["strap-lugs-moulds.png"] = exploded(lugs)
+    made["strap-lugs-pour2.png"] = step_in_section(lugs, 2)
+    made["film-closed-moulds.png"] = exploded(film)
+    made["film-closed-pour2.png"] = step_in_section(film, 2)
+    made["dome-unit.png"] = unit_cut_open(dome)
+    made["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)
+    made["phantom-box.png"] = box_picture(phantom_set(load_phantom("skin")))
+    return {name: small(image) for name, image in made.items()}
 
 
 def arrays() -> dict[str, bytes]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from string import ascii_letters
 
 import numpy as np
 import pytest
@@ -19,8 +18,7 @@ from unitcad.casting.pictures import SIZE, BenchPictures, pictures
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.views import View, picture_path, views
 from unitcad.designs import layer_colour
-from unitcad.export import composite
-from unitcad.export.picture_letters import Name, written
+from unitcad.export.raster import Layer, Name, Surface, aim, finish, render
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build
@@ -190,19 +188,18 @@ def box_x(solid: Manifold) -> float:
 
 def test_a_nearer_body_hides_one_behind_it_whatever_the_order() -> None:
     eye, points = (0.0, -1.0, 0.0), np.array([[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]])
-    camera = composite.view(eye, points, (40, 40))
+    camera = aim(eye, points, (40, 40))
 
-    def drawn(y: float, colour: tuple[float, float, float]) -> composite.DrawnBody:
-        vertices, faces = arrays(realise(moved(box(-1, 1, -0.5, 0.5, -1, 1), y=y), 32))
-        return composite.drawn(np.asarray(vertices), np.asarray(faces), colour, camera)
+    def drawn(y: float, colour: tuple[float, float, float]) -> Layer:
+        return render(Surface(*arrays(realise(moved(box(-1, 1, -0.5, 0.5, -1, 1), y=y), 32)), colour), camera)
 
     near, far = drawn(-1, (1, 0, 0)), drawn(1, (0, 1, 0))
-    one, other = composite.together([near, far], camera), composite.together([far, near], camera)
+    one, other = finish([near, far], camera), finish([far, near], camera)
     assert one == other
     red, green, blue = seen(one)[20, 20]
     assert red > 200
     assert green == blue == 0
-    assert (seen(composite.together([far], camera))[20, 20] == [0, red, 0]).all()
+    assert (seen(finish([far], camera))[20, 20] == [0, red, 0]).all()
     assert (seen(one)[1, 1] == 255).all()
 
 
@@ -248,45 +245,17 @@ def test_sprue_and_vent_point_at_the_silicone_in_them(name: str, cavities: str) 
 
 
 def test_a_ring_leaves_what_it_names_in_view() -> None:
-    camera = composite.view((0.0, -1.0, 0.0), np.array([[-9.0, -9.0, -6.0], [9.0, 9.0, 6.0]]), (360, 240))
-    solid = arrays(realise(box(-3, 3, -0.5, 0.5, -3, 3), 32))
-    body = composite.drawn(np.asarray(solid[0]), np.asarray(solid[1]), (1, 0, 0), camera)
+    camera = aim((0.0, -1.0, 0.0), np.array([[-9.0, -9.0, -6.0], [9.0, 9.0, 6.0]]), (360, 240))
+    body = render(Surface(*arrays(realise(box(-3, 3, -0.5, 0.5, -3, 3), 32)), (1, 0, 0)), camera)
 
     def middle(*names: Name) -> list[int]:
-        picture = seen(composite.together([body], camera, names))
+        picture = seen(finish([body], camera, names))
         rows, columns = np.nonzero((picture[..., 0] > 150) & (picture[..., 1] < 50))
         return list(picture[(rows.min() + rows.max()) // 2, (columns.min() + columns.max()) // 2])
 
     plain = middle()
     assert middle(Name("vent", (0.0, -0.5, 0.0), ring=True)) == plain
     assert middle(Name("vent", (0.0, -0.5, 0.0))) == [0, 0, 0]
-
-
-def test_names_cover_neither_bodies_nor_each_other() -> None:
-    camera = composite.view((0.0, -1.0, 0.0), np.array([[-9.0, -9.0, -6.0], [9.0, 9.0, 6.0]]), (360, 240))
-
-    def drawn(half: tuple[float, float], colour: tuple[float, float, float]) -> composite.DrawnBody:
-        vertices, faces = arrays(realise(box(-half[0], half[0], -3, 3, -half[1], half[1]), 32))
-        return composite.drawn(np.asarray(vertices), np.asarray(faces), colour, camera)
-
-    bodies = [drawn((3, 3), (1, 0, 0)), drawn((0.1, 6), (0, 1, 0))]  # the second one keeps the rows above and below
-    names = [Name("cup 1", (2.0, -3.0, 0.0)), Name("tape 2.5 mm", (2.0, -3.0, 1.0))]
-    plain, named = (seen(composite.together(bodies, camera, each)) for each in ([], names))
-    red = (plain[:, :, 0] > 150) & (plain[:, :, 1] < 50)
-    black = named.max(axis=2) < 90
-    letters = sum(written(text, composite.LETTER_PX).sum() for text in ("cup 1", "tape 2.5 mm"))
-    assert (black & ~red).sum() > 0.6 * letters  # the names, side by side on white
-    assert (black & red).sum() < 250  # no more than two leaders and their dots
-    assert np.array_equal(named, seen(composite.together(bodies, camera, names)))
-
-
-def test_letters_differ_and_lie_in_their_box() -> None:
-    drawn = {letter: written(letter, 3.0) for letter in f"{ascii_letters}0123456789.-"}
-    assert len({(ink.shape, ink.tobytes()) for ink in drawn.values()}) == len(drawn)
-    assert all(ink.any() for ink in drawn.values())
-    assert written("Cup 1", 3.0) is not None
-    assert np.array_equal(written("?", 3.0), written("-", 3.0))
-    assert written("ü", 3.0).any()
 
 
 def test_a_build_writes_the_pictures_and_names_them(tmp_path: Path) -> None:

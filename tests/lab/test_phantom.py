@@ -177,7 +177,6 @@ def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path: Path) -> None:
 
 
 def test_the_box_taken_apart_is_a_picture() -> None:
-    pytest.importorskip("vtkmodules")
     picture = phantom_files.box_picture(_skin())
     assert picture.startswith(b"\x89PNG")
     assert len(picture) > 10_000

@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
-from unitcad.export import drawing
+from unitcad.export.svg import text_width
 from unitcad.kernels.mesh import bounds, realise
 from unitcad.lab.phantom import PhantomSet, phantom_files, phantom_set
 from unitcad.lab.phantom.recipe import load_phantom
@@ -64,9 +64,7 @@ def test_every_name_of_the_section_is_on_the_page() -> None:
     root = ET.fromstring(phantom_files.contents(made)["section.svg"])
     named = {body.name for body in (*made.tools, *made.layers)}
     texts = {str(one.text): float(one.get("x", "nan")) for one in root.iter("{http://www.w3.org/2000/svg}text")}
-    rows = sorted(
-        (x - drawing.text_width(t) / 2, x + drawing.text_width(t) / 2) for t, x in texts.items() if t in named
-    )
+    rows = sorted((x - text_width(t) / 2, x + text_width(t) / 2) for t, x in texts.items() if t in named)
     assert {"muscle", "hypodermis", "skin", "frame2", "frame3", "tray", "plate"} <= set(texts)
     assert rows[0][0] >= 0
     assert rows[-1][1] <= float(root.get("width", "nan"))

@@ -1,37 +1,29 @@
-"""Shaded pictures: what they show, and what happens on a machine that can't draw."""
+"""Shaded pictures of a unit, its moulds and their pours: what they show."""
 
 from __future__ import annotations
 
 import io
 import json
 import math
-import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from unitcad.export import picture
-from unitcad.export.picture import Drawn, NoPicture, Scene, draw
+from unitcad.export.raster import Surface, draw
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.pipeline.scenes import moments, pictures, taken_apart, unit_apart
 from unitcad.pipeline.variant import Variant
+from unitcad.pipeline.write import build
 from unitcad.shape import box
-
-pytest.importorskip("vtkmodules", reason="pictures need VTK: pip install 'unitcad[cadquery]'")
-Image = pytest.importorskip("PIL.Image", reason="reading the pictures back needs Pillow")
+from unitcad.validation import load
 
 RED, GREEN = (0.9, 0.1, 0.1), (0.1, 0.7, 0.1)
-NO_DISPLAY = {**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": "vtkXOpenGLRenderWindow"}
-NO_DISPLAY.pop("DISPLAY", None)
 
 
-def drawn(*shape: float, colour: tuple[float, float, float] = RED, label: str = "") -> Drawn:
-    return Drawn(colour, *arrays(realise(box(*shape), 24)), label)
+def drawn(*shape: float, colour: tuple[float, float, float] = RED, label: str = "") -> Surface:
+    return Surface(*arrays(realise(box(*shape), 24)), colour, label)
 
 
 def pixels(png: bytes) -> np.ndarray:
@@ -49,8 +41,9 @@ def like(image: np.ndarray, colour: tuple[float, float, float]) -> np.ndarray:
 def test_a_picture_shows_its_parts_in_their_places() -> None:
     front = drawn(0, 10, -10, 0, 0, 10)
     above = drawn(0, 10, -10, 0, 12, 20, colour=GREEN)
-    image = pixels(draw([Scene((front, above), (0, -1, 0.2), (300, 400))])[0])
-    assert image.shape == (400, 300, 3)
+    image = pixels(draw([front, above], (0, -1, 0.2), (300, 400)))
+    assert image.shape[1] == 300
+    assert image.shape[0] <= 400
     red, green = like(image, RED), like(image, GREEN)
     assert red.mean() > 0.1
     assert green.mean() > 0.1
@@ -64,64 +57,28 @@ def test_a_picture_shows_its_parts_in_their_places() -> None:
 
 def test_what_lies_behind_is_hidden() -> None:
     behind = drawn(2, 8, 5, 6, 2, 8, colour=GREEN)
-    image = pixels(draw([Scene((drawn(0, 10, 0, 4, 0, 10), behind), (0, -1, 0), (200, 200))])[0])
+    image = pixels(draw([drawn(0, 10, 0, 4, 0, 10), behind], (0, -1, 0), (200, 200)))
     assert not like(image, GREEN).any()
 
 
-def test_a_label_stands_left_of_the_parts() -> None:
-    plain, named = draw(
-        [Scene((drawn(0, 9, 0, 9, 0, 9, label=text),), (0.5, -1, 0.5), (400, 300)) for text in ("", "cup 1")]
-    )
-    left = pixels(named)[:, :110]
-    assert (left.max(axis=2) < 120).sum() > 30
-    assert like(pixels(plain), RED).sum() > like(pixels(named), RED).sum()
+def test_the_same_surfaces_give_the_same_bytes_and_an_empty_one_is_left_out() -> None:
+    parts = [drawn(0, 9, 0, 9, 0, 9, label="cup 1"), drawn(2, 3, 2, 3, 9, 12, colour=GREEN)]
+    nothing = Surface(np.empty((0, 3)), np.empty((0, 3), np.int64), GREEN, "nothing")
+    assert draw(parts, (0.5, -1, 0.5), (400, 300)) == draw([*parts, nothing], (0.5, -1, 0.5), (400, 300))
 
 
-@pytest.mark.skipif(not shutil.which("Xvfb"), reason="no Xvfb on this machine")
-def test_a_child_that_falls_is_followed_by_one_under_a_virtual_display(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkXOpenGLRenderWindow")
-    scene = Scene((drawn(0, 1, 0, 1, 0, 1),), (0, -1, 0.3), (120, 100))
-    assert like(pixels(draw([scene])[0]), RED).mean() > 0.1
-
-
-def test_no_display_and_no_server_is_a_message(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkXOpenGLRenderWindow")
-    monkeypatch.setattr(picture, "shutil", SimpleNamespace(which=lambda name: None))
-    with pytest.raises(NoPicture, match=r"libegl1.*xvfb"):
-        draw([Scene((drawn(0, 1, 0, 1, 0, 1),), (0, -1, 0))])
-
-
-def test_without_vtk_is_a_message(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(picture.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(NoPicture, match="cadquery"):
-        draw([])
-
-
-def test_build_goes_on_without_pictures_and_says_so(tmp_path: Path) -> None:
-    environment = {**NO_DISPLAY, "PATH": str(Path(sys.executable).parent)}
-    command = [sys.executable, "-c", "from unitcad.cli import main; main()", "build", "single-embedded"]
-    done = subprocess.run(
-        [*command, "-o", str(tmp_path), "--formats", "png", "--only", "unit", "--no-check"],
-        env=environment, capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert "no pictures" in done.stderr
-    assert "xvfb" in done.stderr
-    folder = Path(done.stdout.splitlines()[-1])
-    assert (folder / "section.svg").is_file()
-    assert not list(folder.rglob("*.png"))
-    left_out = json.loads((folder / "manifest.json").read_text("utf-8"))["left_out"]
-    assert "pictures" in [one["what"] for one in left_out]
+def test_a_build_draws_the_pictures_that_png_asks_for(tmp_path: Path) -> None:
+    done = build(load("single-embedded", ['output.formats=["png"]']), tmp_path, only=("unit", "moulds"), check=False)
+    manifest = json.loads((done.folder / "manifest.json").read_text("utf-8"))
+    assert manifest["pictures"] == ["unit.png", "moulds/exploded.png", "moulds/step1.png"]
+    written = {path: (done.folder / path).read_bytes() for path in manifest["pictures"]}
+    assert written == {path: picture() for path, picture in pictures(Variant.of("single-embedded")).items()}
 
 
 def test_every_picture_of_the_encapsulating_unit() -> None:
     variant = Variant.of("encapsulating")
-    scenes = {path: scene() for path, scene in pictures(variant).items()}
-    assert list(scenes) == ["unit.png", "moulds/exploded.png", "moulds/step1.png", "moulds/step2.png"]
-    images = dict(zip(scenes, draw(list(scenes.values())), strict=True))
+    images = {path: picture() for path, picture in pictures(variant).items()}
+    assert list(images) == ["unit.png", "moulds/exploded.png", "moulds/step1.png", "moulds/step2.png"]
     blue, green = variant.unit[0].colour, variant.unit[1].colour
     tongue = variant.plan.tool("tongue").colour
     for name, image in images.items():

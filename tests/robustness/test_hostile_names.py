@@ -25,7 +25,7 @@ from unitcad.cache import MemoryStore
 from unitcad.cli import app
 from unitcad.cli.output import say_error
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.export import drawing, threemf
+from unitcad.export import chart, threemf
 from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.spec import Spec, to_toml
@@ -201,7 +201,7 @@ def test_a_bodys_name_is_text_in_meshes_and_drawings(name: str) -> None:
         model = ElementTree.fromstring(made.read("3D/3dmodel.model"))
     objects = [element.get("name") for element in model.iter() if element.tag.endswith("}object")]
     assert objects == [name]
-    marked = drawing.text(name, (0.0, 0.0))
+    marked = chart.text(0.0, 0.0, name)
     assert ElementTree.fromstring(marked).text == name
 
 

@@ -47,7 +47,7 @@ MORE = [
 def _names() -> frozenset[str]:
     """Modules that anything might import: Python's own and those of what is installed."""
     found = set(importlib.metadata.packages_distributions()) | set(sys.stdlib_module_names)
-    optional = {"vtkmodules", "OCP", "build123d", "cadquery", "distributed", "gmsh", "sitecustomize", "usercustomize"}
+    optional = {"OCP", "build123d", "cadquery", "distributed", "gmsh", "sitecustomize", "usercustomize"}
     return frozenset(name for name in found | optional if name.isidentifier()) - {"unitcad", "__main__"}
 
 

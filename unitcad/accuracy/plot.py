@@ -6,7 +6,7 @@ import math
 import textwrap
 
 from unitcad.accuracy.result import Plot, frontier
-from unitcad.export.plot_elements import COLOURS, line, round_step, text, upward_name
+from unitcad.export.chart import COLOURS, line, round_step, text, upward_name
 
 WIDTH, HEIGHT = 720, 440
 LEFT, RIGHT, TOP, BOTTOM = 70, 190, 36, 52

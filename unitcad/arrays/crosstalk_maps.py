@@ -15,7 +15,7 @@ from unitcad.arrays.circuit.outline import circuit_body, outline
 from unitcad.arrays.crosstalk import crosstalk, crosstalk_csv
 from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.errors import Missing, Refusal
-from unitcad.export.drawing import number
+from unitcad.export.chart import number
 from unitcad.shape import Profile
 from unitcad.text import number as number_of
 

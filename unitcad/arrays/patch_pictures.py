@@ -10,7 +10,7 @@ from manifold3d import Manifold
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.patch import PatchMoulds, patch_bodies
-from unitcad.export import composite
+from unitcad.export.raster import Surface, draw
 from unitcad.kernels.mesh import arrays, bounds
 from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import union
@@ -57,7 +57,6 @@ FOLDER = "pictures"
 WORN = f"{FOLDER}/patch-worn.png"
 GAP = 8.0
 """Between two pieces taken apart, mm."""
-_Solid = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
 _Eye = tuple[float, float, float]
 SKIN = (0.93, 0.80, 0.72)
 ALONG = (0.35, -0.9, 0.45)
@@ -81,33 +80,26 @@ def pictures(moulds: PatchMoulds) -> dict[str, bytes]:
     """Return the PNG of each picture by its path."""
     patch = [_solid(moulds, body) for body in patch_bodies(moulds.arranged)]
     drawn = {
-        f"{FOLDER}/patch-skin-side.png": _picture(patch, SKIN_SIDE),
-        f"{FOLDER}/patch-back.png": _picture(patch, BACK),
-        f"{FOLDER}/tools.png": _picture(list(_apart(moulds)), ABOVE),
+        f"{FOLDER}/patch-skin-side.png": draw(patch, SKIN_SIDE, SIZE),
+        f"{FOLDER}/patch-back.png": draw(patch, BACK, SIZE),
+        f"{FOLDER}/tools.png": draw([_solid(moulds, *moved) for moved in taken_apart(moulds)], ABOVE, SIZE),
     }
     if moulds.arranged.radius_mm is not None:
-        drawn[WORN] = _picture(list(_worn(moulds)), ALONG)
-    cuts = [_picture(list(_cut_open(moulds, step.index)), ABOVE) for step in moulds.plan.steps]
+        drawn[WORN] = draw(list(_worn(moulds)), ALONG, SIZE)
+    cuts = [draw(list(_cut_open(moulds, step.index)), ABOVE, SIZE) for step in moulds.plan.steps]
     return drawn | {f"{FOLDER}/pour{i + 1}.png": picture for i, picture in enumerate(cuts)}
 
 
-def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> _Solid:
-    vertices, faces = arrays(moulds.mesh(body))
-    return np.asarray(vertices, float) + np.array(by), np.asarray(faces, np.int64), body.colour
+def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surface:
+    return Surface(*arrays(moulds.mesh(body).translate(by)), body.colour)
 
 
-def _worn(moulds: PatchMoulds) -> Iterator[_Solid]:
+def _worn(moulds: PatchMoulds) -> Iterator[Surface]:
     """Yield the limb, and the patch's bodies as they lie round it."""
     array = moulds.arranged
-    vertices, faces = arrays(limb(array))
-    yield np.asarray(vertices, float), np.asarray(faces, np.int64), SKIN
+    yield Surface(*arrays(limb(array)), SKIN)
     for body in patch_bodies(array):
-        yield (*worn(array, moulds.mesh(body)), body.colour)
-
-
-def _apart(moulds: PatchMoulds) -> Iterator[_Solid]:
-    for body, by in taken_apart(moulds):
-        yield _solid(moulds, body, by)
+        yield Surface(*worn(array, moulds.mesh(body)), body.colour)
 
 
 def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:
@@ -154,7 +146,7 @@ def _of_pour(moulds: PatchMoulds, step: Step) -> Iterator[tuple[Body, ...]]:
     yield from ((lid,) for lid in plan.standing(step, "lid"))
 
 
-def _cut_open(moulds: PatchMoulds, index: int) -> Iterator[_Solid]:
+def _cut_open(moulds: PatchMoulds, index: int) -> Iterator[Surface]:
     """Yield a pour as it is struck off, without its nearer half: cut through a row of units."""
     step = moulds.plan.steps[index - 1]
     y = min((place.y for place in moulds.arranged.places), key=abs) + 1 / 512
@@ -163,12 +155,4 @@ def _cut_open(moulds: PatchMoulds, index: int) -> Iterator[_Solid]:
     for shapes, pour in ((step.earlier, 1), (step.layer, index)):
         solids += [(solid, colours[pour]) for solid in moulds.meshes(shapes)]
     for solid, colour in solids:
-        half = solid.trim_by_plane((0, 1, 0), y)
-        if not half.is_empty():
-            vertices, faces = arrays(half)
-            yield np.asarray(vertices, float), np.asarray(faces, np.int64), colour
-
-
-def _picture(solids: list[_Solid], eye: _Eye) -> bytes:
-    camera = composite.view(eye, np.concatenate([vertices for vertices, _, _ in solids]), SIZE)
-    return composite.together([composite.drawn(*solid, camera) for solid in solids], camera)
+        yield Surface(*arrays(solid.trim_by_plane((0, 1, 0), y)), colour)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from unitcad.casting.drawings import Extra
 from unitcad.casting.views import Placed, View, picture_path, shapes, views
-from unitcad.export import composite
-from unitcad.export.picture_letters import Name
+from unitcad.export import raster
+from unitcad.export.raster import Name, Surface
 from unitcad.export.threemf import layout
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
@@ -18,7 +19,6 @@ SIZE, MANY = (540, 360), (540, 560)
 """Of a picture, px; of the pieces where tools are printed in several."""
 _GAP = 9.0
 """Between pieces laid out side by side, mm."""
-_Solid = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
 _Key = tuple[Placed | Extra, bool]
 """What a view shows, and whether it is of the unit, not of its moulds."""
 
@@ -52,14 +52,14 @@ class BenchPictures:
             size = MANY if view.group == "pieces" and self._moulds.plan.splits else SIZE
             if view.group == "pieces":
                 self._solids, self.written = _laid_out(self._moulds, self._solids)
-            points = np.concatenate([vertices for each in self._solids.values() for vertices, _, _ in each])
-            self._camera = composite.view(view.eye, points, size, turned=view.turned)
+            points = np.concatenate([solid.vertices for each in self._solids.values() for solid in each])
+            self._camera = raster.aim(view.eye, points, size, turned=view.turned)
         bodies = []
         for key in _keys(view):
             if key not in self._drawn:
-                self._drawn[key] = [composite.drawn(*solid, self._camera) for solid in self._solids[key]]
+                self._drawn[key] = [raster.render(solid, self._camera) for solid in self._solids[key]]
             bodies += self._drawn[key]
-        return composite.together(bodies, self._camera, self.written if view.group == "pieces" else view.names)
+        return raster.finish(bodies, self._camera, self.written if view.group == "pieces" else view.names)
 
 
 def _kind(view: View) -> object:
@@ -70,7 +70,7 @@ def _keys(view: View) -> list[_Key]:
     return [(item, view.group == "unit") for item in (*view.parts, *view.extras)]
 
 
-def _solids(moulds: MouldSet, item: Placed | Extra, unit: bool) -> Iterator[_Solid]:
+def _solids(moulds: MouldSet, item: Placed | Extra, unit: bool) -> Iterator[Surface]:
     """Yield the meshes of what a view shows, of a layer one a cell, there where it has it."""
     near = 0.0 if unit else min(cell.y for cell in moulds.plan.layout.cells)
     for shape, colour in shapes(moulds, item, unit):
@@ -78,11 +78,12 @@ def _solids(moulds: MouldSet, item: Placed | Extra, unit: bool) -> Iterator[_Sol
         if isinstance(item, Placed) and item.half:
             solid = solid.trim_by_plane((0, 1, 0), near + 1 / 512)
         if not solid.is_empty():
-            vertices, faces = arrays(solid.translate(item.moved))
-            yield np.asarray(vertices, float), np.asarray(faces, np.int64), colour
+            yield Surface(*arrays(solid.translate(item.moved)), colour)
 
 
-def _laid_out(moulds: MouldSet, solids: dict[_Key, list[_Solid]]) -> tuple[dict[_Key, list[_Solid]], tuple[Name, ...]]:
+def _laid_out(
+    moulds: MouldSet, solids: dict[_Key, list[Surface]]
+) -> tuple[dict[_Key, list[Surface]], tuple[Name, ...]]:
     """Lay tools out side by side in rows, on one plane, the pieces of a split one as they belong together; name them.
 
     Tongues and filaments of several cavities are named by their number; pieces have their numbers written on them.
@@ -93,7 +94,7 @@ def _laid_out(moulds: MouldSet, solids: dict[_Key, list[_Solid]]) -> tuple[dict[
         for split in plan.splits
         for i, piece in enumerate(split.pieces)
     }
-    groups: dict[str, list[tuple[_Key, list[_Solid]]]] = {}
+    groups: dict[str, list[tuple[_Key, list[Surface]]]] = {}
     for key, each in solids.items():
         name = getattr(key[0], "name", "")
         tool, row, column = places.get(name, (name, 0, 0))
@@ -101,7 +102,7 @@ def _laid_out(moulds: MouldSet, solids: dict[_Key, list[_Solid]]) -> tuple[dict[
     boxes = [_box([solid for _, each in group for solid in each])[1:] for group in groups.values()]
     sizes = [tuple((high - low)[:2] + _GAP) for low, high in boxes]
     corners = layout(sizes, (1.25 * float(np.sqrt(np.prod(sizes, axis=1).sum())), 0.0))
-    laid: dict[_Key, list[_Solid]] = {}
+    laid: dict[_Key, list[Surface]] = {}
     found: dict[str, list[tuple[float, float, float]]] = {}
     numbers = []
     for (name, group), (low, high), (x, y) in zip(groups.items(), boxes, corners, strict=True):
@@ -124,11 +125,11 @@ def _laid_out(moulds: MouldSet, solids: dict[_Key, list[_Solid]]) -> tuple[dict[
     return laid, (*numbers, *names)
 
 
-def _shifted(solids: list[_Solid], by: tuple[float, float, float]) -> list[_Solid]:
-    return [(vertices + np.array(by), faces, colour) for vertices, faces, colour in solids]
+def _shifted(solids: list[Surface], by: tuple[float, float, float]) -> list[Surface]:
+    return [replace(solid, vertices=solid.vertices + by) for solid in solids]
 
 
-def _box(solids: list[_Solid]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _box(solids: list[Surface]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the points of solids, the lowest and the highest corner of their box."""
-    points = np.concatenate([vertices for vertices, _, _ in solids])
+    points = np.concatenate([solid.vertices for solid in solids])
     return points, points.min(axis=0), points.max(axis=0)

@@ -38,7 +38,7 @@ from unitcad.casting.drawings import (
 )
 from unitcad.casting.figures import window_length
 from unitcad.designs import layer_colour
-from unitcad.export.picture_letters import Name
+from unitcad.export.raster import Name
 from unitcad.kernels.mesh import arrays, bounds
 from unitcad.moulds.base import plate_bottom, pry_floor
 from unitcad.moulds.layout import MARK

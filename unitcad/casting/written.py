@@ -121,10 +121,9 @@ def step_section(moulds: MouldSet, step: Step) -> str:
     regions: dict[str, svg.Region] = {}
     for region in svg.cut([*bodies, *step.inserts], moulds.segments, y=cells[0].y):
         # Regions of one name, such as a layer's several cells, are one.
-        earlier = regions.get(region.name)
-        regions[region.name] = replace(region, loops=(*earlier.loops, *region.loops)) if earlier else region
-    title, labels = f"Pour {step.index}: {spaced(step.name)}", {name: spaced(name) for name in regions}
-    return svg.section([*regions.values()], title=title, labels=labels, ground="seat")
+        loops = regions[region.name].loops if region.name in regions else ()
+        regions[region.name] = replace(region, name=spaced(region.name), loops=(*loops, *region.loops))
+    return svg.section([*regions.values()], title=f"Pour {step.index}: {spaced(step.name)}", ground="seat")
 
 
 def _figures(figures: Iterable[Figure], decimals: int | None = None) -> list[str]:

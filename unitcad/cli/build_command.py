@@ -150,8 +150,6 @@ def _print_faults(manifest: Manifest) -> None:
     for warning in manifest["warnings"]:
         warn(f"warning: {warning}")
     for entry in manifest["left_out"]:
-        if entry["what"] == "pictures":
-            typer.echo(f"warning: no pictures: {entry['why']}", err=True)
         if entry["why"] == NO_KERNEL:
             typer.echo(f"note: STEP left out: {entry['why']}", err=True)
     checks = manifest["laws"]

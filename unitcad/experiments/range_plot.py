@@ -12,7 +12,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from unitcad.export.plot_elements import COLOURS, line, text
+from unitcad.export.chart import COLOURS, line, text
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 860, 300, 24, 64, 44
 BAR, GAP = 14, 18

@@ -1,4 +1,7 @@
-"""A chart as SVG: curves and points over linear or logarithmic axes, with a legend. The same data, the same bytes."""
+"""Charts as SVG: axes, linear or logarithmic, with curves, points and a legend. The same data, the same bytes.
+
+Other drawings in SVG take their elements from here: coordinates, lines, texts, the page.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,18 @@ import math
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 
-from unitcad.export.plot_elements import COLOURS, line, round_step, text, upward_name
-
+COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d1478c", "#17868c")
+"""Colours of series, in turn."""
 WIDTH, HEIGHT = 760, 460
 LEFT, RIGHT, TOP, BOTTOM = 72, 210, 40, 52
 LEGEND_LETTERS = 28
 MOST_POINTS = 2000
 """Points of a series that are drawn: more can't be told apart."""
-_GREY, _DARK = "#e2e2e2", "#444444"
-
-
+_GRID, _DARK, _SHADE = "#e2e2e2", "#444444", "#f3ead8"
 _NIL = 0.005
 """An axis starts at zero where values lie below it by at most this part of their span, less than a point's size."""
 
@@ -39,6 +41,14 @@ class Series:
     width: float = 1.8
 
 
+@dataclass(frozen=True)
+class Axis:
+    """`at` gives a value's place (px); `ticks` are values with their labels."""
+
+    at: Callable[[float], float]
+    ticks: list[tuple[float, str]]
+
+
 def chart(
     series: Sequence[Series],
     title: str,
@@ -55,57 +65,124 @@ def chart(
     `shaded` marks a range of x, which the legend names where `shaded_name` does; `x_range` is what a linear axis of x
     shows, where the series don't say it.
     """
-    kept = [(one, _kept(one, log_x, log_y)) for one in series]
-    across = _axis(np.concatenate([xy[0] for _, xy in kept] or [np.zeros(0)]), log_x, LEFT, WIDTH - RIGHT, x_range)
-    ends = [np.ravel(np.asarray(one.bars, float)) for one in series]
-    up = _axis(np.concatenate([*(xy[1] for _, xy in kept), *ends] or [np.zeros(0)]), log_y, HEIGHT - BOTTOM, TOP)
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
-        'font-family="sans-serif" font-size="12">',
-        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
-        text(LEFT, 22, title, size=14),
-    ]
+    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
+    kept = [(one, *_kept(one, log_x, log_y)) for one in series]
+    across = axis([value for _, xs, _ in kept for value in xs], LEFT, right, log_x, x_range)
+    bars = [end for one in series for ends in one.bars for end in ends]
+    up = axis([*bars, *(value for _, _, ys in kept for value in ys)], bottom, TOP, log_y)
+    parts = [text(LEFT, 22, title, size=14)]
     if shaded:
-        low, high = (min(max(across.at(end), LEFT), WIDTH - RIGHT) for end in shaded)
-        height = HEIGHT - TOP - BOTTOM
-        parts.append(f'<rect x="{low:.1f}" y="{TOP}" width="{high - low:.1f}" height="{height}" fill="#f3ead8"/>')
-    for value, label in across.ticks:
-        x = across.at(value)
-        parts += [line(x, HEIGHT - BOTTOM, x, TOP, _GREY), text(x, HEIGHT - BOTTOM + 16, label, "middle")]
-    for value, label in up.ticks:
-        y = up.at(value)
-        parts += [line(LEFT, y, WIDTH - RIGHT, y, _GREY), text(LEFT - 6, y + 4, label, "end")]
-    parts += [
-        line(LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, HEIGHT - BOTTOM, _DARK),
-        line(LEFT, HEIGHT - BOTTOM, LEFT, TOP, _DARK),
-        text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 14, x_label, "middle"),
-        upward_name(16, (TOP + HEIGHT - BOTTOM) / 2, y_label),
-    ]
+        low, high = (min(max(across.at(end), LEFT), right) for end in shaded)
+        parts.append(_box(round(low, 1), TOP, round(high - low, 1), bottom - TOP))
+    parts += frame(across, up, (LEFT, right, TOP, bottom), x_label, y_label)
     y = TOP + 12
-    for i, (one, (xs, ys)) in enumerate(kept):
+    for i, (one, xs, ys) in enumerate(kept):
         colour = COLOURS[i % len(COLOURS)]
         spots = [(across.at(float(a)), up.at(float(b))) for a, b in zip(xs, ys, strict=True)]
-        for (x, _), ends_of_one in zip(spots, one.bars, strict=False):
-            low, high = (up.at(float(end)) for end in ends_of_one)
-            parts.append(line(x, low, x, high, colour))
+        for (x, _), (low, high) in zip(spots, one.bars, strict=False):
+            parts.append(line(x, up.at(float(low)), x, up.at(float(high)), colour))
         parts += _drawn(one, spots, colour)
-        parts += _drawn(one, [(WIDTH - RIGHT + 10.0, y - 4.0), (WIDTH - RIGHT + 24.0, y - 4.0)], colour)
-        for words in textwrap.wrap(one.name, LEGEND_LETTERS):
-            parts.append(text(WIDTH - RIGHT + 30, y, words))
-            y += 15
-        y += 4
+        parts += _drawn(one, [(right + 10.0, y - 4.0), (right + 24.0, y - 4.0)], colour)
+        words = legend(right + 30, y, one.name)
+        parts += words
+        y += 15 * len(words) + 4
     if shaded and shaded_name:
-        parts.append(f'<rect x="{WIDTH - RIGHT + 10}" y="{y - 10}" width="14" height="12" fill="#f3ead8"/>')
-        for words in textwrap.wrap(shaded_name, LEGEND_LETTERS):
-            parts.append(text(WIDTH - RIGHT + 30, y, words))
-            y += 15
-    return "\n".join([*parts, "</svg>", ""])
+        parts += [_box(right + 10, y - 10, 14, 12), *legend(right + 30, y, shaded_name)]
+    return page(WIDTH, HEIGHT, parts)
 
 
-@dataclass(frozen=True)
-class _Axis:
-    at: Callable[[float], float]
-    ticks: list[tuple[float, str]]
+def page(width: float, height: float, parts: Sequence[str]) -> str:
+    """Return a drawing as an SVG document on white."""
+    size = f'width="{number(width)}" height="{number(height)}"'
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(width)} {number(height)}" {size} '
+        f'font-family="sans-serif" font-size="12">\n<rect {size} fill="#ffffff"/>'
+    )
+    return "\n".join([head, *parts, "</svg>", ""])
+
+
+def frame(
+    across: Axis, up: Axis, box: tuple[float, float, float, float], x_label: str, y_label: str, aside: float = 56
+) -> list[str]:
+    """Draw two axes with grid, ticks and names; `box`: left, right, top, bottom; `aside`: from it to the name of y."""
+    left, right, top, bottom = box
+    parts = []
+    for value, label in across.ticks:
+        x = across.at(value)
+        parts += [line(x, bottom, x, top, _GRID), text(x, bottom + 16, label, "middle")]
+    for value, label in up.ticks:
+        y = up.at(value)
+        parts += [line(left, y, right, y, _GRID), text(left - 6, y + 4, label, "end")]
+    return [
+        *parts,
+        line(left, bottom, right, bottom, _DARK),
+        line(left, bottom, left, top, _DARK),
+        text((left + right) / 2, bottom + 38, x_label, "middle"),
+        upward_name(left - aside, (top + bottom) / 2, y_label),
+    ]
+
+
+def axis(
+    values: Sequence[float], start: float, end: float, log: bool = False, whole: tuple[float, float] | None = None
+) -> Axis:
+    """Return an axis from `start` to `end` (px) that shows all values; a linear one shows `whole` instead."""
+    low, high = (float(min(values)), float(max(values))) if len(values) else (1.0, 10.0)
+    if log:
+        first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
+        last = max(last, first + 1)
+        step = max(1, math.ceil((last - first) / 8))
+        ticks = [(10.0**d, f"{10.0**d:g}") for d in range(first, last + 1, step)]
+        return Axis(lambda v: start + (math.log10(v) - first) / (last - first) * (end - start), ticks)
+    if whole is not None and whole[1] > whole[0]:
+        low, high = whole
+        step = round_step(high - low)
+    else:
+        low = 0.0 if -_NIL * (high - low) <= low < 0.0 or 0 < low < 0.3 * high else low
+        high = high if high > low else low + 1.0
+        step = round_step(high - low)
+        low, high = math.floor(low / step + 1e-9) * step, math.ceil(high / step - 1e-9) * step
+    inside = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
+    return Axis(
+        lambda v: start + (v - low) / (high - low) * (end - start), [(k * step, f"{k * step:.6g}") for k in inside]
+    )
+
+
+def round_step(span: float, count: int = 6) -> float:
+    """Return the smallest 1, 2 or 5 times a power of ten of which at most `count` fit into the span."""
+    rough = max(span, 1e-300) / count
+    unit = 10.0 ** math.floor(math.log10(rough))
+    return next(unit * k for k in (1, 2, 5, 10) if unit * k >= rough)
+
+
+def number(value: float, digits: int = 2) -> str:
+    """Format a coordinate: so many decimals at most, no trailing zeros, no minus zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".")
+
+
+def line(x0: float, y0: float, x1: float, y1: float, stroke: str, more: str = "") -> str:
+    """Draw a line, px; `more`: further attributes, each with a space before it."""
+    return f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" stroke="{stroke}"{more}/>'
+
+
+def text(x: float, y: float, content: str, anchor: str = "start", size: int = 12, fill: str = "") -> str:
+    """Draw a line of text from its base line, px; `fill`: default the colour of the document."""
+    style = f' fill="{fill}"' if fill else ""
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}"{style}>{escape(content)}</text>'
+
+
+def upward_name(x: float, y: float, content: str) -> str:
+    """Draw the name of an upward axis, its middle at that place, px."""
+    at = f"translate({x:g} {y:.1f}) rotate(-90)"
+    return f'<text transform="{at}" text-anchor="middle">{escape(content)}</text>'
+
+
+def legend(x: float, y: float, name: str, letters: int = LEGEND_LETTERS) -> list[str]:
+    """Draw a name in a legend, in as many lines as it takes, 15 px apart."""
+    return [text(x, y + 15 * i, words) for i, words in enumerate(textwrap.wrap(name, letters))]
+
+
+def _box(x: float, y: float, width: float, height: float) -> str:
+    return f'<rect x="{x}" y="{y}" width="{width}" height="{height}" fill="{_SHADE}"/>'
 
 
 def _kept(one: Series, log_x: bool, log_y: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -114,28 +191,6 @@ def _kept(one: Series, log_x: bool, log_y: bool) -> tuple[np.ndarray, np.ndarray
     x, y = x[shown], y[shown]
     step = max(1, math.ceil(len(x) / MOST_POINTS))
     return x[::step], y[::step]
-
-
-def _axis(values: np.ndarray, log: bool, start: float, end: float, whole: tuple[float, float] | None = None) -> _Axis:
-    low, high = (float(values.min()), float(values.max())) if values.size else (1.0, 10.0)
-    if log:
-        first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
-        last = max(last, first + 1)
-        step = max(1, math.ceil((last - first) / 8))
-        ticks = [(10.0**d, f"{10.0**d:g}") for d in range(first, last + 1, step)]
-        return _Axis(lambda v: start + (math.log10(v) - first) / (last - first) * (end - start), ticks)
-    if whole is not None and whole[1] > whole[0]:
-        low, high = whole
-        step = round_step(high - low, 6)
-        inside = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
-        ticks = [(k * step, f"{k * step:.6g}") for k in inside]
-        return _Axis(lambda v: start + (v - low) / (high - low) * (end - start), ticks)
-    low = 0.0 if -_NIL * (high - low) <= low < 0.0 else low
-    low, high = min(low, 0.0) if low > 0 and low < 0.3 * high else low, high if high > low else low + 1.0
-    step = round_step(high - low, 6)
-    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    ticks = [(k * step, f"{k * step:.6g}") for k in range(first, last + 1)]
-    return _Axis(lambda v: start + (v / step - first) / (last - first) * (end - start), ticks)
 
 
 def _drawn(one: Series, spots: list[tuple[float, float]], colour: str) -> list[str]:

@@ -1,25 +1,39 @@
-"""Shaded pictures of triangle meshes by numpy alone: parallel projection, a depth buffer, PNG. No display, no GPU.
+"""Shaded pictures of triangle meshes: parallel projection and a depth buffer by numpy, names and PNG by Pillow.
 
-Any mesh is drawn unchanged: open, turned inside out or passing through itself.
+No display and no GPU: the same meshes give the same bytes. Any mesh is drawn unchanged: open, turned inside out or
+passing through itself. A mesh is drawn once for a view, as a `Layer`, and serves every picture from that view.
 """
 
 from __future__ import annotations
 
-import struct
-import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+import io
+import math
+import unicodedata
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
+from PIL import Image, ImageChops, ImageDraw, ImageFont
 
-BACKGROUND = (1.0, 1.0, 1.0)
-INSIDE = (0.62, 0.50, 0.40)
-"""The colour of faces seen from behind: the inside of a part, through a hole or a cut."""
-CUT = (0.93, 0.87, 0.76)
-LINE = (0.10, 0.10, 0.12)
+from unitcad.geometry.components import components
+from unitcad.text import printable
+
+Colour = tuple[float, float, float]
+"""Red, green and blue, 0 to 1."""
+SHARPER = 2
+"""Pixels of the depth buffer along a pixel of the picture, along either side."""
+CREASE_DEG = 25.0
+"""Faces that meet at more than this angle have a line between them."""
+INK, WIRE, HATCH = 0.28, 0.4, 0.72
+"""The part of its colour that a pixel keeps on a line, on the side of a face and on a hatch."""
+LETTER_PX = 24
+MOST_CHARACTERS = 28
+"""The longest name that is written whole."""
+MARGIN_PX, EDGE_PX, GAP_PX, APART_PX = 6, 8, 6, 12
+"""White above and below the drawing; from a name to the picture's edge, to what is drawn, to another name."""
 _FRAGMENTS = 200_000  # a block's, which stay in the processor's cache
 _FACES = 100_000
-_PIXELS = 50_000
 
 
 @dataclass(frozen=True)
@@ -45,80 +59,160 @@ class Camera:
         return seen
 
 
-def camera(
-    towards_eye: tuple[float, float, float],
-    middle: np.ndarray,
-    reach: float | np.ndarray,
-    size: tuple[int, int],
+def aim(
+    towards_eye: Colour, points: np.ndarray, size: tuple[int, int], reach: float = 0.0, turned: bool = False
 ) -> Camera:
-    """Return a view that holds a ball of radius `reach` mm round `middle`; given points (n, 3) instead, all of them."""
+    """Return a view that holds all `points` (n, 3) mm with a margin, and a ball of radius `reach` mm in their middle.
+
+    `turned`: upside down, as things look that lie on their back.
+    """
     eye = np.array(towards_eye, float) / np.linalg.norm(towards_eye)
     upwards = np.array([0.0, 0.0, 1.0]) if abs(eye[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
     right = np.cross(upwards, eye)
     right /= np.linalg.norm(right)
-    up = np.cross(eye, right)
-    if isinstance(reach, np.ndarray):
-        plan = (reach - middle) @ np.stack([right, up]).T
-        low, high = plan.min(axis=0), plan.max(axis=0)
-        middle = middle + np.stack([right, up]).T @ ((low + high) / 2)
-        half = np.maximum((high - low) / 2, 1e-12) * 1.1
-    else:
-        half = np.full(2, max(reach, 1e-12))
-    return Camera(right, up, eye, middle, float((np.array(size) / 2 / half).min()), size)
+    plane = np.stack([right, np.cross(eye, right)])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    flat = (points - middle) @ plane.T
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    half = np.maximum((high - low) / 2 * 1.1, max(reach, 1e-12))
+    right, up = -plane if turned else plane
+    scale = float((np.array(size) / 2 / half).min())
+    return Camera(right, up, eye, middle + (low + high) / 2 @ plane, scale, size)
 
 
 @dataclass(frozen=True)
-class Seen:
-    """The faces that a picture's pixels show: an index (height, width), -1 for none, and its depth in mm."""
+class Layer:
+    """A mesh in a view: the rectangle of the depth buffer that it reaches, from its `top` row and `left` column.
 
-    face: np.ndarray
+    Of each pixel (height, width) there: depth in mm, minus infinity beside the mesh, and face, -1 beside it. Of each
+    face (m,): colour, four bytes, and the number of the smooth patch that it lies in, from 1; -1 for a cut.
+    """
+
+    top: int
+    left: int
     depth: np.ndarray
+    face: np.ndarray
+    colours: np.ndarray
+    patches: np.ndarray
 
 
-def look(
-    vertices: np.ndarray, faces: np.ndarray, view: Camera, cut: float = np.inf, first: np.ndarray | None = None
-) -> Seen:
-    """Return what is seen of a mesh (n, 3) mm, (m, 3), without what is nearer the eye than `cut` (mm from the middle).
+@dataclass(frozen=True)
+class Surface:
+    """A mesh in a picture: vertices (n, 3) mm, faces (m, 3), its colour or one a face; `label` is written beside it.
 
-    Faces that `first` (m,) marks are seen before others of the same depth.
+    It is closed unless it has an `inside`: the colour of faces seen from behind.
     """
-    width, height = view.size
-    seen = Seen(np.full((height, width), -1, np.int32), np.full((height, width), -np.inf))
-    top, left, face, depth = nearest(vertices, faces, view, cut, first)
-    at = np.s_[top : top + face.shape[0], left : left + face.shape[1]]
-    seen.face[at], seen.depth[at] = face, depth
-    return seen
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    colour: Colour | np.ndarray
+    label: str = ""
+    inside: Colour | np.ndarray | None = None
 
 
-def nearest(
-    vertices: np.ndarray, faces: np.ndarray, view: Camera, cut: float = np.inf, first: np.ndarray | None = None
+@dataclass(frozen=True)
+class Label:
+    """A name in its place: its box in pixels of the picture, and the line from `start`, what it names, to `end`."""
+
+    text: str
+    left: int
+    top: int
+    width: int
+    height: int
+    start: tuple[float, float]
+    end: tuple[float, float] | None
+    ring: bool
+
+
+@dataclass(frozen=True)
+class Name:
+    """A name and the point (x, y, z) mm of what it names: under a dot, or in a `ring` if a dot would cover it.
+
+    `on`: the name itself is written there, without a line to it.
+    """
+
+    text: str
+    at: tuple[float, float, float]
+    ring: bool = False
+    on: bool = False
+
+
+def draw(surfaces: Sequence[Surface], towards_eye: Colour, size: tuple[int, int]) -> bytes:
+    """Draw surfaces as a PNG, seen from one side; those with a label are named."""
+    view = aim(towards_eye, np.concatenate([surface.vertices for surface in surfaces]), size)
+    layers = [render(surface, view) for surface in surfaces]
+    return finish(layers, view, labels=[surface.label for surface in surfaces])
+
+
+def render(surface: Surface, view: Camera, cut: float = np.inf) -> Layer:
+    """Draw a surface, without what is nearer the eye than `cut` (mm from the view's middle).
+
+    If it is cut, faces seen from behind are the cut: hatched, in their colour as it is. Others are lit.
+    """
+    corners = surface.vertices[surface.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    towards = normal @ view.eye
+    inside = surface.inside
+    kept = np.flatnonzero(towards > 0) if inside is None else np.arange(len(towards))
+    top, left, face, depth = rasterise(surface.vertices, surface.faces[kept], _fine(view), cut)
+    light = view.eye + 0.45 * view.up - 0.35 * view.right
+    bright = 0.45 + 0.55 * np.abs(normal @ (light / np.linalg.norm(light)))
+    behind = towards < 0
+    hatched = behind & np.isfinite(cut)
+    colour = surface.colour if inside is None else np.where(behind[:, None], inside, surface.colour)
+    tints = np.full((len(towards), 4), 255, np.uint8)
+    tints[:, :3] = np.clip(np.round(colour * np.where(hatched, 1.0, bright)[:, None] * 255), 0, 255)
+    patches = np.where(hatched, -1, _patches(surface.faces, normal)).astype(np.int32)
+    return Layer(top, left, depth.astype(np.float32), face, tints[kept], patches[kept])
+
+
+def _fine(view: Camera) -> Camera:
+    return replace(view, scale=SHARPER * view.scale, size=(SHARPER * view.size[0], SHARPER * view.size[1]))
+
+
+def _patches(faces: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Return the number of the smooth patch, from 1, that each face lies in."""
+    sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1).astype(np.int64)
+    key = sides[:, 0] * (int(faces.max(initial=0)) + 1) + sides[:, 1]
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order][1:] == key[order][:-1])
+    one, two = order[same] // 3, order[same + 1] // 3
+    smooth = np.einsum("ij,ij->i", normal[one], normal[two]) > math.cos(math.radians(CREASE_DEG))
+    return components(len(faces), one[smooth], two[smooth]) + 1
+
+
+def look(vertices: np.ndarray, faces: np.ndarray, view: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Return, of each pixel of a picture (height, width), the face that it shows, -1 for none, and its depth in mm."""
+    top, left, face, depth = rasterise(vertices, faces, view)
+    below, right = view.size[1] - top - face.shape[0], view.size[0] - left - face.shape[1]
+    room = ((top, below), (left, right))
+    return np.pad(face, room, constant_values=-1), np.pad(depth, room, constant_values=-np.inf)
+
+
+def rasterise(
+    vertices: np.ndarray, faces: np.ndarray, view: Camera, cut: float = np.inf
 ) -> tuple[int, int, np.ndarray, np.ndarray]:
-    """Return what is seen of a mesh, as `look`, in the rectangle of pixels that it reaches.
+    """Return what is seen of a mesh, without what is nearer the eye than `cut`, in the rectangle that it reaches.
 
-    That is its first row and column, and of each pixel the face, -1 for none, and the depth in mm.
+    That is the rectangle's first row and column, and of each pixel the face, -1 for none, and the depth in mm. Of two
+    faces in one place, to a part of a pixel, the later one is seen.
     """
-    if not len(faces):
-        return 0, 0, np.empty((0, 0), np.int32), np.empty((0, 0))
-    points = view.project(vertices)
+    points = view.project(vertices[np.unique(faces)] if len(faces) else np.zeros((1, 3)))
     low, high = np.floor(points[:, :2].min(axis=0)), np.ceil(points[:, :2].max(axis=0)) + 1
     (left, top), (right, bottom) = (np.clip(ends, 0, view.size).astype(int) for ends in (low, high))
     shape = int(bottom - top), int(right - left)
-    points -= (left, top, 0.0)
+    steps = 16 * view.scale
     least = np.full(shape[0] * shape[1], -np.inf)
     shown = np.full(len(least), -1, np.int32)
-    plain, begun = first is None and cut == np.inf, False
-    for face, pixel, depth in _fragments(points, faces, shape):
-        if begun or not plain:  # else all are the first in their pixels
-            kept = depth <= cut
-            if first is not None:
-                depth = depth + first[face] * (0.25 / view.scale)
-            kept &= depth > least[pixel]
-            face, pixel, depth = face[kept], pixel[kept], depth[kept]
-        begun = True
+    for face, pixel, depth in _fragments(view.project(vertices) - (left, top, 0.0), faces, shape):
+        depth = np.round(depth * steps)
+        kept = (depth <= cut * steps) & (depth >= least[pixel])
+        face, pixel, depth = face[kept], pixel[kept], depth[kept]
         np.maximum.at(least, pixel, depth)
         seen = depth == least[pixel]
         shown[pixel[seen]] = face[seen]
-    return int(top), int(left), shown.reshape(shape), least.reshape(shape)
+    return int(top), int(left), shown.reshape(shape), (least / steps).reshape(shape)
 
 
 def _fragments(
@@ -131,13 +225,12 @@ def _fragments(
     height, width = shape
     for begin in range(0, len(faces), _FACES):
         corners = points[faces[begin : begin + _FACES]]
-        one, two, three = (corners[:, k] for k in range(3))
-        first, second = two - one, three - one
-        area = first[:, 0] * second[:, 1] - second[:, 0] * first[:, 1]
-        low = np.clip(np.ceil(corners[:, :, 1].min(axis=1) - 0.5), 0, height).astype(int)
-        high = np.clip(np.floor(corners[:, :, 1].max(axis=1) - 0.5), -1, height - 1).astype(int)
-        across = (first[:, 2] * second[:, 1] - second[:, 2] * first[:, 1]) / np.where(area, area, 1.0)
-        down = (second[:, 2] * first[:, 0] - first[:, 2] * second[:, 0]) / np.where(area, area, 1.0)
+        one, heights = corners[:, 0], corners[:, :, 1]
+        normal = np.cross(corners[:, 1] - one, corners[:, 2] - one)
+        area = normal[:, 2]
+        across, down = -normal[:, :2].T / np.where(area, area, 1.0)
+        low = np.clip(np.ceil(heights.min(axis=1) - 0.5), 0, height).astype(int)
+        high = np.clip(np.floor(heights.max(axis=1) - 0.5), -1, height - 1).astype(int)
         which = np.flatnonzero((np.abs(area) > 1e-12) & (high >= low))
         rows = (high - low + 1)[which]
         for some in _blocks(rows):
@@ -146,26 +239,21 @@ def _fragments(
             left = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
             right = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int)
             number = np.maximum(right - left + 1, 0)
-            lean, from_left = across[face], left + 0.5 - one[face, 0]
-            level = one[face, 2] + down[face] * (row + 0.5 - one[face, 1]) + lean * from_left
-            pixel = row * width + left
+            lean = across[face]
+            level = one[face, 2] + down[face] * (row + 0.5 - one[face, 1]) + lean * (left + 0.5 - one[face, 0])
             for block in _blocks(number):
                 times = number[block]
                 step = _counted(np.zeros_like(times), times)
-                depth = step * np.repeat(lean[block], times)
-                depth += np.repeat(level[block], times)
-                step += np.repeat(pixel[block], times)
-                yield np.repeat((face[block] + begin).astype(np.int32), times), step, depth
+                depth = np.repeat(level[block], times) + step * np.repeat(lean[block], times)
+                pixel = np.repeat((row * width + left)[block], times) + step
+                yield np.repeat((face[block] + begin).astype(np.int32), times), pixel, depth
 
 
 def _blocks(count: np.ndarray) -> list[np.ndarray]:
     """Return the numbers of the entries of `count` (n,) in blocks, of which each counts some _FRAGMENTS in all."""
     ends = np.cumsum(count)
-    return (
-        np.split(np.arange(len(count)), np.searchsorted(ends, np.arange(_FRAGMENTS, ends[-1], _FRAGMENTS)))
-        if len(count)
-        else []
-    )
+    marks = np.arange(_FRAGMENTS, ends[-1] if len(ends) else 0, _FRAGMENTS)
+    return np.split(np.arange(len(count)), np.searchsorted(ends, marks))
 
 
 def _counted(start: np.ndarray, count: np.ndarray) -> np.ndarray:
@@ -175,95 +263,154 @@ def _counted(start: np.ndarray, count: np.ndarray) -> np.ndarray:
 
 def _span(corners: np.ndarray, face: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return from where to where (px) the line y = `level` lies in faces of `corners` (n, 3, 3): (m,) each."""
-    left, right = np.full(len(face), np.inf), np.full(len(face), -np.inf)
-    for k in range(3):
-        x0, y0 = corners[face, k, 0], corners[face, k, 1]
-        x1, y1 = corners[face, k - 2, 0], corners[face, k - 2, 1]
-        crosses = (np.minimum(y0, y1) <= level) & (level <= np.maximum(y0, y1)) & (y0 != y1)
-        share = (level - y0) / np.where(y0 != y1, y1 - y0, 1.0)
-        x = np.clip(x0 + share * (x1 - x0), np.minimum(x0, x1), np.maximum(x0, x1))
-        left, right = np.where(crosses, np.minimum(left, x), left), np.where(crosses, np.maximum(right, x), right)
-    return left, right
+    x0, y0 = corners[face, :, 0], corners[face, :, 1]
+    x1, y1 = np.roll(x0, 1, axis=1), np.roll(y0, 1, axis=1)
+    crosses = (np.minimum(y0, y1) <= level[:, None]) & (level[:, None] <= np.maximum(y0, y1)) & (y0 != y1)
+    share = (level[:, None] - y0) / np.where(y0 != y1, y1 - y0, 1.0)
+    x = np.clip(x0 + share * (x1 - x0), np.minimum(x0, x1), np.maximum(x0, x1))
+    return np.where(crosses, x, np.inf).min(axis=1), np.where(crosses, x, -np.inf).max(axis=1)
 
 
-def shade(
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    colours: np.ndarray,
-    plain: np.ndarray,
-    seen: Seen,
-    view: Camera,
-    lines: np.ndarray,
-    cut: bool = False,
-) -> np.ndarray:
-    """Return pixels (height, width, 3), 0 to 1: faces in their `colours` (m, 3), lighter towards the light.
+def compose(layers: Sequence[Layer], view: Camera, wires: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Draw layers over one another, with lines round smooth patches and, with `wires`, along the sides of all faces.
 
-    From behind, `plain` faces (m,) have the colour INSIDE, others their own one, darker. `lines` (m, 3): how wide, in
-    pixels, the side from corner k to the next is drawn on its face. Where the part is `cut`, what lies behind the cut
-    and is seen from behind is solid: it is hatched.
+    Return pixels of the depth buffer (height, width): colour in bytes (.., 4), depth in mm, and the number of the face
+    from 1 on, counted through all layers. Of two layers in one place, to a tenth of a pixel, the later one is seen.
     """
-    height, width = seen.face.shape
-    which, index = np.unique(seen.face, return_inverse=True)
-    none = int(which[0] < 0)  # the first one stands for no face
-    corners = vertices[faces[which[none:]]]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    light = view.eye + 0.45 * view.up - 0.35 * view.right
-    behind = np.asarray(normal @ view.eye < 0)
-    bright = np.abs(normal @ (light / np.linalg.norm(light)))
-    bright = np.where(plain[which[none:]], 0.45 + 0.55 * bright, 0.7 + 0.3 * bright)
-    own, bare = colours[which[none:]], plain[which[none:], None]
-    back = (
-        np.where(bare, np.array(CUT), (own + np.array(CUT)) / 2)
-        if cut
-        else np.where(bare, np.array(INSIDE), own * 0.78)
-    )
-    tint = np.where(behind[:, None], back, own) * np.where(behind & cut, 1.0, bright)[:, None]
-    wide = np.where((behind & cut)[:, None], 0.0, lines[which[none:]])
-    tint = np.concatenate([np.array([BACKGROUND] * none).reshape(-1, 3), tint])
-    side_lines = np.concatenate([np.zeros((none, 3, 3)), _side_lines(view.project(corners).reshape(-1, 3, 3))])
-    wide = np.concatenate([np.zeros((none, 3)), wide])
-    hatched = np.concatenate([np.zeros(none, bool), behind & cut])
-    picture = np.empty((height * width, 3))
-    index = index.reshape(-1)
-    for begin in range(0, height * width, _PIXELS):
-        pixel = np.arange(begin, min(begin + _PIXELS, height * width))
-        at = index[pixel]
-        row, column = np.divmod(pixel, width)
-        colour = tint[at]
-        stripe = hatched[at] & ((row + column) % 16 < 3)
-        colour[stripe] *= 0.72
-        a, b, c = np.moveaxis(side_lines[at], 2, 0)
-        distance = a * (column + 0.5)[:, None] + b * (row + 0.5)[:, None] + c
-        near = np.clip(wide[at] - np.abs(distance), 0, 1).max(axis=1)[:, None]
-        picture[pixel] = colour + near * (np.array(LINE) - colour)
-    return picture.reshape(height, width, 3)
+    width, height = _fine(view).size
+    depth, shown = np.full((height, width), -np.inf, np.float32), np.zeros((height, width), np.int32)
+    tints, patches = [np.full((1, 4), 255, np.uint8)], [np.zeros(1, np.int32)]
+    count = 1
+    for one in layers:
+        rows, columns = one.depth.shape
+        at = np.s_[one.top : one.top + rows, one.left : one.left + columns]
+        nearer = one.depth > depth[at] - 0.05 / view.scale
+        np.copyto(depth[at], one.depth, where=nearer)
+        np.add(one.face, np.int32(count), out=shown[at], where=nearer)
+        tints.append(one.colours)
+        patches.append(np.where(one.patches > 0, one.patches + np.int32(count), -1))
+        count += len(one.patches)
+    numbers = np.concatenate(patches)
+    patch = numbers[shown]
+    shade = np.zeros(patch.shape, np.int32)
+    if wires:
+        thin = (shown[:, 1:] != shown[:, :-1])[1:] | (shown[1:] != shown[:-1])[:, 1:]
+        shade[1:, 1:][thin & (patch[1:, 1:] > 0)] = 1
+    if numbers.min() < 0:
+        shade[(patch < 0) & (np.add.outer(np.arange(height), np.arange(width)) % 16 < 3)] = 2
+    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+        differs = patch[one] != patch[other]
+        for side in (one, other):
+            np.copyto(shade[side], 3, where=differs)
+    tint = np.concatenate(tints)
+    table = np.concatenate([tint * np.array([part, part, part, 1.0]) for part in (1.0, WIRE, HATCH, INK)])
+    shade *= count
+    shade += shown
+    return table.astype(np.uint8).view(np.uint32)[shade, 0].view(np.uint8).reshape(height, width, 4), depth, shown
 
 
-def _side_lines(corners: np.ndarray) -> np.ndarray:
-    """Return, for each side of triangles (n, 3, 3) in px, (a, b, c) by which a x + b y + c is the distance to it."""
-    along = (np.roll(corners, -1, axis=1) - corners)[:, :, :2]
-    length = np.maximum(np.linalg.norm(along, axis=2), 1e-9)
-    a, b = -along[:, :, 1] / length, along[:, :, 0] / length
-    return np.stack([a, b, -a * corners[:, :, 0] - b * corners[:, :, 1]], axis=2)
+def finish(layers: Sequence[Layer], view: Camera, names: Sequence[Name] = (), labels: Sequence[str] = ()) -> bytes:
+    """Return the picture of layers drawn for one view as a PNG, without the empty rows above and below.
+
+    Names, and the `labels` of layers, stand clear of what is drawn and of each other if there is room, each with a line
+    to what it names.
+    """
+    colour, _, shown = compose(layers, view)
+    shown = shown[::SHARPER, ::SHARPER]
+    picture = Image.fromarray(colour).convert("RGB")
+    names = [*name_layers(layers, labels, shown, view), *names]
+    pen, font = ImageDraw.Draw(picture), _font()
+    for label in place_names(names, shown > 0, view):
+        corner = SHARPER * label.left, SHARPER * label.top
+        if label.end:
+            (x, y), radius = label.start, 7.0 if label.ring else 3.0
+            away = max(math.dist(label.start, label.end), radius)
+            share = radius / away if label.ring else 0.0
+            ends = x + share * (label.end[0] - x), y + share * (label.end[1] - y), *label.end
+            line = [SHARPER * value for value in ends]
+            pen.line(line, "white", 3 * SHARPER)
+            pen.line(line, "black", SHARPER)
+            ball = [SHARPER * value for value in (x - radius, y - radius, x + radius, y + radius)]
+            pen.ellipse(ball, None if label.ring else "black", "black", SHARPER)
+        pen.text(corner, label.text, "black", font, stroke_width=2 * SHARPER, stroke_fill="white")
+    picture = picture.reduce(SHARPER)
+    _, top, _, bottom = ImageChops.invert(picture).getbbox() or (0, 0, *view.size)
+    return encode_png(picture.crop((0, max(top - MARGIN_PX, 0), view.size[0], min(bottom + MARGIN_PX, view.size[1]))))
 
 
-def shrunk(picture: np.ndarray, times: int) -> np.ndarray:
-    """Return a picture of which every pixel is the mean of `times` by `times`."""
-    height, width, _ = picture.shape
-    return picture.reshape(height // times, times, width // times, times, 3).mean(axis=(1, 3))
+def name_layers(layers: Sequence[Layer], labels: Sequence[str], shown: np.ndarray, view: Camera) -> list[Name]:
+    """Name what is seen of each layer that has a label, well inside it near its left end; from left to right.
+
+    `shown` (height, width): the number of the face of each pixel, as `compose` counts them.
+    """
+    names, count = [], 1
+    for text, one in zip(labels, layers, strict=False):
+        seen = (shown >= count) & (shown < count + len(one.patches))
+        count += len(one.patches)
+        if text and seen.any():
+            rows, columns = np.nonzero(seen)
+            left, top = find_free_box(~seen, (columns.min(), (rows.min() + rows.max()) / 2), (6, 6))
+            at = int(np.argmin(np.hypot(columns - left - 3, rows - top - 3)))
+            right, down = (np.array([columns[at], rows[at]]) + 0.5 - np.array(view.size) / 2) / view.scale
+            names.append(Name(text, tuple((view.middle + right * view.right - down * view.up).tolist())))
+    return sorted(names, key=lambda name: float(view.right @ name.at))
 
 
-def png(picture: np.ndarray, effort: int = 9) -> bytes:
-    """Return a picture (height, width, 3), 0 to 1 or bytes, as a PNG file (ISO/IEC 15948): same pixels, same bytes."""
-    height, width, _ = picture.shape
-    if picture.dtype != np.uint8:
-        picture = np.clip(np.round(picture * 255), 0, 255).astype(np.uint8)
-    rows = np.zeros((height, 1 + width * 3), np.uint8)  # each begins with 0: as it is, no filter
-    rows[:, 1:] = picture.reshape(height, width * 3)
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), effort)), (b"IEND", b""))
-    body = b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
-    )
-    return b"\x89PNG\r\n\x1a\n" + body
+def place_names(names: Sequence[Name], drawn: np.ndarray, view: Camera) -> list[Label]:
+    """Give names a place in a picture, beside what is `drawn` (height, width) and beside each other."""
+    covered = Image.fromarray(drawn.astype(np.uint8))
+    cover, font, labels = ImageDraw.Draw(covered), _font(), []
+    for name in names:
+        text = name.text if len(name.text) <= MOST_CHARACTERS else f"{name.text[: MOST_CHARACTERS - 3]}..."
+        # Pillow's font has the letters of ASCII: others lose their accents.
+        plain = (letter for letter in unicodedata.normalize("NFKD", text) if not unicodedata.combining(letter))
+        text = printable("".join(plain).encode("ascii", "replace").decode())
+        x, y = view.project(np.array(name.at))[0, :2].tolist()
+        wide, high = math.ceil(font.getlength(text) / SHARPER), math.ceil(sum(font.getmetrics()) / SHARPER)
+        end = None
+        if name.on:
+            left, top = round(x - wide / 2), round(y - high / 2)
+            left, top = min(max(left, 0), view.size[0] - wide), min(max(top, 0), view.size[1] - high)
+        else:
+            left, top = find_free_box(np.asarray(covered) > 0, (x, y), (wide, high))
+            end = min(max(x, left), left + wide), min(max(y, top), top + high)
+            cover.line((x, y, *end), 1, 8)
+        cover.rectangle((left - APART_PX, top - APART_PX, left + wide + APART_PX, top + high + APART_PX), 1)
+        labels.append(Label(text, left, top, wide, high, (x, y), end, name.ring))
+    return labels
+
+
+@lru_cache(maxsize=1)
+def _font() -> ImageFont.FreeTypeFont:
+    """Return Pillow's own font, set letter by letter, which is the same on every machine."""
+    font = ImageFont.load_default(SHARPER * LETTER_PX)
+    assert isinstance(font, ImageFont.FreeTypeFont), "Pillow lacks FreeType"
+    return font.font_variant(layout_engine=ImageFont.Layout.BASIC)
+
+
+def find_free_box(taken: np.ndarray, at: tuple[float, float], size: tuple[int, int]) -> tuple[int, int]:
+    """Return the left column and top row of the box of `size` (width, height) nearest to a point (x, y).
+
+    `taken` (height, width): the pixels that the box, with a gap round it, keeps clear of; if no place is clear, it
+    covers as few of them as it can.
+    """
+    height, width = taken.shape
+    left = np.arange(EDGE_PX, max(width - EDGE_PX - size[0], EDGE_PX) + 1, 2)
+    top = np.arange(EDGE_PX, max(height - EDGE_PX - size[1], EDGE_PX) + 1, 2)
+    total = np.zeros((height + 1, width + 1), np.int32)
+    total[1:, 1:] = taken.cumsum(axis=0, dtype=np.int32).cumsum(axis=1)
+    right, bottom = np.minimum(left + size[0] + GAP_PX, width), np.minimum(top + size[1] + GAP_PX, height)
+    upper, lower = total[top - GAP_PX], total[bottom]
+    covered = lower[:, right] - lower[:, left - GAP_PX] - upper[:, right] + upper[:, left - GAP_PX]
+    across = np.maximum(np.maximum(left - at[0], at[0] - left - size[0]), 0.0)
+    down = np.maximum(np.maximum(top - at[1], at[1] - top - size[1]), 0.0)
+    cost = np.hypot(across[None, :], down[:, None]) + 1e6 * covered
+    row, column = np.unravel_index(int(cost.argmin()), cost.shape)
+    return int(left[column]), int(top[row])
+
+
+def encode_png(picture: Image.Image) -> bytes:
+    """Return a picture as a PNG file (ISO/IEC 15948): same pixels, same bytes."""
+    content = io.BytesIO()
+    picture.save(content, "PNG", compress_level=4)
+    return content.getvalue()

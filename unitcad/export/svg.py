@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -12,14 +12,18 @@ import numpy as np
 from manifold3d import CrossSection
 
 from unitcad.designs import Dimensions
-from unitcad.export import drawing
-from unitcad.export.drawing import Point
+from unitcad.export.chart import number
 from unitcad.export.threemf import colour_hex
 from unitcad.kernels.mesh import realise
 from unitcad.shape.body import Body
 from unitcad.shape.profile import GRID_PER_MM
-from unitcad.text import xml_text
+from unitcad.text import xml_attribute, xml_text
 
+Point = tuple[float, float]
+TEXT_PX = 12.0
+CHARACTER_PX = 0.62 * TEXT_PX
+"""The room for a character: no common sans-serif is wider on average."""
+ARROW_PX = 7.0
 HAIR_MM = 1 / 3000
 """The cut lies this far off its plane, and so in no plane of the length grid: a face in the plane itself, shared by two
 bodies, could be drawn for both or for neither."""
@@ -32,7 +36,7 @@ LABEL_GAP_PX, EDGE_PX = 14.0, 6.0
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0]])
 """Turns (x, y, z) to (x, z, -y): the plane of the section becomes the one that manifold3d slices in."""
 _STYLE = (
-    f"text{{font:{drawing.number(drawing.TEXT_PX)}px Helvetica,Arial,sans-serif;fill:#111}}"
+    f"text{{font:{number(TEXT_PX)}px Helvetica,Arial,sans-serif;fill:#111}}"
     "path{stroke:#111;stroke-width:.8;stroke-linejoin:round}"
     ".dimension{stroke:#111;stroke-width:.7}.extension{stroke:#777;stroke-width:.5}.arrow{fill:#111}"
     ".leader{stroke:#333;stroke-width:.6}.dot{fill:#111}.axis{stroke:#555;stroke-width:.6;stroke-dasharray:12 3 2 3}"
@@ -96,31 +100,26 @@ def section(
     measures: Sequence[Measure] = (),
     notes: Sequence[Note] = (),
     title: str = "",
-    labels: Mapping[str, str] | None = None,
     ground: str = "skin",
 ) -> str:
-    """Draw `regions`: every one named (by `labels`, else its own name), with its measures.
+    """Draw `regions`, every one named, with its measures.
 
     `ground` is what the line z = 0 is called, "" for no name. The same arguments give the same text.
     """
-    texts = [(labels or {}).get(region.name, region.name) for region in regions]
-    named = [*notes, *map(Note, texts, _anchors(regions, [drawing.text_width(text) for text in texts]))]
+    anchors = _anchors(regions, [text_width(region.name) for region in regions])
+    named = [*notes, *(Note(region.name, at) for region, at in zip(regions, anchors, strict=True))]
     page = _Page(regions, measures, named)
-    marks = [
-        drawing.outline([[page.at(point) for point in loop] for loop in region.loops], colour_hex(region.colour), text)
-        for region, text in zip(regions, texts, strict=True)
-    ]
+    marks = [page.region(region) for region in regions]
     marks += page.frame(ground)
     for side in ("below", "left", "right"):
         marks += page.measures([m for m in measures if m.side == side])
     marks += page.labels(named)
     if title:
-        marks.append(drawing.text(title, (page.width / 2, drawing.TEXT_PX)))
-    size = f"{drawing.number(page.width)} {drawing.number(page.height)}"
-    width, height = size.split()
+        marks.append(_text(title, (page.width / 2, TEXT_PX)))
+    width, height = number(page.width), number(page.height)
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" width="{width}" height="{height}" viewBox="0 0 {size}">'
-        f"<title>{xml_text(title or 'section')}</title><style>{_STYLE}</style>"
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" width="{width}" height="{height}" '
+        f'viewBox="0 0 {width} {height}"><title>{xml_text(title or "section")}</title><style>{_STYLE}</style>'
         f'<rect width="{width}" height="{height}" fill="#fff"/>'
     )
     return "\n".join([head, *marks, "</svg>", ""])
@@ -130,8 +129,6 @@ def unit_section(
     bodies: Sequence[Body],
     dims: Dimensions,
     segments: int,
-    title: str = "",
-    labels: Mapping[str, str] | None = None,
     concentric: bool = True,
 ) -> str:
     """Draw the unit cut along its tail, in the plane y = 0: main dimensions, layers and air named.
@@ -143,17 +140,17 @@ def unit_section(
         reach = max(
             (abs(x) for m in measures if m.side == "below" for x in (m.start, m.end)), default=dims.outer_radius
         )
-        return section(cut(bodies, segments, reach=reach + TAIL_MM), measures, (), title, labels)
+        return section(cut(bodies, segments, reach=reach + TAIL_MM), measures)
     regions = cut(bodies, segments, reach=dims.outer_radius + TAIL_MM)
     notes = []
     if dims.air_ring > 0:
         notes.append(Note("air", ((dims.motor_radius + dims.cavity_radius) / 2, dims.motor_height / 3)))
-    return section(regions, _unit_measures(dims), notes, title, labels)
+    return section(regions, _unit_measures(dims), notes)
 
 
 def _measured(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[Measure]:
     """Return width and height of the cast layers together, and the motor's diameter where the plane holds its axis."""
-    show, names = drawing.millimetres, {body.name for body in bodies if body.made == "cast"}
+    names = {body.name for body in bodies if body.made == "cast"}
     # A polygon's corners on the circle: a round body is then as wide as it is drawn.
     regions = cut(bodies, segments, swell=1.0)
     cast = [point for region in regions if region.name in names for loop in region.loops for point in loop]
@@ -161,41 +158,40 @@ def _measured(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[M
         return []
     (left, low), (right, high) = np.min(cast, axis=0).tolist(), np.max(cast, axis=0).tolist()
     measures = [
-        Measure(show(right - left), left, right, "below", 1, low),
-        Measure(show(high - low), low, high, "left", 0, left),
+        Measure(_mm(right - left), left, right, "below", 1, low),
+        Measure(_mm(high - low), low, high, "left", 0, left),
     ]
     for region in regions:
         across = [x for loop in region.loops for x, _ in loop]
         if region.name == "motor" and abs(max(across) - min(across) - 2 * dims.motor_radius) < 2 / GRID_PER_MM:
-            text = f"Ø{show(2 * dims.motor_radius)}"
+            text = f"Ø{_mm(2 * dims.motor_radius)}"
             measures.append(Measure(text, min(across), max(across), "below", 0, low))
     return measures
 
 
 def _unit_measures(dims: Dimensions) -> list[Measure]:
-    show = drawing.millimetres
     inner, walls = [dims.cavity_radius, *dims.radii[:-1]], []
     for low, high in zip(inner, dims.radii, strict=True):
-        walls.append(Measure(show(high - low), -high, -low, "below", 0, 0))
+        walls.append(Measure(_mm(high - low), -high, -low, "below", 0, 0))
     if dims.air_ring > 0:
-        walls.append(Measure(show(dims.air_ring), -dims.cavity_radius, -dims.motor_radius, "below", 0, 0))
+        walls.append(Measure(_mm(dims.air_ring), -dims.cavity_radius, -dims.motor_radius, "below", 0, 0))
     measures = [
         *walls,
-        Measure(f"Ø{show(2 * dims.motor_radius)}", -dims.motor_radius, dims.motor_radius, "below", 0, 0),
-        Measure(f"R{show(dims.cavity_radius)}", 0, dims.cavity_radius, "below", 1, 0),
-        Measure(f"Ø{show(2 * dims.outer_radius)}", -dims.outer_radius, dims.outer_radius, "below", 2, 0),
+        Measure(f"Ø{_mm(2 * dims.motor_radius)}", -dims.motor_radius, dims.motor_radius, "below", 0, 0),
+        Measure(f"R{_mm(dims.cavity_radius)}", 0, dims.cavity_radius, "below", 1, 0),
+        Measure(f"Ø{_mm(2 * dims.outer_radius)}", -dims.outer_radius, dims.outer_radius, "below", 2, 0),
     ]
     levels = sorted({0.0, dims.motor_height, dims.core_height, *dims.heights})
     reach = -dims.outer_radius
     inside = [level for level in levels if level != dims.motor_height or level == dims.core_height]
     for low, high in pairwise(inside):
-        measures.append(Measure(show(high - low), low, high, "left", 0, reach))
+        measures.append(Measure(_mm(high - low), low, high, "left", 0, reach))
     if len(inside) > 2:
-        measures.append(Measure(show(levels[-1]), 0, levels[-1], "left", 1, reach))
+        measures.append(Measure(_mm(levels[-1]), 0, levels[-1], "left", 1, reach))
     if dims.exit:
         low, high = dims.exit.low, dims.exit.high
         measures.append(
-            Measure(f"slot {show(high - low)} × {show(dims.exit.width)}", low, high, "right", 0, dims.outer_radius)
+            Measure(f"slot {_mm(high - low)} × {_mm(dims.exit.width)}", low, high, "right", 0, dims.outer_radius)
         )
     return [measure for measure in measures if measure.end > measure.start]
 
@@ -208,10 +204,10 @@ class _Page:
         self.low, self.high = points.min(axis=0), points.max(axis=0)
         self.scale = WIDTH_PX / max(self.high[0] - self.low[0], 1e-9)
         rows = {s: 1 + max((m.row for m in measures if m.side == s), default=-1) for s in ("below", "left", "right")}
-        right = max((drawing.text_width(m.text) for m in measures if m.side == "right"), default=0.0)
+        right = max((text_width(m.text) for m in measures if m.side == "right"), default=0.0)
         self.left = 24 + COLUMN_PX * rows["left"]
         self.top = 84.0
-        row = sum(drawing.text_width(note.text) + LABEL_GAP_PX for note in notes) - LABEL_GAP_PX + 2 * EDGE_PX
+        row = sum(text_width(note.text) + LABEL_GAP_PX for note in notes) - LABEL_GAP_PX + 2 * EDGE_PX
         self.width = max(self.left + WIDTH_PX + 24 + (ROW_PX + right if rows["right"] else 0.0), row)
         self.height = self.top + (self.high[1] - self.low[1]) * self.scale + 30 + ROW_PX * rows["below"]
 
@@ -220,14 +216,21 @@ class _Page:
         x, z = point
         return self.left + (x - self.low[0]) * self.scale, self.top + (self.high[1] - z) * self.scale
 
+    def region(self, region: Region) -> str:
+        """Draw a filled region with holes, titled."""
+        loops = [[self.at(point) for point in loop] for loop in region.loops]
+        path = "".join("M" + "L".join(f"{number(x)} {number(y)}" for x, y in loop) + "Z" for loop in loops)
+        fill = xml_attribute(colour_hex(region.colour))
+        return f'<path d="{path}" fill={fill} fill-rule="evenodd"><title>{xml_text(region.name)}</title></path>'
+
     def frame(self, ground: str) -> list[str]:
         """Draw the line z = 0 and the axis."""
         skin = self.at((self.low[0], 0.0)), self.at((self.high[0], 0.0))
         top, bottom = self.at((0.0, self.high[1])), self.at((0.0, self.low[1]))
         return [
-            drawing.line(skin[0], skin[1], "skin"),
-            *([drawing.text(ground, (skin[1][0], skin[1][1] + drawing.TEXT_PX * 0.8), "end")] if ground else []),
-            drawing.line((top[0], top[1] - 12), (bottom[0], bottom[1] + 12), "axis"),
+            _line(*skin, "skin"),
+            *([_text(ground, (skin[1][0], skin[1][1] + TEXT_PX * 0.8), "end")] if ground else []),
+            _line((top[0], top[1] - 12), (bottom[0], bottom[1] + 12), "axis"),
         ]
 
     def measures(self, measures: Sequence[Measure]) -> list[str]:
@@ -235,57 +238,121 @@ class _Page:
         marks = []
         for row in sorted({measure.row for measure in measures}):
             in_row = [measure for measure in measures if measure.row == row]
-            ends = [self._ends(measure) for measure in in_row]
-            for measure, (start, end) in zip(in_row, ends, strict=True):
-                feet = [self.at(self._point(measure, value)) for value in (measure.start, measure.end)]
-                marks += [drawing.line(foot, tip, "extension") for foot, tip in zip(feet, (start, end), strict=True)]
-                marks += drawing.dimension(start, end)
-            marks += self._texts(in_row, ends)
+            middles = []
+            for measure in in_row:
+                ends = measure.start, measure.end
+                if measure.side == "below":
+                    y = self.at((0.0, self.low[1]))[1] + ROW_PX * (row + 1)
+                    feet = [self.at((end, measure.reach)) for end in ends]
+                    tips = [(x, y) for x, _ in feet]
+                else:
+                    x = self.left + (-14 - COLUMN_PX * row if measure.side == "left" else WIDTH_PX + 14 + ROW_PX * row)
+                    feet = [self.at((measure.reach, end)) for end in ends]
+                    tips = [(x, y) for _, y in feet]
+                marks += [_line(foot, tip, "extension") for foot, tip in zip(feet, tips, strict=True)]
+                marks += _dimension(*tips)
+                middles.append(((tips[0][0] + tips[1][0]) / 2, (tips[0][1] + tips[1][1]) / 2))
+            # Texts stand under a horizontal dimension line, beside a vertical one.
+            if in_row[0].side == "below":
+                places = spread([x for x, _ in middles], [text_width(m.text) for m in in_row])
+                spots, anchor = [(x, middles[0][1] + TEXT_PX * 0.8) for x in places], "middle"
+            else:
+                beside, anchor = (-6.0, "end") if in_row[0].side == "left" else (6.0, "start")
+                places = spread([y for _, y in middles], [TEXT_PX] * len(middles), 2.0)
+                spots = [(middles[0][0] + beside, y) for y in places]
+            marks += [_text(m.text, spot, anchor) for m, spot in zip(in_row, spots, strict=True)]
         return marks
 
     def labels(self, notes: Sequence[Note]) -> list[str]:
         """Draw names in a row above the drawing, each with a leader to its point."""
         anchors = [self.at(note.at) for note in notes]
-        widths = [drawing.text_width(note.text) for note in notes]
-        spread = drawing.spread([x for x, _ in anchors], widths, LABEL_GAP_PX)
-        middles = drawing.within(spread, widths, (EDGE_PX, self.width - EDGE_PX), LABEL_GAP_PX)
+        widths = [text_width(note.text) for note in notes]
+        wanted = spread([x for x, _ in anchors], widths, LABEL_GAP_PX)
+        middles = within(wanted, widths, (EDGE_PX, self.width - EDGE_PX), LABEL_GAP_PX)
         row = self.top - 38
         marks = []
-        for note, anchor, middle in zip(notes, anchors, middles, strict=True):
-            marks.append(drawing.line((middle, row + drawing.TEXT_PX * 0.7), anchor, "leader"))
-            marks += [drawing.dot(anchor), drawing.text(note.text, (middle, row))]
+        for note, (x, y), middle in zip(notes, anchors, middles, strict=True):
+            marks.append(_line((middle, row + TEXT_PX * 0.7), (x, y), "leader"))
+            marks.append(f'<circle class="dot" cx="{number(x)}" cy="{number(y)}" r="2.2"/>')
+            marks.append(_text(note.text, (middle, row)))
         return marks
 
-    def _ends(self, measure: Measure) -> tuple[Point, Point]:
-        """Return where a dimension line runs (px)."""
-        start, end = (self.at(self._point(measure, value)) for value in (measure.start, measure.end))
-        if measure.side == "below":
-            y = self.at((0.0, self.low[1]))[1] + ROW_PX * (measure.row + 1)
-            return (start[0], y), (end[0], y)
-        if measure.side == "left":
-            x = self.left - 14 - COLUMN_PX * measure.row
-        else:
-            x = self.left + WIDTH_PX + 14 + ROW_PX * measure.row
-        return (x, start[1]), (x, end[1])
 
-    @staticmethod
-    def _point(measure: Measure, value: float) -> Point:
-        return (value, measure.reach) if measure.side == "below" else (measure.reach, value)
+def _mm(value: float) -> str:
+    """Format a length as a drawing shows it: three decimals at most."""
+    return number(value, 3)
 
-    @staticmethod
-    def _texts(measures: Sequence[Measure], ends: Sequence[tuple[Point, Point]]) -> list[str]:
-        """Draw the texts of one row: under a horizontal dimension line, beside a vertical one."""
-        if measures[0].side == "below":
-            middles = [(start[0] + end[0]) / 2 for start, end in ends]
-            places = drawing.spread(middles, [drawing.text_width(m.text) for m in measures])
-            level = ends[0][0][1] + drawing.TEXT_PX * 0.8
-            return [drawing.text(m.text, (x, level)) for m, x in zip(measures, places, strict=True)]
-        middles = [(start[1] + end[1]) / 2 for start, end in ends]
-        places = drawing.spread(middles, [drawing.TEXT_PX] * len(measures), 2.0)
-        beside, anchor = (-6.0, "end") if measures[0].side == "left" else (6.0, "start")
-        return [
-            drawing.text(m.text, (ends[0][0][0] + beside, y), anchor) for m, y in zip(measures, places, strict=True)
-        ]
+
+def text_width(text: str) -> float:
+    """Return the room (px) that `text` takes."""
+    return len(text) * CHARACTER_PX
+
+
+def spread(wanted: Sequence[float], sizes: Sequence[float], gap: float = 4.0) -> list[float]:
+    """Return middles of items of `sizes` in a row, `gap` apart or more, in the order of `wanted` and close to it.
+
+    Items that would overlap are joined into a run about the mean of their wanted middles (pool adjacent violators).
+    """
+    order = sorted(range(len(wanted)), key=lambda i: (wanted[i], i))
+    before = [0.0]
+    for left, right in pairwise(order):
+        before.append(before[-1] + (sizes[left] + sizes[right]) / 2 + gap)
+    runs: list[list[float]] = []
+    for i, offset in zip(order, before, strict=True):
+        runs.append([wanted[i] - offset, 1])
+        while len(runs) > 1 and runs[-2][0] > runs[-1][0]:
+            mean, count = runs.pop()
+            runs[-1] = [(runs[-1][0] * runs[-1][1] + mean * count) / (runs[-1][1] + count), runs[-1][1] + count]
+    starts = [mean for mean, count in runs for _ in range(int(count))]
+    middles = [0.0] * len(wanted)
+    for i, start, offset in zip(order, starts, before, strict=True):
+        middles[i] = start + offset
+    return middles
+
+
+def within(
+    middles: Sequence[float], sizes: Sequence[float], ends: tuple[float, float], gap: float = 4.0
+) -> list[float]:
+    """Return middles moved between `ends`, each no farther than it must be; where they don't fit, past the far end."""
+    found = list(middles)
+    order = sorted(range(len(found)), key=lambda i: found[i])
+    start, end = ends
+    for i in reversed(order):
+        found[i] = min(found[i], end - sizes[i] / 2)
+        end = found[i] - sizes[i] / 2 - gap
+    for i in order:
+        found[i] = max(found[i], start + sizes[i] / 2)
+        start = found[i] + sizes[i] / 2 + gap
+    return found
+
+
+def _line(start: Point, end: Point, kind: str) -> str:
+    (x1, y1), (x2, y2) = start, end
+    return f'<line class="{kind}" x1="{number(x1)}" y1="{number(y1)}" x2="{number(x2)}" y2="{number(y2)}"/>'
+
+
+def _text(content: str, at: Point, anchor: str = "middle") -> str:
+    """Draw a line of text, its middle at the height of `at`."""
+    x, y = at
+    return f'<text x="{number(x)}" y="{number(y + 0.35 * TEXT_PX)}" text-anchor="{anchor}">{xml_text(content)}</text>'
+
+
+def _dimension(start: Point, end: Point) -> list[str]:
+    """Draw a horizontal or vertical dimension line; arrows that don't fit inside stand outside."""
+    along = (end[0] - start[0], end[1] - start[1])
+    length = (along[0] ** 2 + along[1] ** 2) ** 0.5
+    unit = (along[0] / length, along[1] / length)
+    inside = 1.0 if length > 3 * ARROW_PX else -1.0
+    marks = [_line(start, end, "dimension")]
+    for tip, sign in ((start, 1.0), (end, -1.0)):
+        way = sign * inside * ARROW_PX
+        back = (tip[0] + unit[0] * way, tip[1] + unit[1] * way)
+        if inside < 0:
+            marks.append(_line(tip, (tip[0] + unit[0] * way * 2, tip[1] + unit[1] * way * 2), "dimension"))
+        across = (-unit[1] * ARROW_PX * 0.25, unit[0] * ARROW_PX * 0.25)
+        corners = (tip, (back[0] + across[0], back[1] + across[1]), (back[0] - across[0], back[1] - across[1]))
+        marks.append(f'<polygon class="arrow" points="{" ".join(f"{number(x)},{number(y)}" for x, y in corners)}"/>')
+    return marks
 
 
 def _anchors(regions: Sequence[Region], widths: Sequence[float]) -> list[Point]:

@@ -25,7 +25,6 @@ from unitcad.checks import Strain, check_geometry, check_unit, strain_findings, 
 from unitcad.checks.finding import FindingRecord
 from unitcad.errors import Unfinished
 from unitcad.estimating import estimate_input, estimate_spec
-from unitcad.export.picture import NoPicture
 from unitcad.json_text import json_bytes
 from unitcad.kernels.mesh import bounds
 from unitcad.meshcheck import Options, check_bytes
@@ -35,7 +34,6 @@ from unitcad.pipeline.manifest import (
     CASTING,
     BodyFile,
     Geometry,
-    LeftOut,
     Manifest,
     MeshFinding,
     PartRecord,
@@ -159,7 +157,7 @@ class Subject:
             progress("estimate")
             estimate, own["estimate.json"] = _estimate(spec, store)
         shape = geometry(moulds, outputs, check, store, progress)
-        pictures, no_pictures = _shaded_pictures(moulds, outputs, store, progress)
+        pictures = _shaded_pictures(moulds, outputs, store, progress)
         if "casting" in outputs:
             progress("casting")
             volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
@@ -168,7 +166,6 @@ class Subject:
         progress("manifest")
         findings = mould_findings(spec, shape)
         manifest = manifests.of_unit(moulds, outputs, check, shape, findings, estimate, list(pictures))
-        manifest["left_out"][:0] = no_pictures
         return finished(manifest, own, {**shape["files"], **pictures}, store)
 
 
@@ -229,21 +226,13 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, prog
     }
 
 
-def _shaded_pictures(
-    moulds: MouldSet, only: Sequence[str], store: Store, progress: Progress
-) -> tuple[dict[str, str], list[LeftOut]]:
-    """Return the pictures that VTK draws, path to SHA-256, or the reason why this machine can't draw.
-
-    That is not stored, since another try may succeed.
-    """
+def _shaded_pictures(moulds: MouldSet, only: Sequence[str], store: Store, progress: Progress) -> dict[str, str]:
+    """Return the pictures that the format png asks for, path to SHA-256."""
     if "png" not in moulds.spec.output.formats:
-        return {}, []
+        return {}
     progress("pictures")
     scenes = [planned for planned in plan(moulds.blank, only, ("png",)) if planned.form == "png"]
-    try:
-        return {planned.path: store.file(planned.key(), planned.make) for planned in scenes}, []
-    except NoPicture as error:
-        return {}, [LeftOut(what="pictures", why=str(error))]
+    return {planned.path: store.file(planned.key(), planned.make) for planned in scenes}
 
 
 def _mould_checks(

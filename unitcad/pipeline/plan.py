@@ -25,7 +25,6 @@ from unitcad.casting.written import step_section
 from unitcad.designs import design_of, no_estimate
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.export import glb, stl, svg, threemf
-from unitcad.export.picture import draw
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import mould_set
@@ -40,9 +39,8 @@ from unitcad.spec.asked import OUTPUTS, Output
 GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
 KERNELS = {
-    "": ("manifold3d", "numpy"),
+    "": ("manifold3d", "numpy", "pillow"),
     "step": ("build123d", "cadquery", "cadquery-ocp", "cadquery-ocp-novtk"),
-    "png": ("vtk",),
 }
 
 
@@ -107,11 +105,8 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
             path = picture_path(name)
             yield Planned(path, partial(bench.picture, name), partial(geometry_key, moulds, path), "step pictures")
     if "png" in moulds.spec.output.formats:
-        scenes = pictures(moulds, only)
-        drawn = cache(lambda: dict(zip(scenes, draw([scene() for scene in scenes.values()]), strict=True)))
-        for path in scenes:
-            key = partial(geometry_key, moulds, path, *sorted(kernel_versions(("png",)).items()))
-            yield Planned(path, lambda path=path: drawn()[path], key, "pictures", "png")
+        for path, draw in pictures(moulds, only).items():
+            yield Planned(path, draw, partial(geometry_key, moulds, path), "pictures", "png")
 
 
 def _drawn(moulds: MouldSet, path: str, draw: Callable[[], str], reads: str) -> Planned:

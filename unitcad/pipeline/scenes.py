@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
 from manifold3d import Manifold
 
-from unitcad.export.picture import Drawn, Scene
+from unitcad.export.raster import Colour, Surface, draw
 from unitcad.kernels.mesh import arrays, bounds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
@@ -119,12 +118,12 @@ def _extent(moulds: MouldSet, names: Iterable[str]) -> tuple[float, float]:
     return min(b[2] for b in boxes), max(b[5] for b in boxes)
 
 
-def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict[str, Callable[[], Scene]]:
-    """Return what draws each picture of a variant, by the path of its file.
+def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict[str, Callable[[], bytes]]:
+    """Return what draws each picture of a variant as PNG, by the path of its file.
 
     The unit cut open, the set taken apart, each pour in section.
     """
-    drawn: dict[str, Callable[[], Scene]] = {}
+    drawn: dict[str, Callable[[], bytes]] = {}
     if "unit" in only:
         drawn["unit.png"] = partial(unit_cut_open, moulds)
     if "moulds" in only:
@@ -134,27 +133,27 @@ def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict
     return drawn
 
 
-def unit_cut_open(moulds: MouldSet) -> Scene:
+def unit_cut_open(moulds: MouldSet) -> bytes:
     """Show the unit without its nearer half, seen from a little below: the skin's side is the open one."""
-    parts = [_drawn(_far_half(moulds.mesh(body)), body.colour, _name(body)) for body in moulds.unit]
-    return Scene(tuple(p for p in parts if p), (0.45, -1.0, -0.38), (1200, 640))
+    halves = [_solid(_far_half(moulds.mesh(body)), body.colour, _name(body)) for body in moulds.unit]
+    return draw(halves, (0.45, -1.0, -0.38), (1200, 640))
 
 
 def _name(body: Body) -> str:
     return "circuit" if body.kind == "circuit" else spaced(body.name)
 
 
-def step_in_section(moulds: MouldSet, index: int) -> Scene:
+def step_in_section(moulds: MouldSet, index: int) -> bytes:
     """Show pour `index` as it stands when struck off, cut through the first row of cells."""
     step = moulds.plan.steps[index - 1]
     colours = _colours(moulds)
     y = min(cell.y for cell in moulds.plan.layout.cells)
     names = (*step.tools, *(f"layer{i}" for i in range(1, index + 1)), *(body.name for body in step.inserts))
-    parts = [_drawn(_far_half(solid, y), colours[name]) for name in names for solid in _solids(moulds, name)]
-    return Scene(tuple(p for p in parts if p), (0.18, -1.0, 0.48), (1200, 640))
+    halves = [_solid(_far_half(solid, y), colours[name]) for name in names for solid in _solids(moulds, name)]
+    return draw(halves, (0.18, -1.0, 0.48), (1200, 640))
 
 
-def exploded(moulds: MouldSet) -> Scene:
+def exploded(moulds: MouldSet) -> bytes:
     """Show the whole set taken apart, with names."""
     colours, offsets = _colours(moulds), taken_apart(moulds)
     groups = [[tool.name for tool in moulds.plan.of_kind(kind)] for kind in ("tongue", "stub")]
@@ -165,11 +164,11 @@ def exploded(moulds: MouldSet) -> Scene:
         for i, solid in enumerate(_solids(moulds, name)):
             shown = name.rstrip("1") if name in numbered else names.get(name, spaced(name))
             label = "" if i or name in unnamed else shown
-            parts.append(_drawn(solid.translate(offset), colours[name], label))
-    return Scene(tuple(p for p in parts if p), (0.55, -1.0, 0.5), (1000, 1300))
+            parts.append(_solid(solid.translate(offset), colours[name], label))
+    return draw(parts, (0.55, -1.0, 0.5), (1000, 1300))
 
 
-def _colours(moulds: MouldSet) -> Mapping[str, tuple[float, float, float]]:
+def _colours(moulds: MouldSet) -> Mapping[str, Colour]:
     return {body.name: body.colour for body in (*moulds.unit, *moulds.plan.tools)}
 
 
@@ -178,8 +177,5 @@ def _far_half(solid: Manifold, y: float = 0.0) -> Manifold:
     return solid.trim_by_plane((0, 1, 0), y + 1 / 512)
 
 
-def _drawn(solid: Manifold, colour: tuple[float, float, float], label: str = "") -> Drawn | None:
-    if solid.is_empty():
-        return None
-    vertices, faces = arrays(solid)
-    return Drawn(colour, np.asarray(vertices), np.asarray(faces), label)
+def _solid(solid: Manifold, colour: Colour, label: str = "") -> Surface:
+    return Surface(*arrays(solid), colour, label)

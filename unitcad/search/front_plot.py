@@ -10,14 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.export.plot_elements import line, round_step, text, upward_name
+from unitcad.export.chart import axis, frame, line, page, text
 from unitcad.search.candidates import Candidates
 from unitcad.search.ranking_order import front
-from unitcad.text import number
 
 WIDTH, PANEL, HEIGHT = 820, 400, 280
 LEFT, RIGHT, TOP, BOTTOM = 52, 14, 34, 44
-_GREY, _LIGHT, _DARK, _FRONT, _MARK = "#b9b4aa", "#e8e5df", "#444444", "#0a6b62", "#c2571a"
+_GREY, _FRONT, _MARK = "#b9b4aa", "#0a6b62", "#c2571a"
 HEAD = 46
 
 
@@ -52,9 +51,6 @@ def front_svg(
     lines = -(-len(panels) // columns)
     height, width = HEAD + HEIGHT * max(lines, 1), WIDTH if columns > 1 else PANEL + 10
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
-        'font-family="sans-serif" font-size="12">',
-        f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
         text(12, 22, f"What pulls apart: {rows.size} candidates, front and proposals", size=14),
         f'<circle cx="16" cy="36" r="2.5" fill="{_GREY}"/>',
         text(24, 40, "candidate"),
@@ -68,7 +64,7 @@ def front_svg(
         parts += _panel(found, rows, one, at, [(label, p, values[i]) for label, p, values in marked])
     if not panels:
         parts.append(text(12, HEAD + 30, "Nothing pulls apart: the best is the smallest too."))
-    return "\n".join([*parts, "</svg>", ""])
+    return page(width, height, parts)
 
 
 def _panel(
@@ -81,27 +77,12 @@ def _panel(
     x0, x1 = at[0] + LEFT, at[0] + PANEL - RIGHT
     y0, y1 = at[1] + HEIGHT - BOTTOM, at[1] + TOP - 16
     values = np.concatenate([one.values[rows], [value for _, _, value in marked]])
-    least, most = float(values.min()), float(values.max())
-    room = 0.05 * (most - least)
-    low, high = least - room, most + room
-
-    def across(value: float) -> float:
-        return x0 + (value - low) / (high - low) * (x1 - x0)
-
-    def up(p: float) -> float:
-        return y0 - p * (y0 - y1)
-
-    parts = []
-    for p in (0.0, 0.25, 0.5, 0.75, 1.0):
-        parts += [line(x0, up(p), x1, up(p), _LIGHT), text(x0 - 6, up(p) + 4, f"{p:g}", "end")]
-    for value in _ticks(low, high):
-        parts += [line(across(value), y0, across(value), y0 + 4, _DARK)]
-        parts += [text(across(value), y0 + 17, number(value, 4), "middle")]
-    parts += [
-        line(x0, y0, x1, y0, _DARK),
-        text((x0 + x1) / 2, y0 + 35, one.name, "middle"),
-        upward_name(at[0] + 14, (y0 + y1) / 2, "probability of the level"),
-    ]
+    low, high = float(values.min()), float(values.max())
+    room = 0.05 * (high - low)
+    low, high = low - room, high + room
+    x_axis, y_axis = axis(values.tolist(), x0, x1, whole=(low, high)), axis([], y0, y1, whole=(0.0, 1.0))
+    across, up = x_axis.at, y_axis.at
+    parts = frame(x_axis, y_axis, (x0, x1, y1, y0), one.name, "probability of the level", aside=38)
     if one.limit is not None and low <= one.limit <= high:
         parts.append(line(across(one.limit), y0, across(one.limit), y1, _MARK, ' stroke-dasharray="5 4"'))
         parts.append(text(across(one.limit) - 4, y1 + 10, "limit", "end"))
@@ -117,9 +98,3 @@ def _panel(
         parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="8" fill="{_MARK}"/>')
         parts.append(text(x, y + 4, label, "middle", fill="#ffffff"))
     return parts
-
-
-def _ticks(low: float, high: float) -> list[float]:
-    """Return round values between the ends, six or fewer."""
-    step = round_step(high - low, 5)
-    return [float(f"{i * step:.9g}") for i in range(int(np.ceil(low / step)), int(np.floor(high / step)) + 1)]

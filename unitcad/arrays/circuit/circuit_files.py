@@ -14,7 +14,7 @@ from unitcad.arrays.circuit.outline import outline
 from unitcad.arrays.circuit.wiring import Wiring, wiring
 from unitcad.arrays.construction import construction_of
 from unitcad.errors import Missing, missing_extra
-from unitcad.export.drawing import number
+from unitcad.export.chart import number
 from unitcad.shape import Profile
 from unitcad.shape.profile import arc_centre, arc_middle, sides
 from unitcad.spec import motor_of

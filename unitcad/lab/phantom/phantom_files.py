@@ -15,8 +15,8 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import to_csv
 from unitcad.export import stl, svg, threemf
 from unitcad.export.chart import Series, chart
-from unitcad.export.picture import Drawn, Scene, draw
 from unitcad.export.printing import print_ready
+from unitcad.export.raster import Surface, draw
 from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.lab.phantom import SEGMENTS, PhantomSet, bench, printed, tissue_table
 from unitcad.meshcheck import check
@@ -59,7 +59,7 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
 
 
 def box_picture(phantom: PhantomSet) -> bytes:
-    """Draw the box taken apart as a PNG file. Raises NoPicture where this machine can't draw."""
+    """Draw the box taken apart as a PNG file."""
     shown = [body for body in phantom.tools if body.kind != "blade"]
 
     def place(body: Body) -> tuple[float, bool]:
@@ -72,9 +72,9 @@ def box_picture(phantom: PhantomSet) -> bytes:
     for body in bodies:
         vertices, faces = arrays(realise(body.shape, SEGMENTS))
         low, high = vertices[:, 2].min(), vertices[:, 2].max()
-        parts.append(Drawn(body.colour, vertices + np.array([0.0, 0.0, height - low]), faces, body.name))
+        parts.append(Surface(vertices + np.array([0.0, 0.0, height - low]), faces, body.colour, body.name))
         height += (high - low) + APART_MM
-    return draw([Scene(tuple(parts), (1.0, -2.0, 0.7))])[0]
+    return draw(parts, (1.0, -2.0, 0.7), (1200, 900))
 
 
 def tissue_toml(phantom: PhantomSet) -> str:
