@@ -23,7 +23,6 @@ FLOORS = [
     {"pipeline"},
     {"lab", "arrays"},
     {"casting", "checks"},
-    {"experiments"},
     {"moulds", "estimating"},
     {"validation"},
     {"export"},

@@ -1,4 +1,4 @@
-"""What would decide between the best two, and what a measurement of a candidate says about the wish."""
+"""The order of the best two, and what a measurement of a candidate says about the wish."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from msgspec import structs
 
-from unitcad.attenuation.edge.lab_fit import LabFit, ModelFit
 from unitcad.attenuation.edge.predictive import predictive_of
 from unitcad.estimating import estimate_input
-from unitcad.experiments.most_telling import decision_between
 from unitcad.search.best_two import below_by_ranking, best_two
 from unitcad.search.design_words import first_other, level_line
 from unitcad.search.proposals import invert
@@ -29,16 +26,24 @@ def quiet() -> dict[str, Any]:
     return invert(load_target("quiet-edge"), check=False).data
 
 
-def test_the_sentence_has_the_rankings_models_and_says_where_it_differs(quiet: dict[str, Any]) -> None:
+def test_the_sentence_has_the_order_that_the_ranking_expects(quiet: dict[str, Any]) -> None:
     decision = quiet["decision"]
     assert decision["weights"] == quiet["models"]["weights"]
-    assert set(decision["predicted"]) == {"bush", "crossings"}
-    assert decision["first_below_by_ranking"] > 0.5 > decision["first_below"]
-    assert quiet["decides"] == (
-        f"The ranking expects #1 below #2 ({100 * decision['first_below_by_ranking']:.0f} %); the same models held to "
-        f"the measured levels of their kinds expect the reverse ({100 - 100 * decision['first_below']:.0f} %): "
-        "the order is open. Cast and measure both."
-    )
+    assert decision["ratios"].keys() == quiet["models"]["weights"].keys()
+    assert 0.55 < decision["first_below"] < 0.99
+    expects = f"The ranking expects #1 below #2 ({100 * decision['first_below']:.0f} %)."
+    assert quiet["decides"] == f"{expects} To be sure of the order cast and measure both."
+
+
+def test_the_ratio_of_the_best_two_is_that_of_their_estimates(quiet: dict[str, Any]) -> None:
+    both = [one["by_model"] for one in quiet["proposals"][:2]]
+    levels = [
+        predictive_of([estimate_input(spec)], [model]).quantile(0.5)[0]
+        for model in both[0]
+        for spec in invert(load_target("quiet-edge"), check=False).specs[:2]
+    ]
+    ratios = [first / second for first, second in zip(levels[::2], levels[1::2], strict=True)]
+    assert list(quiet["decision"]["ratios"].values()) == pytest.approx(ratios, rel=1e-6)
 
 
 def test_where_both_were_measured_the_sentence_follows_the_measurements() -> None:
@@ -48,11 +53,11 @@ def test_where_both_were_measured_the_sentence_follows_the_measurements() -> Non
     data, decision = made.data, made.data["decision"]
     assert [one["measured"]["level"] for one in data["proposals"][:2]] == [0.0517, 0.04]
     assert decision["weights"] == data["models"]["weights"]
-    assert decision["first_below_by_ranking"] > 0.8
+    assert decision["first_below"] > 0.8
     assert data["decides"] == (
         "The two best were measured, #1 printed as 5.17 % and 4.58 %, #2 as 4 %, each unit once. By its measurement "
         "#2 is the lower; the ranking, which has the models alone, expects the reverse "
-        f"({100 * decision['first_below_by_ranking']:.0f} %). To be sure of the order cast and measure both again."
+        f"({100 * decision['first_below']:.0f} %). To be sure of the order cast and measure both again."
     )
     both = list(zip(made.specs[:2], data["proposals"][:2], strict=True))
 
@@ -63,15 +68,6 @@ def test_where_both_were_measured_the_sentence_follows_the_measurements() -> Non
     assert "#1 is the lower" in said({"level": 0.03, "also": None}, {})
     assert "leave the order of the two open" in said({"level": 0.05, "also": 0.039}, {})
     assert "By its measurement" not in said({"by": "your lab (a)"}, {})
-
-
-def test_weights_count_in_a_decision() -> None:
-    specs = {"flat": load("encapsulating"), "three layers": load("three-layer")}
-    alone = decision_between(specs, ["crossings"]).first_higher
-    assert decision_between(specs, {"crossings": 1.0, "bush": 0.0}).first_higher == pytest.approx(alone, abs=1e-9)
-    both = [decision_between(specs, {"crossings": 1.0 - w, "bush": w}).first_higher for w in (0.1, 0.5, 0.9)]
-    assert both[1] - both[0] == pytest.approx(both[2] - both[1], abs=1e-6)
-    assert abs(both[2] - both[0]) > 0.1
 
 
 def test_the_order_by_the_ranking_is_that_of_drawn_levels() -> None:
@@ -86,33 +82,6 @@ def test_the_order_by_the_ranking_is_that_of_drawn_levels() -> None:
     assert below_by_ranking(pair[::-1]) == pytest.approx(1 - sum(drawn), abs=3e-3)
 
 
-def _fit(kappa: float) -> LabFit:
-    ends: dict[str, Any] = {key: {} for key in ("low", "high", "stored")} | {"left_out_low": 1.1, "left_out_high": 1.3}
-    one = ModelFit(
-        constants={"s": 1.0, "kappa": kappa},
-        covariance=[[0.1, 0.0], [0.0, 1e-6]],
-        discrepancy=0.2,
-        degrees_of_freedom=5,
-        left_out=1.2,
-        **ends,
-    )
-    rest = structs.replace(one, constants={"s": 1.0}, covariance=[[0.1]])
-    return LabFit(
-        format=1, name="lab", units=7, moduli="dynamic", with_paper=True, between_labs=1.0, seed=1,
-        model={"fitted": one, **dict.fromkeys(("bush", "paper", "consistent"), rest)}, null=rest,
-    )  # fmt: skip
-
-
-def test_a_labs_fit_gives_its_own_constants() -> None:
-    """The divider's ratio of two units is (1 + kappa p1 c1)/(1 + kappa p2 c2): kappa moves it."""
-    specs = {"a": load("encapsulating"), "b": load("embedded")}
-    ratios = [
-        decision_between(specs, {"fitted": 1.0}, fit=_fit(kappa)).predicted["fitted"]["middle"] for kappa in (0.01, 5.0)
-    ]
-    assert ratios[0] > 0.7
-    assert ratios[1] == pytest.approx(0.5, abs=0.05)
-
-
 def test_two_of_one_level_are_the_same_for_a_purpose() -> None:
     target = load_target("amplify")
     made = invert(target, check=False)
@@ -120,7 +89,9 @@ def test_two_of_one_level_are_the_same_for_a_purpose() -> None:
     slow, fast = (by_name[f"encapsulating-{name}-1.25-1.25"] for name in ("d30-e10", "d10-e10"))
     sentence, _ = best_two(replace(target), [slow[0], fast[0]], [{**slow[1], "measured": None}, fast[1]])
     assert sentence is not None
-    assert sentence.startswith("#1 and #2 are the same for your purpose: their levels' ratio is ")
+    assert sentence.startswith(
+        "#1 and #2 are the same for your purpose: the ranking expects levels with a ratio of 1.02. "
+    )
     hours = [f"{one[1]['cure_hours']:.3g}" for one in (fast, slow)]
     assert sentence.endswith(f"Take the faster, #2: {hours[0]} h against {hours[1]} h.")
 

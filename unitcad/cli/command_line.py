@@ -17,7 +17,6 @@ COMMANDS = {
     "check": "check",
     "design": "design",
     "estimate": "estimate",
-    "experiments": "experiments",
     "accuracy": "accuracy",
     "coupon": "coupon",
     "fit": "fit",

@@ -9,7 +9,7 @@ import typer
 from unitcad.cli.shared_options import AsJson
 
 KINDS = (
-    "templates", "arrays", "designs", "materials", "motors", "printers", "experiments", "phantoms", "sweeps", "targets",
+    "templates", "arrays", "designs", "materials", "motors", "printers", "phantoms", "sweeps", "targets",
     "rules",
 )  # fmt: skip
 
@@ -59,10 +59,6 @@ def _entries(kind: str) -> dict[str, Any]:
         return {name: _first_comment(path.read_text("utf-8")) for name, path in array_templates().items()}
     if kind == "designs":
         return {name: design.about for name, design in shipped().items()}
-    if kind == "experiments":
-        from unitcad.experiments.lab_file import shipped as labs
-
-        return {name: _first_comment(path.read_text("utf-8")) for name, path in labs().items()}
     if kind == "phantoms":
         from unitcad.lab.phantom.recipe import phantoms
 

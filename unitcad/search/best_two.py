@@ -1,4 +1,4 @@
-"""What would decide between the best two: their measurements, or the ranking's models and these held to the levels."""
+"""Which of the best two proposals has the lower level: by their measurements, or as the ranking's models expect."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtr, stdtrit
 
 from unitcad.attenuation.edge.predictive import Predictive, stack_of
 from unitcad.attenuation.edge.variant_units import stacked
-from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
-from unitcad.experiments.most_telling import SURE, Decision, decision_between
 from unitcad.search.ranking_order import ALIKE
 from unitcad.search.target_file import Target
 from unitcad.spec import Spec
@@ -19,45 +18,34 @@ from unitcad.text import listed, number
 
 _SAME_LEVEL = 0.05
 """Levels whose expected ratio is nearer to one are the same for a purpose: half of a reading's own noise of 10 %."""
-_OPEN = 0.05
-"""A probability this near to one half tells no order."""
+_OPEN, _SURE = 0.55, 0.99
+"""Below the first probability the order of two levels is open; from the second on no measurement is needed for it."""
 _POINTS = 400
 
 
 def best_two(target: Target, specs: Sequence[Spec], data: Sequence[dict[str, Any]]) -> tuple[str | None, Any]:
-    """Return the sentence on what would decide between the first two proposals, and the figures behind it.
+    """Return the sentence on the order of the first two proposals' levels, and the figures behind it.
 
-    None where there are not two. Their models and weights are the ranking's. Where both were measured in one lab, the
-    sentence follows the measurements.
+    None if there are not two. If one lab measured both, the sentence follows the measurements.
     """
     if len(specs) < 2:
         return None, None
     stack = stack_of(target.models, target.fit, target.asked.estimate.moduli)
-    weights = {model: float(weight) for model, weight in zip(stack.models, stack.weights, strict=True)}
-    names = [one["name"] for one in data[:2]]
-    try:
-        decision = decision_between(dict(zip(names, specs[:2], strict=True)), weights, fit=target.fit)
-    except Refusal as refusal:
-        return f"No measurement is named between the best two: {refusal.limit}.", None
-    below = below_by_ranking([stack.predictive(stacked([estimate_input(spec)])) for spec in specs[:2]])
+    both = [stack.predictive(stacked([estimate_input(spec)])) for spec in specs[:2]]
+    ratios = np.exp(both[0].centre[0] - both[1].centre[0])
+    below = below_by_ranking(both)
     figures = {
-        "measure": str(decision.ratio),
-        "predicted": decision.predicted,
-        "weights": weights,
-        "first_below_by_ranking": below,
-        "first_below": 1.0 - decision.first_higher,
-        "bits": decision.order.bits,
-        "error": decision.order.error,
-        "open_bits": decision.open_bits,
+        "ratios": dict(zip(stack.models, map(float, ratios), strict=True)),
+        "weights": dict(zip(stack.models, map(float, stack.weights), strict=True)),
+        "first_below": below,
     }
-    by_measurement = _by_measurement(below, data[:2])
-    return " ".join([*_measured(data[:2]), by_measurement or _sentence(target, decision, below, data[:2])]), figures
+    ratio = float(np.exp(stack.weights @ np.log(ratios)))
+    said = _by_measurement(below, data[:2]) or _by_models(ratio, below, data[:2])
+    return " ".join([*_measured(data[:2]), said]), figures
 
 
 def below_by_ranking(both: Sequence[Predictive]) -> float:
     """Return the probability that the first unit's level is the lower one, each model missing the two independently."""
-    from scipy.special import stdtr, stdtrit
-
     first, second = both
     shares = (np.arange(_POINTS) + 0.5) / _POINTS
     each = [
@@ -72,7 +60,7 @@ def _measured(data: Sequence[dict[str, Any]]) -> list[str]:
     measured = [one["measured"] for one in data]
     if not all(measured):
         return []
-    printed = [listed([percent(level) for level in _levels(one)]) for one in measured]
+    printed = [listed([f"{number(100 * level, 3)} %" for level in _levels(one)]) for one in measured]
     if _one_unit(data):
         return [f"One unit of this silicone was measured, {printed[0]}, once; of which of the two designs is not said."]
     return [f"The two best were measured, #1 printed as {printed[0]}, #2 as {printed[1]}, each unit once."]
@@ -93,7 +81,7 @@ def _one_unit(data: Sequence[Mapping[str, Any]]) -> bool:
 
 
 def _by_measurement(below: float, data: Sequence[dict[str, Any]]) -> str | None:
-    """Return the order by the measurements of both, beside what the ranking expects; None where they tell none.
+    """Return the order by the measurements of both, with what the ranking expects; None if they tell none.
 
     Levels of two labs are not compared.
     """
@@ -116,38 +104,20 @@ def _by_measurement(below: float, data: Sequence[dict[str, Any]]) -> str | None:
     )
 
 
-def percent(level: float) -> str:
-    """Return a measured level in per cent as it is printed, to three digits."""
-    return f"{number(100 * level, 3)} %"
-
-
-def _sentence(target: Target, decision: Decision, below: float, data: Sequence[dict[str, Any]]) -> str:
-    ratios = [float(span["middle"]) for span in decision.predicted.values()]
-    near = max(abs(float(np.log(ratio))) for ratio in ratios) < _SAME_LEVEL
-    if near and abs(data[0]["probability"] - data[1]["probability"]) <= ALIKE:
-        span = f"{number(min(ratios), 3)} to {number(max(ratios), 3)}"
+def _by_models(ratio: float, below: float, data: Sequence[dict[str, Any]]) -> str:
+    """Return the order that the ranking expects; `ratio`: its first level over the second, a mean over the models."""
+    if abs(np.log(ratio)) < _SAME_LEVEL and abs(data[0]["probability"] - data[1]["probability"]) <= ALIKE:
         return (
-            f"#1 and #2 are the same for your purpose: their levels' ratio is {span} by these models. {_faster(data)}"
+            "#1 and #2 are the same for your purpose: "
+            f"the ranking expects levels with a ratio of {number(ratio, 3)}. {_faster(data)}"
         )
-    side = "below" if below >= 0.5 else "above"
-    ranked = below if below >= 0.5 else 1.0 - below
-    held = 1.0 - decision.first_higher if side == "below" else decision.first_higher
-    how = "with the constants of your lab" if target.fit else "held to the measured levels of their kinds"
-    expects = f"The ranking expects #1 {side} #2 ({100 * ranked:.0f} %)"
-    if abs(held - 0.5) < _OPEN:
-        return f"{expects}; the same models {how} can't tell ({_sure(held)}): the order is open. Cast and measure both."
-    if held < 0.5:
-        share = _sure(1.0 - held)
-        return (
-            f"{expects}; the same models {how} expect the reverse ({share}): the order is open. Cast and measure both."
-        )
-    if held >= SURE:
-        return f"{expects}, and so do the same models {how} ({_sure(held)}): no measurement is needed to order the two."
-    return f"{expects}, and so do the same models {how} ({_sure(held)}). To be sure of the order cast and measure both."
-
-
-def _sure(share: float) -> str:
-    return "more than 99 %" if share > 0.995 else f"{100 * share:.0f} %"
+    side, share = ("below", below) if below >= 0.5 else ("above", 1.0 - below)
+    if share < _OPEN:
+        return f"The ranking can't tell whether #1 is below #2 ({100 * below:.0f} %). Cast and measure both."
+    expects = f"The ranking expects #1 {side} #2 ({'more than 99' if share > 0.995 else f'{100 * share:.0f}'} %)"
+    if share >= _SURE:
+        return f"{expects}: no measurement is needed to order the two."
+    return f"{expects}. To be sure of the order cast and measure both."
 
 
 def _faster(data: Sequence[dict[str, Any]]) -> str:
