@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from unitcad.accuracy import runner
+from unitcad.accuracy.accuracy_command import accuracy
 from unitcad.accuracy.result import Result
-from unitcad.cli.accuracy_command import accuracy
 from unitcad.errors import Missing
 
 CLONE = Path(__file__).parents[2]

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from unitcad.accuracy import kernel_agreement, runner
+from unitcad.accuracy.accuracy_command import accuracy
 from unitcad.accuracy.pages import front
 from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import (
@@ -29,7 +30,6 @@ from unitcad.accuracy.result import (
     stars,
 )
 from unitcad.accuracy.timing import PROCESSOR, interleaved, timing
-from unitcad.cli.accuracy_command import accuracy
 from unitcad.errors import Refusal, UnitcadError
 
 RESULT = Result(
