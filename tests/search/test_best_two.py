@@ -10,9 +10,8 @@ import pytest
 
 from unitcad.attenuation.edge.predictive import predictive_of
 from unitcad.estimating import estimate_input
-from unitcad.search.best_two import below_by_ranking, best_two
-from unitcad.search.design_words import first_other, level_line
-from unitcad.search.proposals import invert
+from unitcad.search.design_text import is_first_other, level_line
+from unitcad.search.proposals import below_by_ranking, best_two, invert
 from unitcad.search.target_file import load_target, target_of
 from unitcad.validation import load
 
@@ -31,8 +30,7 @@ def test_the_sentence_has_the_order_that_the_ranking_expects(quiet: dict[str, An
     assert decision["weights"] == quiet["models"]["weights"]
     assert decision["ratios"].keys() == quiet["models"]["weights"].keys()
     assert 0.55 < decision["first_below"] < 0.99
-    expects = f"The ranking expects #1 below #2 ({100 * decision['first_below']:.0f} %)."
-    assert quiet["decides"] == f"{expects} To be sure of the order cast and measure both."
+    assert quiet["decides"] == f"The ranking expects #1 below #2 ({100 * decision['first_below']:.0f} %)."
 
 
 def test_the_ratio_of_the_best_two_is_that_of_their_estimates(quiet: dict[str, Any]) -> None:
@@ -55,9 +53,8 @@ def test_where_both_were_measured_the_sentence_follows_the_measurements() -> Non
     assert decision["weights"] == data["models"]["weights"]
     assert decision["first_below"] > 0.8
     assert data["decides"] == (
-        "The two best were measured, #1 printed as 5.17 % and 4.58 %, #2 as 4 %, each unit once. By its measurement "
-        "#2 is the lower; the ranking, which has the models alone, expects the reverse "
-        f"({100 * decision['first_below']:.0f} %). To be sure of the order cast and measure both again."
+        "#1 was measured at 5.17 % and 4.58 %, #2 at 4 %: #2 is the lower; by the models alone "
+        f"the ranking expects #1 below #2 ({100 * decision['first_below']:.0f} %)."
     )
     both = list(zip(made.specs[:2], data["proposals"][:2], strict=True))
 
@@ -66,8 +63,8 @@ def test_where_both_were_measured_the_sentence_follows_the_measurements() -> Non
         return str(best_two(target_of(_data()), [spec for spec, _ in both], own)[0])
 
     assert "#1 is the lower" in said({"level": 0.03, "also": None}, {})
-    assert "leave the order of the two open" in said({"level": 0.05, "also": 0.039}, {})
-    assert "By its measurement" not in said({"by": "your lab (a)"}, {})
+    assert "which one is lower stays open" in said({"level": 0.05, "also": 0.039}, {})
+    assert "was measured at" not in said({"by": "your lab (a)"}, {})
 
 
 def test_the_order_by_the_ranking_is_that_of_drawn_levels() -> None:
@@ -92,8 +89,8 @@ def test_two_of_one_level_are_the_same_for_a_purpose() -> None:
     assert sentence.startswith(
         "#1 and #2 are the same for your purpose: the ranking expects levels with a ratio of 1.02. "
     )
-    hours = [f"{one[1]['cure_hours']:.3g}" for one in (fast, slow)]
-    assert sentence.endswith(f"Take the faster, #2: {hours[0]} h against {hours[1]} h.")
+    hours = " and ".join(f"{one[1]['cure_hours']:.3g}" for one in (slow, fast))
+    assert sentence.endswith(f"They are out of the mould in {hours} h.")
 
 
 def test_a_control_of_a_design_that_is_not_said_is_one_unit() -> None:
@@ -103,7 +100,7 @@ def test_a_control_of_a_design_that_is_not_said_is_one_unit() -> None:
         check=False,
     ).data
     assert [one["design"] for one in made["proposals"]] == ["encapsulating", "embedded"]
-    assert made["decides"].startswith("One unit of this silicone was measured, 39.5 %, once; of which of the two")
+    assert "39.5 %, #2 at 39.5 %: which one is lower stays open" in made["decides"]
     assert all("of which design is not said" in level_line(one) for one in made["proposals"])
 
 
@@ -120,7 +117,7 @@ def test_a_unit_measured_outside_the_wish_is_no_proposal() -> None:
 
 def test_what_is_less_probable_than_asked_for_is_called_so() -> None:
     data = invert(load_target("paper"), check=False).data["proposals"]
-    assert first_other(data) == 3
+    assert [i for i in range(len(data)) if is_first_other(data, i)] == [2]
     assert "probability 0.10, below your 50 %, " in level_line(data[2])
     assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the wish" in level_line(data[0])
 
