@@ -31,7 +31,7 @@ def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess
     )
 
 
-@pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "experiments", "rules"])
+@pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "rules"])
 def test_list_names_what_is_shipped(kind: str) -> None:
     done = _run("list", kind)
     assert done.returncode == 0

@@ -22,7 +22,6 @@ PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
     {"accuracy", "serve"},
     {"search", "sweeps", "lab", "arrays"},
-    {"experiments"},
     {"cli"},
     {"api"},
     {"report"},
@@ -51,7 +50,6 @@ ROOMS = {
     "search": {"accuracy"},
     "sweeps": {"accuracy", "serve"},
     "lab": {"accuracy"},
-    "experiments": {"accuracy", "lab", "search"},
 }
 """Each room that can be deleted, with the rooms that stand on it."""
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}

@@ -191,3 +191,14 @@ def test_without_scikit_fem_the_message_says_what_to_install():
     assert "Traceback" not in done.stderr
     plain = subprocess.run([*asked, "--json"], capture_output=True, text=True, check=True)
     assert "mechanics" not in json.loads(plain.stdout)
+
+
+def test_the_change_over_frequency_is_as_the_page_on_what_to_measure_says() -> None:
+    """docs/what-to-measure.md: from 60 to 200 Hz, the middle 80 % of the draws, a flat motor in the closed unit."""
+    unit = estimate_input(load("encapsulating"))
+    ratios = []
+    for index in range(48):
+        draw = Draw(1, index, 48)
+        low, high = (level(unit, hertz, "flat", "edge", draw, 0.5) for hertz in (60.0, 200.0))
+        ratios.append(high / low)
+    assert np.quantile(ratios, [0.1, 0.9]) == pytest.approx([0.2, 3.0], rel=0.1)

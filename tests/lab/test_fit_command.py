@@ -5,13 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import tomli_w
 from typer.testing import CliRunner
 
+from unitcad.attenuation.edge.closed_form import transmission_only
 from unitcad.attenuation.edge.lab_fit import unit_key
+from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_input, estimate_spec
@@ -47,12 +50,30 @@ def test_the_shipped_lab_says_that_it_is_synthetic_and_gives_the_same_bytes() ->
     assert set(data["by_moduli"]) == {"dynamic", "quasi-static", "data sheet"}
 
 
+def test_the_units_on_which_the_models_differ_most_come_first() -> None:
+    """The levels of each unit of the lab are those of a fit without it, whose own constants the model has."""
+    lab = load_fit_lab("synthetic-bench")
+    result = fit_lab(lab)
+    rows = json.loads(contents(result)["fit.json"])["models_differ_on"]
+    assert {row["unit"] for row in rows} == {unit.name for unit in lab.units}
+    assert [row["factor"] for row in rows] == sorted((row["factor"] for row in rows), reverse=True)
+    for row in rows:
+        assert set(row["levels"]) == {"bush", "fitted", "paper", "consistent", "crossings"}
+        assert row["factor"] == pytest.approx(max(row["levels"].values()) / min(row["levels"].values()), rel=1e-5)
+        unit = next(unit for unit in lab.units if unit.name == row["unit"])
+        others = replace(lab, units=tuple(other for other in lab.units if other is not unit))
+        without = fit_lab(others).fit.model["crossings"].constants["s"]
+        path = transmission_only(nominal(estimate_input(unit.spec, unit.frequency_hz)))
+        assert row["levels"]["crossings"] == pytest.approx(without * float(path[0]), rel=1e-4)
+    page = contents(result)["fit.md"]
+    assert f"| {rows[0]['unit']} |" in page.partition("## Units on which the models differ most")[2]
+
+
 def test_constants_lie_between_the_stored_and_the_lab_s_own(tmp_path: Path) -> None:
     """One own unit of a one-constant model: the weights are 0.9 and 1 without an error of measurement."""
     fit = fit_lab(load_fit_lab(_written(tmp_path, unit=[UNITS[1]]))).fit
     spec = estimate_input(load("encapsulating"), 110.0)
     from unitcad.attenuation.edge.fitted_models import path_of
-    from unitcad.attenuation.edge.variant_units import nominal
 
     own = 0.06 / float(path_of("bush")(nominal(spec))[0])
     one = fit.model["bush"]

@@ -13,9 +13,6 @@ import numpy as np
 import pytest
 from chromium import Visit
 
-from unitcad.experiments.lab_file import load_lab
-from unitcad.experiments.study import study
-from unitcad.experiments.study_files import shown, write_study
 from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.validation import load
@@ -149,32 +146,3 @@ def test_nothing_of_it_is_wider_than_its_column(running: Any, solved: Path, dark
     assert (bright[0] > bright[1]) == dark
     assert seen.errors == seen.console == []
     seen.close()
-
-
-def test_a_studys_picture_keeps_its_words_apart(running: Any, tmp_path: Path) -> None:
-    """No word leaves the picture or lies on another or on a bar; what can't be read has words in place of a bar."""
-    lab = load_lab("paper", {"rivals": ["paper", "crossings", "bush"], "compare": ["unit"], "draws": 20})
-    data = study(lab)
-    best = shown(data)[0]["experiment"]
-    for one in data["experiments"]:
-        if one["experiment"] == best:
-            one["predicted"]["bush"]["unread"] = 0.7
-    write_study(data, tmp_path)
-    context = running.new_context(viewport={"width": 1280, "height": 900})
-    page = context.new_page()
-    page.goto((tmp_path / "experiments.svg").as_uri())
-    boxes = """(name) => [...document.querySelectorAll(name)].map((node) => {
-      const b = node.getBBox(); return [b.x, b.y, b.x + b.width, b.y + b.height, node.textContent];
-    })"""
-    words, bars = page.evaluate(boxes, "text"), page.evaluate(boxes, "rect[fill-opacity]")
-    width, height = page.evaluate(
-        "() => { const v = document.documentElement.viewBox.baseVal; return [v.width, v.height]; }"
-    )
-    assert all(x0 >= 0 and y0 >= 0 and x1 <= width and y1 <= height for x0, y0, x1, y1, _ in words)
-    assert len(bars) == 3 * len(shown(data)) - 1
-    assert [word[4] for word in words].count("below what can be read") == 1
-    for i, word in enumerate(words):
-        for other in [*words[:i], *bars]:
-            apart = word[2] <= other[0] or other[2] <= word[0] or word[3] <= other[1] + 3 or other[3] <= word[1] + 3
-            assert apart, (word, other)
-    context.close()

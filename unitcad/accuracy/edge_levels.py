@@ -11,6 +11,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from unitcad.accuracy.level_scores import score_tables
+from unitcad.accuracy.mechanics_search import unit_spec
 from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Summary, Table, stars
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.accuracy.unexplained import NineLevels, unexplained
@@ -22,7 +23,6 @@ from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.mechanics.motor_level import Setting, amplitude, motion, pressed_skin
 from unitcad.catalogue import measurements
 from unitcad.estimating import estimate_input
-from unitcad.experiments.measured_units import unit_spec
 from unitcad.spec import Spec
 from unitcad.validation import default_template, load
 

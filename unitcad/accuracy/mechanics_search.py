@@ -18,8 +18,10 @@ from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
 from unitcad.attenuation.mechanics.motor_level import Drive, Reading, Setting, amplitude, motion
 from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 from unitcad.catalogue import measurements
+from unitcad.designs import shipped
 from unitcad.estimating import estimate_input
-from unitcad.experiments.measured_units import unit_spec
+from unitcad.spec import Spec
+from unitcad.validation import from_data
 
 DRIVES: tuple[Drive, ...] = get_args(Drive)
 READINGS: tuple[Reading, ...] = get_args(Reading)
@@ -27,6 +29,16 @@ COMPONENTS = ("normal", "radial", "total")
 REFERENCES = ("motor", "free")
 """What a level is over: the motor's own motion in the unit, or that of a motor in the air, F / (omega^2 m)."""
 AXES = ("drive", "reading", "component", "reference")
+
+
+def unit_spec(design: str, unit: str) -> Spec:
+    """Return the spec of a measured unit in a design, "E10/D30" or a control "D10", with its walls and caps."""
+    names, shared = measurements().layers(unit), measurements().unit
+    wall = 2 * shared.wall_mm / len(names)
+    layers = [
+        {"material": name, "wall_mm": wall, **({"cap_mm": wall} if shipped()[design].caps else {})} for name in names
+    ]
+    return from_data({"name": unit, "design": design, "diameter_mm": shared.diameter_mm, "fpcb": {}, "layers": layers})
 
 
 def unit_levels(unit: str, draw: Draw | None, fineness: float) -> np.ndarray:

@@ -14,10 +14,9 @@ from unitcad.accuracy.timing import machine
 from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
 from unitcad.attenuation.edge.predictive import STACKED, Predictive, stack
 from unitcad.errors import Refusal
-from unitcad.search.candidates import Candidates, candidates
-from unitcad.search.geometries import Lengths
-from unitcad.search.ranking_order import kinds
-from unitcad.search.refinement import alone, refined
+from unitcad.search.candidates import Candidates, Lengths, candidates
+from unitcad.search.proposals import refined
+from unitcad.search.ranking import kinds
 from unitcad.search.target_file import Target, target_of
 
 STACKS = {"every closed form": STACKED, "crossings, fitted, paper": ("crossings", "fitted", "paper")}
@@ -243,7 +242,7 @@ class _Counter:
         motor = self.target.asked.at_hand.motors[0]
         self.count += 1
         try:
-            one = alone(self.table, Lengths(design, motor, walls, caps, diameter), materials)
+            one = self.table.alone(Lengths(design, motor, walls, caps, diameter), materials)
         except Refusal:
             return 0.0
         p = float(one.probability[0]) if one.mass_g[0] <= (self.target.wish.mass_max_g or np.inf) else 0.0

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from unitcad.accuracy.mechanics_search import DRIVES, READINGS, drawn_levels, searches
+from unitcad.accuracy.mechanics_search import DRIVES, READINGS, drawn_levels, searches, unit_spec
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, interleaved, machine
 from unitcad.attenuation.inputs import body
@@ -16,7 +16,6 @@ from unitcad.attenuation.mechanics.motor_level import Drive, Setting, amplitude,
 from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 from unitcad.catalogue import measurements
 from unitcad.estimating import estimate_input
-from unitcad.experiments.measured_units import unit_spec
 from unitcad.validation import default_template, load
 
 SEED, DRAWS = 1, 128

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
+from rich.table import Column, Table
 
 from unitcad import files
 from unitcad.cli.output import console, print_json, progress
@@ -73,6 +73,12 @@ def _print(result: Fitted) -> None:
     for source, compared in result.by_source.items():
         if compared.reason:
             screen.print(f"  {source}: {compared.reason}", soft_wrap=True)
+    head, *rows = fit_files.differing_table(result)
+    differing = Table(Column("unit", overflow="fold"), *head[1:], title="units on which the models differ most")
+    for cells in rows:
+        differing.add_row(*cells)
+    screen.print(differing)
+    screen.print(f"  {fit_files.DIFFERING}.", soft_wrap=True)
     screen.print(f"  {fit_files.prior_text(result)}", soft_wrap=True)
     screen.print(
         "  against the null: difference of |ln(predicted/measured)|, below 0 is better; 80 %: units in their range",

@@ -15,6 +15,11 @@ from unitcad.lab.fitting import Compared, Fitted
 from unitcad.spec.toml import text_of, without_none
 
 FIT = "lab-fit.toml"
+DIFFERING = (
+    "Level by each model, unit left out, and the factor between the highest and the lowest. "
+    "A second cast of these units decides most"
+)
+_MOST_DIFFERING = 5
 
 
 def contents(result: Fitted) -> dict[str, str]:
@@ -50,6 +55,7 @@ def as_data(result: Fitted) -> dict[str, Any]:
         "moduli": settings.moduli,
         "by_moduli": rounded(scores, 6),
         "units": unit_rows(result),
+        "models_differ_on": differing_units(result),
         "fit": without_none(msgspec.to_builtins(result.fit)),
         "prior": prior_text(result),
         "warnings": warnings(result),
@@ -69,6 +75,30 @@ def unit_rows(result: Fitted) -> list[dict[str, Any]]:
         row = {"unit": unit, "own": bool(judged.own[i]), "measured": float(table.levels[i]), "model": name, **numbers}
         rows.append(rounded(row, 6))
     return rows
+
+
+def differing_units(result: Fitted) -> list[dict[str, Any]]:
+    """Return the lab's own units with the level by each model, unit left out, and the factor between the extremes.
+
+    The unit on which the models differ most comes first.
+    """
+    judged = {name: one for name, one in result.chosen.judged.items() if name != "null"}
+    own = next(iter(judged.values())).own
+    rows = []
+    for i, unit in zip(np.flatnonzero(own), result.lab.units, strict=True):
+        levels = {name: float(np.exp(one.centre[i])) for name, one in judged.items()}
+        factor = max(levels.values()) / min(levels.values())
+        rows.append(rounded({"unit": unit.name, "levels": levels, "factor": factor, "measured": unit.level.value}, 6))
+    return sorted(rows, key=lambda row: -row["factor"])
+
+
+def differing_table(result: Fitted) -> list[list[str]]:
+    """Return the cells of the units on which the models differ most, the head first."""
+    rows = differing_units(result)[:_MOST_DIFFERING]
+    cells = [
+        [row["unit"], *(f"{level:.2g}" for level in row["levels"].values()), f"x {row['factor']:.2f}"] for row in rows
+    ]
+    return [["unit", *rows[0]["levels"], "factor"], *cells]
 
 
 def best(compared: Compared) -> str:
@@ -178,6 +208,15 @@ def page(result: Fitted) -> str:
     for row in unit_rows(result):
         numbers = " | ".join(f"{row[key]:.3g}" for key in ("measured", "predicted", "p10", "p90"))
         lines.append(f"| {row['unit']}{' (own)' if row['own'] else ''} | {numbers} |")
+    lines += [
+        "",
+        "## Units on which the models differ most",
+        "",
+        f"{DIFFERING}.",
+        "",
+    ]
+    head, *rows = differing_table(result)
+    lines += [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
     lines += ["", "## Files that were read", ""]
     lines += [f"- {one.file}: SHA-256 {one.sha256}" for one in result.fit.input]
     return "\n".join(lines) + "\n"

@@ -14,9 +14,8 @@ from unitcad import files
 from unitcad.casting.cast_record import CastRecord, CastUnit, read_cast_record
 from unitcad.catalogue import materials
 from unitcad.errors import Refusal, UnitcadError, unknown_name
-from unitcad.experiments.lab_file import spec_with
-from unitcad.spec import Spec
-from unitcad.validation import custom_templates, from_data, put, templates
+from unitcad.spec import Spec, check_plain
+from unitcad.validation import custom_templates, from_data, put, read, templates
 from unitcad.validation.shipped_files import is_path
 
 Cavity = Annotated[int, Meta(ge=1, le=999, description="the unit of a cast record: the number engraved beside it")]
@@ -70,8 +69,8 @@ def specs_of(
 
     `changes` are values by path, `entries` tables of the lab's own such as materials.NAME. Raises Refusal.
     """
-    if unit.cast is None:
-        asked = spec_with(field, unit.spec, changes, folder, entries, "spec")
+    if unit.spec is not None:
+        asked = _spec_with(field, unit.spec, changes, folder, entries)
         return asked, asked
     if changes:
         raise Refusal(f"{field}.set", dict(changes), "stands beside cast: the record says what was cast")
@@ -90,6 +89,20 @@ def specs_of(
         return asked, from_data(data)
     except Refusal as refusal:
         raise Refusal(where, unit.cast, str(refusal)) from None
+
+
+def _spec_with(field: str, base: str, changes: Mapping[str, Any], folder: Path, entries: Mapping[str, Any]) -> Spec:
+    """Return the spec that `base` names, a template or a file in `folder`, with `entries` and `changes` by path."""
+    data = read(folder / base if is_path(base) else base)
+    check_plain(data)
+    for path, entry in entries.items():
+        put(data, path, entry)
+    try:
+        for path, value in changes.items():
+            put(data, path, value)
+        return from_data(data, folder)
+    except Refusal as refusal:
+        raise type(refusal)(f"{field}.{refusal.field}", refusal.value, refusal.limit, refusal.nearest) from None
 
 
 def measured_walls(asked: Spec, built: Spec) -> str:

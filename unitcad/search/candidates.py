@@ -1,60 +1,89 @@
-"""Every candidate of a target as a table: what it is made of, what it measures, and how probably it meets the level."""
+"""Every candidate of a target as a table: lengths, silicones, size, mass, hours, and probability of the level."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from msgspec import structs
 
 from unitcad import catalogue
 from unitcad.attenuation.crosstalk import crosstalk_ratio
-from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Section, Units
 from unitcad.attenuation.edge.predictive import Predictive, stack_of
-from unitcad.attenuation.inputs import Quantity, SiliconeLayer
+from unitcad.attenuation.edge.variant_units import FIELDS, stacked
+from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
+from unitcad.casting.figures import at_room
+from unitcad.casting.procedure import procedure
+from unitcad.designs import dimensions
+from unitcad.designs import shipped as designs
+from unitcad.designs.dimensions import MOTOR_CLEARANCE
 from unitcad.errors import Refusal
-from unitcad.estimating import silicone_layer
-from unitcad.search.finish_time import Work, bench_hours, cure_hours, finish_hours
-from unitcad.search.geometries import Geometry, Lengths, Refused, Say, geometries
-from unitcad.search.target_file import Target
+from unitcad.estimating import estimate_input, silicone_layer
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.search.target_file import MOST_GEOMETRIES, Target
+from unitcad.spec import Spec
+from unitcad.validation import from_data
 
 MOST_CANDIDATES = 400_000
+Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Silicones:
-    """The silicones that the models can read, by name, and why the others are left out."""
+class Lengths:
+    """The lengths of a unit that vary, mm: walls and caps inside out; a design may have no caps."""
 
-    known: dict[str, SiliconeLayer]
-    left_out: dict[str, str]
+    design: str
+    motor: str
+    walls: tuple[float, ...]
+    caps: tuple[float, ...]
+    diameter: float
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Lengths that a design accepts: spec and estimate's input, with some silicone in every layer."""
+
+    lengths: Lengths
+    spec: Spec
+    variant: EstimateInput
+
+    @property
+    def height_mm(self) -> float:
+        """The height of the unit over the skin, its circuit's pad included."""
+        dims = dimensions(self.spec)
+        return max(dims.heights[-1], dims.pad.high if dims.pad else 0.0, dims.motor_height)
 
 
 @dataclass(frozen=True)
 class Candidates:
     """Candidates as columns, one row each: `geometry` and `sequence` are indices into the two lists.
 
-    mass in g, hours from the first weighing until it is out of the mould, crosstalk NaN where it is not asked for.
-    `probability` is that of meeting the level; `work`: see `finish_time`.
+    mass in g; hours from the first weighing until the unit is out of the mould; crosstalk at the pitch, or where units
+    touch if the pitch is shorter, NaN without a pitch. `probability` is that of meeting the level. left_out: silicones
+    without a modulus, with the reason. refused: the reasons why lengths were refused, by design and field.
     """
 
     target: Target
     geometries: list[Geometry]
     sequences: list[tuple[str, ...]]
-    silicones: Silicones
-    refused: dict[str, Refused]
+    silicones: dict[str, SiliconeLayer]
     geometry: np.ndarray
     sequence: np.ndarray
     predictive: Predictive
     probability: np.ndarray
     mass_g: np.ndarray
-    hours: np.ndarray
+    cure_hours: np.ndarray
     height_mm: np.ndarray
     diameter_mm: np.ndarray
     crosstalk: np.ndarray
-    work: Work
+    left_out: dict[str, str] = field(default_factory=dict)
+    refused: dict[str, list[str]] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -70,9 +99,24 @@ class Candidates:
         return self.sequences[self.sequence[row]]
 
     def kind(self, row: int) -> tuple[str, str, tuple[str, ...]]:
-        """Return (design, motor, silicones): candidates of one kind differ in lengths alone."""
+        """Return (design, motor, silicones): candidates of one kind differ only in lengths."""
         lengths = self.lengths(row)
         return lengths.design, lengths.motor, self.materials(row)
+
+    def variant(self, row: int) -> EstimateInput:
+        """Return a candidate as the estimate reads it."""
+        own = self.geometries[self.geometry[row]].variant
+        layers = zip(self.materials(row), own.layers, strict=True)
+        known = tuple(structs.replace(self.silicones[name], thickness=layer.thickness) for name, layer in layers)
+        return structs.replace(own, layers=known)
+
+    def spec(self, row: int, name: str = "candidate") -> Spec:
+        """Return the spec of a candidate."""
+        return from_data(spec_data(self.target, self.lengths(row), self.materials(row), name))
+
+    def alone(self, lengths: Lengths, materials: tuple[str, ...]) -> Candidates:
+        """Return the one candidate of these lengths and silicones. Raises Refusal if the design does not accept it."""
+        return tabulate(self.target, [geometry_of(self.target, lengths)], self.silicones, only=materials)
 
     @cached_property
     def range(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -81,18 +125,107 @@ class Candidates:
 
 
 def candidates(target: Target, say: Say = lambda stage: None) -> Candidates:
-    """Return every candidate of a target. Raises Refusal where there is none, or too many."""
+    """Return every candidate of a target. Raises Refusal for too many, if there is none, or if none can be cast."""
     try:
         made, refused = geometries(target, say)
-        return tabulate(target, made, refused, silicones_of(target, made[0].variant.frequency), say)
+        known, left_out = silicones_of(target, made[0].variant.frequency)
+        table = replace(tabulate(target, made, known, say), left_out=left_out, refused=refused)
+        if np.isnan(table.cure_hours).all():
+            finish_hours(made[0].spec)  # which says why no moulds can be made
+        return table
     except Refusal as refusal:
         if refusal.field.partition(".")[0] not in target.asked.spec:
             raise
         raise Refusal(f"spec.{refusal.field}", refusal.value, refusal.limit, refusal.nearest) from None
 
 
-def silicones_of(target: Target, frequency: Quantity) -> Silicones:
-    """Return the silicones at hand as the estimate reads them. Raises Refusal where none has a modulus."""
+def spec_data(target: Target, lengths: Lengths, materials: Sequence[str], name: str = "candidate") -> dict[str, Any]:
+    """Return the plain data of a candidate's spec."""
+    tables = target.entries
+    layers: list[dict[str, Any]] = [
+        {"material": material, "wall_mm": wall} for material, wall in zip(materials, lengths.walls, strict=True)
+    ]
+    for layer, cap in zip(layers, lengths.caps, strict=False):
+        layer["cap_mm"] = cap
+    return {
+        "name": name,
+        "design": lengths.design,
+        "diameter_mm": lengths.diameter,
+        **tables,
+        "motor": {"part": lengths.motor, **tables.get("motor", {})},
+        "layers": layers,
+    }
+
+
+def geometry_of(target: Target, lengths: Lengths) -> Geometry:
+    """Return the geometry of lengths. Raises Refusal if the design does not accept them."""
+    spec = from_data(spec_data(target, lengths, (target.materials[0],) * len(lengths.walls)))
+    return Geometry(lengths, spec, estimate_input(spec))
+
+
+def geometries(target: Target, say: Say = lambda stage: None) -> tuple[list[Geometry], dict[str, list[str]]]:
+    """Return every geometry that the target lets vary, and why others were refused, by design and field.
+
+    Raises Refusal for more than `MOST_GEOMETRIES`, and the design's own if it accepts none.
+    """
+    wanted = list(itertools.islice(_lengths(target), MOST_GEOMETRIES + 1))
+    step = target.asked.vary.step_mm
+    if len(wanted) > MOST_GEOMETRIES:
+        limit = f"makes more than {MOST_GEOMETRIES} sets of lengths to try; widen the step or narrow the ranges"
+        raise Refusal("vary.step_mm", step, limit, 2 * step)
+    made: list[Geometry] = []
+    refused: dict[str, list[str]] = {}
+    last = None
+    for i, lengths in enumerate(wanted):
+        if i % 200 == 0:
+            say(f"lengths {i} of {len(wanted)}")
+        try:
+            made.append(geometry_of(target, lengths))
+        except Refusal as refusal:
+            last = refusal
+            refused.setdefault(f"{lengths.design}, {refusal.field}", []).append(refusal.limit)
+    if last and not made:
+        raise last
+    return made, refused
+
+
+def _lengths(target: Target) -> Iterator[Lengths]:
+    vary, known = target.asked.vary, designs()
+    caps = grid(vary.cap_mm, vary.step_mm) if vary.cap_mm else ()
+    for design, motor, count in itertools.product(target.designs, target.asked.at_hand.motors, sorted(vary.layers)):
+        for walls in itertools.product(grid(vary.walls(count), vary.step_mm), repeat=count):
+            over = [walls] if known[design].caps else [()]
+            if known[design].caps and caps:
+                over = list(itertools.product(caps, repeat=count))
+            for diameter, cap in itertools.product(_diameters(target, motor, walls), over):
+                yield Lengths(design, motor, walls, cap, diameter)
+
+
+def _diameters(target: Target, motor: str, walls: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the diameters to try; default: the measured units', or the least that motor, clearance and walls fit."""
+    vary, most = target.asked.vary, target.wish.diameter_max_mm
+    if vary.diameter_mm:
+        return grid(vary.diameter_mm, vary.diameter_step_mm)
+    table = target.entries.get("motor", {})
+    wide = table.get("diameter_mm") or float(catalogue.motors(target.asked.motors)[motor].diameter_mm)
+    clearance = 0.0 if table.get("fill") else MOTOR_CLEARANCE
+    least = math.ceil(10 * (wide + 2 * (clearance + sum(walls))) - 1e-6) / 10
+    usual = catalogue.measurements().unit.diameter_mm
+    return (max(usual if most is None else min(usual, most), least),)
+
+
+def grid(ends: tuple[float, float], step: float) -> tuple[float, ...]:
+    """Return the values from the least to the largest, a step apart, the largest among them."""
+    low, high = ends
+    values = [round(low + i * step, 6) for i in range(math.floor((high - low) / step + 1e-9) + 1)]
+    return tuple(values if np.isclose(values[-1], high) else [*values, high])
+
+
+def silicones_of(target: Target, frequency: Quantity) -> tuple[dict[str, SiliconeLayer], dict[str, str]]:
+    """Return the silicones at hand as the estimate reads them, and why others are left out.
+
+    Raises Refusal if none has a modulus.
+    """
     entries, known, left_out = catalogue.materials(target.asked.materials), {}, {}
     for name in target.materials:
         layer = silicone_layer(entries[name], 1e-3, frequency, target.asked.estimate.moduli == "quasi-static")
@@ -101,9 +234,9 @@ def silicones_of(target: Target, frequency: Quantity) -> Silicones:
         else:
             known[name] = layer
     if not known:
-        names = list(target.materials)
-        raise Refusal("at_hand.materials", names, f"no level can be estimated: {next(iter(left_out.values()))}")
-    return Silicones(known, left_out)
+        limit = f"no level can be estimated: {next(iter(left_out.values()))}"
+        raise Refusal("at_hand.materials", list(target.materials), limit)
+    return known, left_out
 
 
 def sequences_of(materials: Sequence[str], count: int) -> list[tuple[str, ...]]:
@@ -115,120 +248,128 @@ def sequences_of(materials: Sequence[str], count: int) -> list[tuple[str, ...]]:
 def tabulate(
     target: Target,
     made: list[Geometry],
-    refused: dict[str, Refused],
-    silicones: Silicones,
+    silicones: dict[str, SiliconeLayer],
     say: Say = lambda stage: None,
     only: tuple[str, ...] | None = None,
-    work: Work | None = None,
 ) -> Candidates:
-    """Return the candidates of geometries with every sequence of silicones, or with `only` one; `work` is added to.
+    """Return the candidates of geometries with every sequence of silicones, or only with one.
 
-    Raises Refusal for too many, where there is none, and where no moulds can be made of any.
+    Raises Refusal for too many, and if there is none.
     """
-    counts = [len(one.lengths.walls) for one in made]
-    known = list(silicones.known)
-    by_count = {n: [only] if only else sequences_of(known, n) for n in sorted(set(counts))}
-    total = sum(len(by_count[n]) for n in counts)
+    counts = np.array([len(one.lengths.walls) for one in made])
+    by_count = {int(n): [only] if only else sequences_of(list(silicones), int(n)) for n in np.unique(counts)}
+    total = sum(len(by_count[n]) for n in counts.tolist())
     if total > MOST_CANDIDATES:
-        limit = f"makes {total} candidates; at most {MOST_CANDIDATES}"
-        raise Refusal("vary.step_mm", target.asked.vary.step_mm, limit, 2 * target.asked.vary.step_mm)
+        step, limit = target.asked.vary.step_mm, f"makes {total} candidates; at most {MOST_CANDIDATES}"
+        raise Refusal("vary.step_mm", step, limit, 2 * step)
     if not total:
         limit = "has one silicone with a modulus, and neighbouring layers differ: vary one layer"
         raise Refusal("at_hand.materials", list(target.materials), limit)
+    say(f"{total} candidates")
     sequences = [one for n in by_count for one in by_count[n]]
-    starts = dict(zip(by_count, np.cumsum([0, *map(len, by_count.values())]), strict=False))
-    stack, parts = stack_of(target.models, target.fit, target.asked.estimate.moduli), []
+    stack = stack_of(target.models, target.fit, target.asked.estimate.moduli)
+    parts, start = [], 0
     for n, own in by_count.items():
-        at = np.flatnonzero(np.equal(counts, n))
-        if not own or not at.size:
-            continue
-        say(f"{at.size * len(own)} candidates of {n} {'layer' if n == 1 else 'layers'}")
-        geometry, sequence = (each.ravel() for each in np.meshgrid(at, np.arange(len(own)), indexing="ij"))
-        units, volumes = _units([made[i] for i in at], [[silicones.known[m] for m in one] for one in own])
-        motor = np.array([made[i].variant.geometry.motor_mass.middle for i in at])
-        mass = np.einsum("ij,ij->i", volumes, units.density) + np.repeat(motor, len(own))
-        parts.append((geometry, sequence + starts[n], stack.predictive(units), 1e3 * mass))
-    geometry, sequence = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
-    predictive = replace(
-        parts[0][2],
-        centre=np.concatenate([part[2].centre for part in parts]),
-        scale=np.concatenate([part[2].scale for part in parts]),
-    )
-    say("hours")
-    entries, work = catalogue.materials(target.asked.materials), {} if work is None else work
-    cures = np.array([cure_hours(one, entries, target.casting.room_c) for one in sequences])
-    benches = np.array([bench_hours(one, work) for one in made])
-    if np.isnan(benches).all():
-        finish_hours(made[0].spec)  # says why no moulds can be made
+        at = np.flatnonzero(counts == n)
+        if own:
+            units, mass = _units([made[i] for i in at], [[silicones[name] for name in one] for one in own])
+            sequence = np.tile(np.arange(len(own)) + start, at.size)
+            parts.append((np.repeat(at, len(own)), sequence, mass, stack.predictive(units)))
+        start += len(own)
+    geometry, sequence, mass = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    centre, scale = (np.concatenate([getattr(part[3], end) for part in parts]) for end in ("centre", "scale"))
+    predictive = replace(parts[0][3], centre=centre, scale=scale)
+    entries, room_c = catalogue.materials(made[0].spec.materials), made[0].spec.casting.room_c
+    cures = np.array([_cure_hours(one, entries, room_c) for one in sequences])
     say("crosstalk")
-    crosstalk = _crosstalk(target, made)
     return Candidates(
         target=target,
         geometries=made,
         sequences=sequences,
         silicones=silicones,
-        refused=refused,
         geometry=geometry,
         sequence=sequence,
         predictive=predictive,
-        probability=probability_of(target, predictive),
-        mass_g=np.concatenate([part[3] for part in parts]),
-        hours=cures[sequence] + benches[geometry],
-        work=work,
-        height_mm=np.array([one.height for one in made])[geometry],
+        probability=probability_by_model(target, predictive) @ predictive.weights,
+        mass_g=1e3 * mass,
+        cure_hours=_bench_hours(made)[geometry] + cures[sequence],
+        height_mm=np.array([one.height_mm for one in made])[geometry],
         diameter_mm=np.array([one.lengths.diameter for one in made])[geometry],
-        crosstalk=crosstalk[geometry],
+        crosstalk=_crosstalk(target, made)[geometry],
     )
 
 
-def probability_of(target: Target, predictive: Predictive) -> np.ndarray:
-    """Return the probability of meeting the level that is wished for."""
-    return probability_by_model(target, predictive) @ predictive.weights
-
-
 def probability_by_model(target: Target, predictive: Predictive) -> np.ndarray:
-    """Return the same by each model alone, shape (..., models)."""
+    """Return the probability of meeting the level by each model, shape (..., models)."""
     wish = target.wish
     below = predictive.each_at_most(wish.edge_max) if wish.edge_max is not None else np.ones(predictive.centre.shape)
     return below - predictive.each_at_most(wish.edge_min) if wish.edge_min is not None else below
 
 
 def _units(made: Sequence[Geometry], own: Sequence[Sequence[SiliconeLayer]]) -> tuple[Units, np.ndarray]:
-    """Return the closed forms' input and the layers' volumes (m3), a row for each geometry with each sequence."""
-    count, layers = len(own), len(own[0])
-    variants = [one.variant for one in made]
-
-    def of_materials(values: list[list[float]]) -> np.ndarray:
-        return np.tile(np.array(values, dtype=float), (len(made), 1))
-
-    def of_lengths(values: Sequence[object]) -> np.ndarray:
-        return np.repeat(np.array(values, dtype=float), count, axis=0)
-
-    section = sections([variant.geometry for variant in variants])
-    units = Units(
-        youngs_modulus=of_materials([[layer.youngs_modulus.middle for layer in one] for one in own]),
-        density=of_materials([[layer.density for layer in one] for one in own]),
-        poisson_ratio=of_materials([[layer.poisson_ratio.middle for layer in one] for one in own]),
-        tan_delta=of_materials([[layer.tan_delta.middle for layer in one] for one in own]),
-        thickness=of_lengths([[layer.thickness for layer in variant.layers] for variant in variants]),
-        omega=of_lengths([2.0 * np.pi * variant.frequency.middle for variant in variants]),
-        passes=of_lengths([variant.passes for variant in variants]),
-        section=Section(*(np.repeat(getattr(section, field.name), count, axis=0) for field in fields(section))),
+    """Return the closed forms' input and the mass (kg) of each geometry with each sequence of silicones."""
+    base, count = stacked([one.variant for one in made]), len(own)
+    section = base.section
+    assert section is not None
+    of_silicones = {key: [[getattr(layer, key).middle for layer in one] for one in own] for key in FIELDS}
+    of_silicones["density"] = [[layer.density for layer in one] for one in own]
+    units = replace(
+        base,
+        **{key: np.tile(values, (len(made), 1)) for key, values in of_silicones.items()},
+        **{key: np.repeat(getattr(base, key), count, axis=0) for key in ("thickness", "omega", "passes")},
+        section=Section(*(np.repeat(getattr(section, one.name), count, axis=0) for one in fields(section))),
     )
-    tops = np.array([[layer.top for layer in variant.geometry.layers] for variant in variants])
+    tops = np.array([[layer.top for layer in one.variant.geometry.layers] for one in made])
     inside = np.array(section.cavity_radius) ** 2 * np.array(section.core_height)
-    cylinders = np.concatenate([inside[:, None], np.array(section.outer_radii) ** 2 * tops], axis=1)
-    volumes = np.pi * np.diff(cylinders, axis=1)
-    assert volumes.shape[1] == layers
-    return units, np.repeat(volumes, count, axis=0)
+    volumes = np.pi * np.diff(np.concatenate([inside[:, None], np.array(section.outer_radii) ** 2 * tops], axis=1))
+    motor = np.array([one.variant.geometry.motor_mass.middle for one in made])
+    return units, np.einsum("ij,ij->i", np.repeat(volumes, count, axis=0), units.density) + np.repeat(motor, count)
+
+
+def finish_hours(spec: Spec) -> float:
+    """Return the hours from the first pour's first step until the units are out of the mould.
+
+    Work before it is done once for a mould. Raises Refusal if the moulds can't be made.
+    """
+    # Volumes change only the grams, which the procedure's times do not depend on.
+    made = procedure(MouldSet(spec), (1.0,) * len(spec.layers), 1.0)
+    begins = next(phase.start_min for phase in made.time_line if phase.name == "pour 1")
+    return (made.earliest_finish_min - begins) / 60
+
+
+def _cure_hours(names: Iterable[str], entries: Mapping[str, catalogue.Material], room_c: float) -> float:
+    """Return the hours that layers of these silicones cure, one after the other, at the room's temperature."""
+    return sum(at_room(float(entries[name].cure_h), room_c) for name in names)
+
+
+def _bench_hours(made: Sequence[Geometry]) -> np.ndarray:
+    """Return the hours of each geometry's procedure without its cures, NaN if its moulds can't be made.
+
+    Lengths do not change them.
+    """
+    known: dict[tuple[str, str, int], float] = {}
+    hours = np.full(len(made), np.nan)
+    for i, one in enumerate(made):
+        key = one.lengths.design, one.lengths.motor, len(one.lengths.walls)
+        if key not in known:
+            spec, names = one.spec, (layer.material for layer in one.spec.layers)
+            cures = _cure_hours(names, catalogue.materials(spec.materials), spec.casting.room_c)
+            try:
+                known[key] = finish_hours(spec) - cures
+            except Refusal:
+                known[key] = math.nan
+        hours[i] = known[key]
+    return hours
 
 
 def _crosstalk(target: Target, made: Sequence[Geometry]) -> np.ndarray:
-    """Return the ratio of each geometry at the pitch, without its range; NaN where none is asked for or units meet."""
-    pitch = target.wish.pitch_mm
-    found: dict[tuple[str, float], float] = {}
-    for one in made:
-        key = (one.lengths.motor, one.lengths.diameter)
-        if pitch is not None and key not in found and one.lengths.diameter <= pitch + 1e-9:
-            found[key] = crosstalk_ratio(one.variant, 1e-3 * pitch, spread=False).middle
-    return np.array([found.get((one.lengths.motor, one.lengths.diameter), np.nan) for one in made])
+    """Return the ratio of each geometry at the pitch, or where units touch, without its range; NaN without a pitch."""
+    pitch, known = target.wish.pitch_mm, dict[tuple[str, float], float]()
+    ratios = np.full(len(made), np.nan)
+    for i, one in enumerate(made if pitch is not None else ()):
+        key = one.lengths.motor, one.lengths.diameter
+        if key not in known:
+            distance = max(pitch or 0.0, one.lengths.diameter)
+            known[key] = crosstalk_ratio(one.variant, 1e-3 * distance, spread=False).middle
+        ratios[i] = known[key]
+    return ratios

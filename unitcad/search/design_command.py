@@ -11,9 +11,7 @@ from rich.text import Text
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
 from unitcad.files import seen_from
-from unitcad.search import design_files
-from unitcad.search import design_words as words
-from unitcad.search.design_words import explanation_lines
+from unitcad.search import design_files, design_text
 from unitcad.search.explanation import explain as explained
 from unitcad.search.proposals import invert
 from unitcad.search.target_file import load_target
@@ -34,9 +32,8 @@ def design(
     """From a wish to designs: try everything at hand and rank it.
 
     Each proposal has its probability of meeting the level at the edge, with a range, and what no measurement covers.
-    The last line printed is the folder: ranking.csv, front.svg, design.md, design.html, and specs to build.
+    The last line printed is the folder: the page design.html, ranking.csv, and specs to build.
     """
-
     wish = load_target(target)
     if explain is None:
         design_files.check_out(out)
@@ -51,7 +48,7 @@ def design(
         if as_json:
             print_json(reasons)
         else:
-            for line in explanation_lines(reasons):
+            for line in design_text.explanation_lines(reasons):
                 console().print(line, soft_wrap=True)
         return
     data = design_files.with_files(made.data, seen_from(folder))
@@ -63,20 +60,13 @@ def design(
 
 
 def _print(data: dict[str, Any]) -> None:
-
     screen = console()
-    screen.print(Text.assemble((data["name"], "bold"), f": {words.wish_line(data['wish'])}"), soft_wrap=True)
-    screen.print(f"  {words.tried_line(data)}", soft_wrap=True)
-    screen.print(f"  {words.models_line(data)}", soft_wrap=True)
-    other = words.first_other(data["proposals"])
-    for one in data["proposals"]:
-        if one["rank"] == other:
-            screen.print(f"{words.OTHERS}:", soft_wrap=True)
-        screen.print(Text(f"{one['rank']}. {words.title(one)}", style="bold"), soft_wrap=True)
-        screen.print(f"   {words.level_line(one)}", soft_wrap=True)
-        for line in [words.size_line(one), *words.reasons(one)]:
-            screen.print(f"   - {line}", soft_wrap=True)
-    for line in [*words.left_out_lines(data), *words.not_castable_lines(data)]:
+    screen.print(Text.assemble((data["name"], "bold"), f": {design_text.wish_line(data['wish'])}"), soft_wrap=True)
+    lines: list[str | Text] = [f"  {line}" for line in design_text.head_lines(data)]
+    for i, one in enumerate(data["proposals"]):
+        lines += [f"{design_text.OTHERS}:"] if design_text.is_first_other(data["proposals"], i) else []
+        lines += [Text(design_text.title(one), style="bold"), f"   {design_text.level_line(one)}"]
+        lines += [f"   - {line}" for line in design_text.lines(one)]
+    lines += [*design_text.left_out_lines(data), *([data["decides"]] if data["decides"] else [])]
+    for line in lines:
         screen.print(line, soft_wrap=True)
-    if data["decides"]:
-        screen.print(data["decides"], soft_wrap=True)

@@ -1,4 +1,4 @@
-"""A result's folder: ranking.csv, front.svg, design.md, design.html, design.json and a spec for each proposal."""
+"""A result's folder: the ranking, the page, the same as Markdown and as JSON, charts, and a spec for each proposal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import io
 import json
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -15,24 +16,32 @@ import numpy as np
 
 from unitcad import files
 from unitcad.errors import UnitcadError
+from unitcad.export.chart import Series, chart
 from unitcad.pipeline import write as folders
 from unitcad.pipeline.variant import Variant
-from unitcad.search import design_words as words
-from unitcad.search.design_page import design_page
-from unitcad.search.front_plot import front_svg, quantities
-from unitcad.search.geometries import Say
+from unitcad.report.plain_page import drawing, plain_page
+from unitcad.search import design_text
+from unitcad.search.candidates import Candidates, Say
+from unitcad.search.limits import limits
 from unitcad.search.proposals import Inversion, name_of
-from unitcad.search.ranking_order import ordered
-from unitcad.search.wishes import limits
+from unitcad.search.ranking import ordered
 from unitcad.spec import to_toml
 from unitcad.text import cell, markdown, number
 
 SPECS = "specs"
-OWN = ("ranking.csv", "front.svg", "design.md", "design.html", "design.json", SPECS)
+_QUANTITIES = {
+    "mass_g": "mass, g",
+    "cure_hours": "hours until it is out of the mould",
+    "height_mm": "height, mm",
+    "diameter_mm": "diameter, mm",
+    "crosstalk": "crosstalk ratio",
+}
+"""Columns of the candidates, of which less may cost probability."""
 _COLUMNS = (
     "place", "proposal", "name", "design", "motor", "materials", "walls_mm", "caps_mm", "diameter_mm", "height_mm",
     "mass_g", "cure_hours", "crosstalk_ratio", "probability", "edge_p10", "edge_p50", "edge_p90", "measured", "over",
 )  # fmt: skip
+_NUMBER = ' class="number"'
 
 
 def folder_of(name: str, out: Path) -> Path:
@@ -42,39 +51,23 @@ def folder_of(name: str, out: Path) -> Path:
 
 
 def check_out(out: Path) -> None:
-    """Raise UnitcadError, before the work, for a file where the result's folder is to go."""
+    """Raise UnitcadError, before the work, if a file is in the place of the result's folder."""
     if out.exists() and not out.is_dir():
         raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o")
 
 
 def contents(made: Inversion, folder: str, say: Say = lambda stage: None) -> dict[str, bytes]:
-    """Return the files by name; `folder` is how they are seen from where the commands run."""
+    """Return the files by name; `folder` is their path from where the commands run."""
     say("files")
     data = with_files(made.data, folder)
-    panels = quantities(made.found, made.rows)
-    names = {"mass, g": "mass_g", "hours until it is out of the mould": "cure_hours", "height, mm": "height_mm"}
-    names |= {"diameter, mm": "diameter_mm"}
-
-    def value(one: Mapping[str, Any], quantity: str) -> float:
-        return one["crosstalk"]["value"] if quantity == "crosstalk ratio" else one[names[quantity]]
-
-    marked = [
-        (str(one["rank"]), one["probability"], [value(one, panel.name) for panel in panels])
-        for one in data["proposals"]
-    ]
-    front = front_svg(made.found, made.rows, marked)
-    narrow = front_svg(made.found, made.rows, marked, columns=1)
-    sections = [Variant(spec).section() for spec in made.specs]
-    specs = {
-        f"{SPECS}/{Path(one['file']).name}": to_toml(spec)
-        for one, spec in zip(data["proposals"], made.specs, strict=True)
-    }
+    specs = {Path(one["file"]).name: spec for one, spec in zip(data["proposals"], made.specs, strict=True)}
+    charts = front_charts(made)
     texts = {
-        **specs,
+        **{f"{SPECS}/{name}": to_toml(spec) for name, spec in specs.items()},
+        **charts,
         "ranking.csv": ranking(made),
-        "front.svg": front,
-        "design.md": page(data),
-        "design.html": design_page(data, (front, narrow), sections),
+        "design.md": page(data, charts),
+        "design.html": html_page(data, charts, [Variant(spec).section() for spec in made.specs]),
         "design.json": json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
     }
     return {name: text.encode() for name, text in texts.items()}
@@ -86,67 +79,147 @@ def with_files(data: Mapping[str, Any], folder: str) -> dict[str, Any]:
     return {**data, "proposals": proposals}
 
 
-def write(folder: Path, found: Mapping[str, bytes]) -> None:
-    """Put the files in place of an earlier result's, all or none; what else lies in the folder stays."""
+def write(folder: Path, made: Mapping[str, bytes]) -> None:
+    """Put the files in place of an earlier result's, all or none; other files in the folder stay."""
     folders.expect_folder(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     folders.clear_leftovers(folder.parent)
     with folders.replacing(folder) as fresh:
         (fresh / SPECS).mkdir()
-        for name, content in found.items():
+        for name, content in made.items():
             files.write_new(fresh / name, content)
-    for spec in (folder / SPECS).glob("[1-9]-*.toml"):
-        if f"{SPECS}/{spec.name}" not in found:  # of an earlier result
-            spec.unlink()
+    for earlier in [*folder.glob(f"{SPECS}/[1-9]-*.toml"), *folder.glob("front-*.svg")]:
+        if earlier.relative_to(folder).as_posix() not in made:
+            earlier.unlink()
 
 
 def ranking(made: Inversion) -> str:
     """Return every candidate as CSV: those within the limits in their order, then the others."""
-    found = made.found
+    found, asked, text = made.found, limits(made.found), io.StringIO()
     outside = np.setdiff1d(np.arange(found.count), made.rows)
-    low, middle, high = found.range
-    asked, text = limits(found), io.StringIO()
-    over = {int(row): [limit.key for limit in asked if not limit.met[row]] for row in outside}
-    numbers_of = {one["name"]: one["rank"] for one in made.data["proposals"]}
+    numbered = {one["name"]: one["rank"] for one in made.data["proposals"]}
+    columns = [found.diameter_mm, found.height_mm, found.mass_g, found.cure_hours, found.crosstalk, found.probability]
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
     for place, row in enumerate([*ordered(found, made.rows), *ordered(found, outside)], 1):
         lengths, name, own = found.lengths(row), name_of(found, int(row)), made.measured.get(int(row))
-        numbers = [found.diameter_mm, found.height_mm, found.mass_g, found.hours, found.crosstalk]
-        numbers += [found.probability, low, middle, high]
         writer.writerow(
             [
-                place if int(row) not in over else "",
-                numbers_of.get(name, ""),
+                place if place <= made.rows.size else "",
+                numbered.get(name, ""),
                 cell(name),
                 lengths.design,
                 cell(lengths.motor),
                 cell(" ".join(found.materials(row))),
                 " ".join(f"{wall:g}" for wall in lengths.walls),
                 " ".join(f"{cap:g}" for cap in lengths.caps),
-                *("" if np.isnan(each[row]) else number(each[row], 4) for each in numbers),
+                *("" if np.isnan(each[row]) else number(each[row], 4) for each in [*columns, *found.range]),
                 number(own["level"], 4) if own else "",
-                " ".join(over.get(int(row), [])),
+                " ".join(limit.key for limit in asked if not limit.met[row]),
             ]
         )
     return text.getvalue()
 
 
-def page(data: Mapping[str, Any]) -> str:
+def front(found: Candidates, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the rows that no other one beats in both: a higher probability and a smaller value; by rising value."""
+    order = rows[np.lexsort((rows, -found.probability[rows], values[rows]))]
+    best = np.maximum.accumulate([-1.0, *found.probability[order]])
+    return order[found.probability[order] > best[:-1] + 1e-9]
+
+
+def front_charts(made: Inversion) -> dict[str, str]:
+    """Return a chart of the probability over each quantity of which less costs probability, by file name."""
+    found, rows, proposals, charts = made.found, made.rows, made.data["proposals"], {}
+    for key, name in _QUANTITIES.items():
+        values = getattr(found, key)
+        best = front(found, rows, values)
+        if np.all(np.isfinite(values[rows])) and best.size > 1:
+            own = [one[key]["value"] if key == "crosstalk" else one[key] for one in proposals]
+            series = [
+                Series("candidates", values[rows], found.probability[rows], points=True),
+                Series("front: nothing is better in both", values[best], found.probability[best]),
+                Series("proposals", own, [one["probability"] for one in proposals], points=True),
+            ]
+            charts[f"front-{key}.svg"] = chart(series, f"{rows.size} candidates", name, "probability of the level")
+    return charts
+
+
+def page(data: Mapping[str, Any], charts: Mapping[str, str]) -> str:
     """Return the result as Markdown."""
-    lines = [f"# {markdown(data['name'])}: {words.wish_line(data['wish'])}", ""]
-    lines += [f"{words.tried_line(data)}; {words.models_line(data)}.", ""]
-    other = words.first_other(data["proposals"])
-    for one in data["proposals"]:
-        if one["rank"] == other:
-            lines += [f"*{words.OTHERS}.*", ""]
-        lines += [f"## {one['rank']}. {markdown(words.title(one))}", "", f"**{markdown(words.level_line(one))}**", ""]
-        lines += [f"- {markdown(line)}" for line in [words.size_line(one), *words.reasons(one)]]
-        lines += [f"- build it: `unitcad build {shlex.quote(one['file'])}`", ""]
+    made = [f"# {markdown(data['name'])}: {design_text.wish_line(data['wish'])}", ""]
+    made += [f"{'; '.join(design_text.head_lines(data))}.", ""]
+    for i, one in enumerate(data["proposals"]):
+        if design_text.is_first_other(data["proposals"], i):
+            made += [f"*{design_text.OTHERS}.*", ""]
+        made += [f"## {markdown(design_text.title(one))}", "", f"**{markdown(design_text.level_line(one))}**", ""]
+        made += [f"- {markdown(line)}" for line in design_text.lines(one)]
+        made += [f"- build it: `unitcad build {shlex.quote(one['file'])}`", ""]
     if data["decides"]:
-        lines += ["## What would decide", "", markdown(data["decides"]), ""]
-    lines += ["## What pulls apart", "", "![probability of the level over mass, time and size](front.svg)", ""]
-    besides = [*words.left_out_lines(data), *words.not_castable_lines(data)]
-    if besides:
-        lines += ["## Left out", "", *(f"- {markdown(line)}" for line in besides), ""]
-    return "\n".join(lines)
+        made += ["## The best two", "", markdown(data["decides"]), ""]
+    made += [f"![probability of the level]({name})\n" for name in charts]
+    if left_out := design_text.left_out_lines(data):
+        made += ["## Left out", "", *(f"- {markdown(line)}" for line in left_out), ""]
+    return "\n".join(made)
+
+
+def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequence[str]) -> str:
+    """Return the page of a result; `sections`: the SVG of each proposal."""
+    tried, models = (escape(line) for line in design_text.head_lines(data))
+    refused = [
+        f"{one['what']}: {one['count']} sets of lengths refused, first {one['first']}"
+        for one in data["tried"]["refused"]
+    ]
+    proposals = zip(data["proposals"], sections, strict=True)
+    body = [
+        f'<div class="top"><div><h1>{escape(data["name"])}</h1>',
+        f'<p class="line">{escape(design_text.wish_line(data["wish"]))}</p></div></div>',
+        f"<section><h2>Proposals</h2>{_table(data['proposals'])}",
+        f'<p class="note">Levels in per cent of the motor; mm: diameter x height. The {models}. The probability is '
+        "that of meeting the level; it counts what the models missed on measured units, not that a unit has never been "
+        f"made.</p><p>{escape(data['decides'] or '')}</p></section>",
+        *(
+            f'<section id="proposal-{one["rank"]}"><h2>{escape(design_text.title(one))}</h2>'
+            f"<p><strong>{escape(design_text.level_line(one))}</strong></p>{_list(design_text.lines(one))}"
+            f"{drawing(section, 'section of ' + one['label'])}"
+            f"<p>Build it: <code>unitcad build {escape(shlex.quote(one['file']))}</code></p></section>"
+            for one, section in proposals
+        ),
+        "<section><h2>Less costs probability</h2>",
+        *(drawing(svg, "probability of the level, with the front") for svg in charts.values()),
+        f"</section><section><h2>Tried</h2><p>{tried}. All of them are in ranking.csv.</p>",
+        f"{_list([*design_text.left_out_lines(data), *refused])}</section>",
+    ]
+    return plain_page(f"{data['name']}: designs", "\n".join(body))
+
+
+def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
+    rows, head = [], ("unit", "measured", "probability", "10 to 90 %", "g", "hours", "mm")
+    for i, one in enumerate(proposals):
+        edge, measured = one["edge"], one["measured"]
+        outside = "" if not measured or measured["meets"] else ", outside"
+        cells = [
+            design_text.percent(measured["level"]) + outside if measured else "",
+            f"{one['probability']:.2f}",
+            f"{design_text.percent(edge['p10'])} to {design_text.percent(edge['p90'])}",
+            number(one["mass_g"], 2),
+            number(one["cure_hours"], 3),
+            f"{number(one['diameter_mm'], 3)} x {number(one['height_mm'], 3)}",
+        ]
+        if design_text.is_first_other(proposals, i):
+            rows.append(f'<tr><td colspan="{len(head)}">{escape(design_text.OTHERS)}</td></tr>')
+        numbers = "".join(
+            f'<td{_NUMBER} data-head="{escape(name)}">{escape(text)}</td>'
+            for name, text in zip(head[1:], cells, strict=True)
+        )
+        link = f'<a href="#proposal-{one["rank"]}">{escape(design_text.title(one))}</a>'
+        rows.append(f"<tr><td>{link}</td>{numbers}</tr>")
+    heads = "".join(f"<th{_NUMBER if i else ''}>{escape(name)}</th>" for i, name in enumerate(head))
+    return (
+        '<div class="scroll" tabindex="0" role="region" aria-label="proposals"><table class="stacked">'
+        f"<thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+    )
+
+
+def _list(made: Sequence[str]) -> str:
+    return f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in made)}</ul>" if made else ""

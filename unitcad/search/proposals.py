@@ -1,48 +1,60 @@
-"""From a target to proposals as JSON-ready data: the best of each kind, judged, with what speaks for and against it."""
+"""From a target to proposals as JSON-ready data: the best of each kind, cast in thought, with what speaks for it."""
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtr, stdtrit
 
 from unitcad.attenuation.crosstalk import RANGE as CROSSTALK_RANGE
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.predictive import Stack, stack_of
+from unitcad.attenuation.edge.predictive import Predictive, Stack, stack_of
+from unitcad.attenuation.edge.variant_units import stacked
 from unitcad.casting.figures import MOST_ERROR_PCT, mix
 from unitcad.catalogue import materials as silicones
 from unitcad.catalogue import measurements
+from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
-from unitcad.search.best_two import best_two
-from unitcad.search.candidates import Candidates, candidates, probability_by_model
-from unitcad.search.castability import Verdict, castability
-from unitcad.search.geometries import Lengths, Say, spec_data
-from unitcad.search.nearest_wish import check_possible
-from unitcad.search.own_measurement import measured_rows, measurement
-from unitcad.search.ranking_order import ALIKE, Kind, kinds
-from unitcad.search.refinement import alone, refined
-from unitcad.search.reliance import length_notes, reliance
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.search.candidates import (
+    Candidates,
+    Lengths,
+    Say,
+    candidates,
+    geometry_of,
+    probability_by_model,
+    tabulate,
+)
+from unitcad.search.limits import check_possible, label, limits, within
+from unitcad.search.ranking import ALIKE, Kind, kinds, measured_rows, measurement, novelty, unmeasured
 from unitcad.search.target_file import Target
-from unitcad.search.wishes import label, limits, within
 from unitcad.spec import Spec
 from unitcad.text import listed, number
-from unitcad.validation import from_data, warnings
+from unitcad.validation import warnings
 
 SHOWN = 5
-LEAST_SHOWN = 0.005
-"""A kind whose probability is smaller, 0.00 with two digits, is no proposal."""
-TRIES = 3
+_LEAST_SHOWN = 0.005
+"""A kind with a smaller probability, 0.00 with two digits, is no proposal."""
+_TRIES = 3
 """Candidates of a kind that are judged until one can be cast."""
+_FINE_STEPS = (0.1, 0.05)
+"""Steps of walls and caps between those of the grid, and half those of diameters, mm: the printers' play is larger."""
+_SAME_LEVEL = 0.05
+"""Levels whose expected ratio is nearer to one are the same for a purpose: half of a reading's own noise of 10 %."""
+_OPEN, _SURE = 0.55, 0.99
+"""Below the first probability the order of two levels is open; from the second on no measurement is needed for it."""
 
 
 @dataclass(frozen=True)
 class Inversion:
-    """What was found: every candidate, the rows within the limits, the specs of the proposals, all as data.
+    """The result: every candidate, the rows within the limits, the specs of the proposals, all as data.
 
     `measured`: the measurements of rows that were measured themselves.
     """
@@ -57,20 +69,18 @@ class Inversion:
 def invert(target: Target, check: bool = True, say: Say = lambda stage: None) -> Inversion:
     """Try everything at hand, and return the best with their reasons; without `check` no moulds are drawn.
 
-    The same target gives the same data. Raises Refusal, with the nearest that is possible, where a limit or the level
-    can't be met.
+    The same target gives the same data. Raises Refusal, with the nearest accepted values, if nothing meets the target.
     """
     found = candidates(target, say)
-    rows = within(found)
-    measured = measured_rows(found, rows)
-    check_possible(found, rows, measured)
+    rows, measured = within(found), measured_rows(found)
+    check_possible(found, measured)
     chosen, out = _chosen(found, _ranked(found, rows, measured), check, say)
     if not chosen:
         limit = f"none of the best can be cast: {out[0]['candidate']}: {out[0]['failed'][0]}"
         raise Refusal("at_hand.printer", target.asked.at_hand.printer, limit)
-    specs = tuple(one.spec for one in chosen)
-    say("what would decide between the best two")
-    decides, decision = best_two(target, specs, [one.data for one in chosen])
+    specs = tuple(spec for spec, _ in chosen)
+    proposals = [{**one, "rank": i} for i, (_, one) in enumerate(chosen, 1)]
+    decides, decision = best_two(target, specs, proposals)
     data = {
         "name": target.name,
         "wish": {key: value for key, value in _wish(target).items() if value is not None},
@@ -79,17 +89,17 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
             "geometries": int(np.unique(found.geometry).size),
             "within_limits": int(rows.size),
             "refused": [
-                {"what": what, "count": one.count, "first": one.first} for what, one in sorted(found.refused.items())
+                {"what": what, "count": len(why), "first": why[0]} for what, why in sorted(found.refused.items())
             ],
         },
         "models": models_block(target),
-        "left_out": found.silicones.left_out,
-        "proposals": [one.data for one in chosen],
+        "left_out": found.left_out,
+        "proposals": proposals,
         "not_castable": out,
         "decides": decides,
         "decision": decision,
     }
-    return Inversion(found, rows, specs, rounded(data), measured_rows(found, np.arange(found.count)))
+    return Inversion(found, rows, specs, rounded(data), measured)
 
 
 def models_block(target: Target) -> dict[str, Any]:
@@ -102,54 +112,100 @@ def models_block(target: Target) -> dict[str, Any]:
     return {"weights": weights, "without_weight": left_out, "by": by}
 
 
-@dataclass(frozen=True)
-class _Chosen:
-    spec: Spec
-    data: dict[str, Any]
-
-
-def _chosen(found: Candidates, ranked: list[Kind], check: bool, say: Say) -> tuple[list[_Chosen], list[dict[str, Any]]]:
-    """Return the best of each kind that can be cast, at most `SHOWN`, and what was judged and fell out."""
-    chosen: list[_Chosen] = []
+def _chosen(
+    found: Candidates, ranked: Sequence[Kind], check: bool, say: Say
+) -> tuple[list[tuple[Spec, dict[str, Any]]], list[dict[str, Any]]]:
+    """Return the best of each kind that can be cast, at most `SHOWN`, and the candidates that can't be cast."""
+    chosen: list[tuple[Spec, dict[str, Any]]] = []
     out: list[dict[str, Any]] = []
     for kind in ranked:
-        if len(chosen) == SHOWN or (chosen and kind.most < LEAST_SHOWN):
+        if len(chosen) == SHOWN or (chosen and kind.most < _LEAST_SHOWN):
             break
         say(f"{len(chosen) + 1} of {SHOWN}: {label(found, kind.best)}")
-        tried = [(found, int(row)) for row in kind.rows[:TRIES]]
+        tried = [(found, int(row)) for row in kind.rows[:_TRIES]]
         if kind.most - kind.least > ALIKE and (better := refined(found, kind.best)):
             tried.insert(0, (better, 0))
         for table, row in tried:
-            spec = from_data(spec_data(found.target, table.lengths(row), table.materials(row), name_of(table, row)))
-            verdict = castability(spec) if check else Verdict(0, ())
-            if verdict.castable:
-                checked = verdict.checked if check else None
-                data = proposal(table, row, spec, kind, len(chosen) + 1, checked, refined=table is not found)
-                chosen.append(_Chosen(spec, data))
+            spec = table.spec(row, name_of(table, row))
+            checked, failed = castability(spec) if check else (None, [])
+            if not failed:
+                chosen.append((spec, proposal(table, row, spec, kind, checked, table is not found)))
                 break
-            out.append({"name": spec.name, "candidate": label(table, row), "failed": list(verdict.failed)})
-    chosen.sort(key=lambda one: one.data["nearest_other"])  # a refined one may have become a proposal
-    return [replace(one, data={**one.data, "rank": i}) for i, one in enumerate(chosen, 1)], out
+            out.append({"name": spec.name, "candidate": label(table, row), "failed": failed})
+    return sorted(chosen, key=lambda one: one[1]["nearest_other"]), out  # a refined one may have become a proposal
+
+
+def castability(spec: Spec) -> tuple[int, list[str]]:
+    """Draw the moulds of a spec; return how many places were checked, and a sentence with its code for each fault."""
+    try:
+        every = check_moulds(MouldSet(spec))
+    except Refusal as refusal:
+        return 0, [str(refusal)]
+    failed = [one for one in every if not one.ok]
+    return len(every), [
+        f"{one.code} {one.where}: {one.value:.3g} against {one.limit:.3g} {one.unit}".rstrip() for one in failed
+    ]
+
+
+def refined(found: Candidates, row: int) -> Candidates | None:
+    """Return the best candidate between the grid's steps around a row; None if it gains less than `ALIKE`.
+
+    A pattern search by one or two lengths at a time, within the target's ranges and limits.
+    """
+    materials = found.materials(row)
+    best = found.alone(found.lengths(row), materials)
+    for step in _FINE_STEPS:
+        while True:
+            made = []
+            for lengths in _around(found.target, best.lengths(0), step):
+                try:
+                    made.append(geometry_of(found.target, lengths))
+                except Refusal:
+                    continue
+            table = tabulate(found.target, made, found.silicones, only=materials) if made else best
+            rows = within(table)
+            top = int(rows[np.argmax(table.probability[rows])]) if rows.size else 0
+            if not rows.size or table.probability[top] < best.probability[0] + 1e-4:
+                break
+            best = found.alone(table.lengths(top), materials)
+    return best if best.probability[0] > found.probability[row] + ALIKE else None
+
+
+def _around(target: Target, at: Lengths, step: float) -> Iterator[Lengths]:
+    """Yield the lengths whose walls, caps and diameter, as far as they vary, differ by a step in one or two."""
+    vary, count = target.asked.vary, len(at.walls)
+    own_caps = at.caps if vary.cap_mm else ()
+    start = [*at.walls, *own_caps, *([at.diameter] if vary.diameter_mm else [])]
+    ends = [vary.walls(count)] * count + [vary.cap_mm] * len(own_caps) + [vary.diameter_mm]
+    steps = [step] * (count + len(own_caps)) + [2 * step]
+    for moved in itertools.chain(*(itertools.combinations(range(len(start)), n) for n in (1, 2))):
+        for signs in itertools.product((-1, 1), repeat=len(moved)):
+            values = list(start)
+            for i, sign in zip(moved, signs, strict=True):
+                values[i] = round((round(start[i] / steps[i]) + sign) * steps[i], 6)
+            if all(low <= value <= high for value, (low, high) in zip(values, ends, strict=False)):  # type: ignore[misc]
+                walls = tuple(values[:count])
+                caps = tuple(values[count : count + len(own_caps)]) if own_caps else walls if at.caps else ()
+                yield replace(at, walls=walls, caps=caps, diameter=values[-1] if vary.diameter_mm else at.diameter)
 
 
 def _is_other(found: Candidates, probability: float, measured: Mapping[str, Any] | None) -> bool:
     """Tell whether a candidate is no proposal but one of the nearest others.
 
-    It was measured outside the wish, or is less probable than is asked for and was not measured within it.
+    It was measured outside the target, or is less probable than is asked for and was not measured within it.
     """
     return not measured["meets"] if measured else probability < found.target.wish.probability_min
 
 
 def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[str, Any]]) -> list[Kind]:
-    """Return the kinds in their order, those measured within the wish first, the nearest others last.
+    """Return the kinds in their order, those measured within the target first, the nearest others last.
 
-    A measured unit within the wish stands for its kind where the kind's best is less probable than is asked for.
+    A measured unit within the target stands for its kind if the kind's best is less probable than is asked for.
     """
-    least = found.target.wish.probability_min
     made = []
     for kind in kinds(found, rows):
         inside = [int(row) for row in kind.rows if measured.get(int(row), {}).get("meets")]
-        if inside and found.probability[kind.best] < least:
+        if inside and found.probability[kind.best] < found.target.wish.probability_min:
             kind = replace(kind, rows=np.array([*inside, *(row for row in kind.rows if row not in inside)]))
         made.append(kind)
 
@@ -161,15 +217,14 @@ def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[
 
 
 def proposal(
-    found: Candidates, row: int, spec: Spec, kind: Kind, rank: int, checked: int | None, refined: bool
+    found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None, is_refined: bool
 ) -> dict[str, Any]:
-    """Return a candidate as data: what it is, its probability and range, its measurement, limits, what it relies on."""
-    variant, lengths = estimate_input(spec), found.lengths(row)
+    """Return a candidate as data: what it is, its probability and range, its measurement, limits, unmeasured inputs."""
+    variant, lengths, wish = estimate_input(spec), found.lengths(row), found.target.wish
     low, middle, high = (float(end[row]) for end in found.range)
-    each, wish = probability_by_model(found.target, found.predictive), found.target.wish
+    by_model = probability_by_model(found.target, found.predictive)[row]
     measured = measurement(found.target, variant)
     data: dict[str, Any] = {
-        "rank": rank,
         "name": spec.name,
         "label": label(found, row),
         "design": lengths.design,
@@ -181,19 +236,19 @@ def proposal(
         "nearest_other": _is_other(found, float(found.probability[row]), measured),
         "probability_min": wish.probability_min,
         "probability": float(found.probability[row]),
-        "by_model": dict(zip(found.predictive.models, map(float, each[row]), strict=True)),
+        "by_model": dict(zip(found.predictive.models, map(float, by_model), strict=True)),
         "edge": {"p10": low, "p50": middle, "p90": high},
         "diameter_mm": float(found.diameter_mm[row]),
         "height_mm": float(found.height_mm[row]),
         "mass_g": float(found.mass_g[row]),
-        "cure_hours": float(found.hours[row]),
-        "refined": refined,
+        "cure_hours": float(found.cure_hours[row]),
+        "refined": is_refined,
         "within": [limit.shown(row) for limit in limits(found)],
         "checks": checked,
-        "lengths_measured": not length_notes(found, lengths),
-        "relies_on": reliance(found, row),
-        "lengths_gain": _gain(kind, refined),
-        "remarks": [*warnings(spec), *_scale(spec, found, row)],
+        "lengths_measured": not novelty(found)[row],
+        "relies_on": unmeasured(found, row),
+        "lengths_gain": _gain(kind, is_refined),
+        "remarks": [*warnings(spec), *_scale(spec)],
     }
     if wish.pitch_mm is not None:
         ratio = crosstalk_ratio(variant, 1e-3 * wish.pitch_mm)
@@ -210,22 +265,26 @@ def proposal(
             data["remarks"].append(
                 f"the crosstalk ratio may reach {number(ratio.high or 0.0, 2)}: the body's range goes over the limit"
             )
-    if sibling := _sibling(found, row, data["measured"]):
+    if not measured and (sibling := _sibling(found, row)):
         data["measured_sibling"] = sibling
     return data
 
 
 def name_of(found: Candidates, row: int) -> str:
     """Return a candidate's name: its design, short names of silicones, walls."""
+    return name_from(found.target, found.lengths(row), found.materials(row))
+
+
+def name_from(target: Target, lengths: Lengths, materials: Sequence[str]) -> str:
+    """Return the name of a unit with these lengths and silicones."""
     short = {full: name.lower() for name, full in measurements().names.items()}
-    lengths = found.lengths(row)
-    parts = [lengths.design, *(short.get(name, name) for name in found.materials(row))]
+    parts = [lengths.design, *(short.get(name, name) for name in materials)]
     parts += [f"{wall:g}" for wall in lengths.walls]
     if lengths.caps and lengths.caps != lengths.walls:
         parts += ["caps", *(f"{cap:g}" for cap in lengths.caps)]
     if lengths.diameter != measurements().unit.diameter_mm:
         parts.append(f"d{lengths.diameter:g}")
-    if len(found.target.asked.at_hand.motors) > 1:
+    if len(target.asked.at_hand.motors) > 1:
         parts.append(lengths.motor.lower())
     return re.sub(r"[^a-z0-9.]+", "-", "-".join(parts).lower()).strip("-")[:110]
 
@@ -234,44 +293,88 @@ def _wish(target: Target) -> dict[str, Any]:
     return {key: getattr(target.wish, key) for key in target.wish.__struct_fields__}
 
 
-def _sibling(found: Candidates, row: int, measured: dict[str, Any] | None) -> dict[str, Any] | None:
-    """Return the measured unit of a candidate's kind where the candidate is not it: its level and probability."""
+def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
+    """Return the measured unit of a candidate's kind, its level and its probability; None if none was measured."""
     lengths, shared, names = found.lengths(row), measurements().unit, found.materials(row)
     walls = (2 * shared.wall_mm / len(names),) * len(names)
-    if measured or lengths.motor != shared.motor:
-        return None
     there = Lengths(lengths.design, lengths.motor, walls, walls if lengths.caps else (), shared.diameter_mm)
     try:
-        table = alone(found, there, names)
-        spec = from_data(spec_data(found.target, there, names, "measured"))
+        table = found.alone(there, names)
     except Refusal:
         return None
-    level = measurement(found.target, estimate_input(spec))
+    level = measurement(found.target, table.variant(0))
     return level and {**level, "label": label(table, 0), "probability": float(table.probability[0])}
 
 
-def _gain(kind: Kind, refined: bool) -> str:
-    """Say what the lengths change of a kind's probability; `refined`: the proposal lies between the steps."""
+def _gain(kind: Kind, is_refined: bool) -> str:
+    """Say how the lengths change a kind's probability; `is_refined`: the proposal lies between the steps."""
     if kind.rows.size < 2:
         return "its lengths are the only ones within the limits"
     of = f"{kind.rows.size} sets of lengths within the limits"
     if kind.most - kind.least < 1e-6:
         return f"lengths gain nothing: the probability is the same for all {of}"
-    return f"lengths change the probability from {kind.least:.2f} to {kind.most:.2f} over the {of}" + (
-        "; this one lies between the steps" if refined else ""
-    )
+    between = "; this one lies between the steps" if is_refined else ""
+    return f"lengths change the probability from {kind.least:.2f} to {kind.most:.2f} over the {of}{between}"
 
 
-def _scale(spec: Spec, found: Candidates, row: int) -> list[str]:
-    """Say where the scale is too coarse for the smaller part of a pour's mix."""
-    known = silicones(spec.materials)
-    poor = [
-        name
-        for name in dict.fromkeys(found.materials(row))
-        if mix(spec, known[name], 1.0).mix_error_pct > MOST_ERROR_PCT
-    ]
+def _scale(spec: Spec) -> list[str]:
+    """Say if the scale is too coarse for the smaller part of a pour's mix."""
+    known, names = silicones(spec.materials), dict.fromkeys(layer.material for layer in spec.layers)
+    poor = [name for name in names if mix(spec, known[name], 1.0).mix_error_pct > MOST_ERROR_PCT]
     if not poor:
         return []
-    digit = number(spec.casting.scale_resolution_g, 3)
-    least = number(spec.casting.minimum_mix_g, 3)
+    digit, least = number(spec.casting.scale_resolution_g, 3), number(spec.casting.minimum_mix_g, 3)
     return [f"a scale of {digit} g is off by more than {MOST_ERROR_PCT:g} % on a part of {least} g of {listed(poor)}"]
+
+
+def best_two(target: Target, specs: Sequence[Spec], data: Sequence[Mapping[str, Any]]) -> tuple[str | None, Any]:
+    """Return the sentence on the order of the first two proposals' levels, and the figures behind it.
+
+    None if there are not two. If one lab measured both, the sentence has the order by the measurements.
+    """
+    if len(specs) < 2:
+        return None, None
+    stack = stack_of(target.models, target.fit, target.asked.estimate.moduli)
+    both = [stack.predictive(stacked([estimate_input(spec)])) for spec in specs[:2]]
+    logs, below = both[0].centre[0] - both[1].centre[0], below_by_ranking(both)
+    figures = {
+        "ratios": dict(zip(stack.models, map(float, np.exp(logs)), strict=True)),
+        "weights": dict(zip(stack.models, map(float, stack.weights), strict=True)),
+        "first_below": below,
+    }
+    side, share = ("below", below) if below >= 0.5 else ("above", 1.0 - below)
+    expects = f"the ranking expects #1 {side} #2 ({'more than 99' if share > 0.995 else f'{100 * share:.0f}'} %)"
+    first, second = (one["measured"] for one in data[:2])
+    if first and second and first["by"].startswith("your lab") == second["by"].startswith("your lab"):
+        return f"{_by_measurement(first, second)}; by the models alone {expects}.", figures
+    ratio = float(np.exp(stack.weights @ logs))
+    if abs(np.log(ratio)) < _SAME_LEVEL and abs(data[0]["probability"] - data[1]["probability"]) <= ALIKE:
+        hours = " and ".join(number(one["cure_hours"], 3) for one in data[:2])
+        same = f"the ranking expects levels with a ratio of {number(ratio, 3)}"
+        return f"#1 and #2 are the same for your purpose: {same}. They are out of the mould in {hours} h.", figures
+    if share < _OPEN:
+        return f"The ranking can't tell which of #1 and #2 is lower ({100 * below:.0f} %).", figures
+    sure = ": no measurement is needed to order the two" if share >= _SURE else ""
+    return f"{expects[0].upper()}{expects[1:]}{sure}.", figures
+
+
+def _by_measurement(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
+    """Return the order of two measured units; each unit was measured once, and some levels are printed twice."""
+    one, other = ([level for level in (each["level"], each.get("also")) if level] for each in (first, second))
+    printed = [listed(f"{number(100 * level, 3)} %" for level in levels) for levels in (one, other)]
+    order = "which one is lower stays open"
+    if max(one) < min(other) or max(other) < min(one):
+        order = f"#{1 if max(one) < min(other) else 2} is the lower"
+    return f"#1 was measured at {printed[0]}, #2 at {printed[1]}: {order}"
+
+
+def below_by_ranking(both: Sequence[Predictive], points: int = 400) -> float:
+    """Return the probability that the first unit's level is the lower one, each model missing the two independently."""
+    first, second = both
+    shares = (np.arange(points) + 0.5) / points
+    each = [
+        np.mean(stdtr(df, (second.centre[0, k] - first.centre[0, k] + second.scale[0, k] * t) / first.scale[0, k]))
+        for k, df in enumerate(first.degrees_of_freedom)
+        for t in [stdtrit(df, shares)]
+    ]
+    return float(np.array(each) @ first.weights)
