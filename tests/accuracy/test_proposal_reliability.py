@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta
 
-from unitcad.accuracy import proposal_reliability as suite
+from benchmarks.accuracy import proposal_reliability as suite
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.edge.predictive import stack
 

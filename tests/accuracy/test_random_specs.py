@@ -12,7 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from unitcad.accuracy import extremes
+from benchmarks.accuracy import extremes
+from benchmarks.accuracy.runner import JOURNALS
 from unitcad.accuracy.outcomes import (
     BUILT,
     CIRCLE,
@@ -26,12 +27,11 @@ from unitcad.accuracy.outcomes import (
     refusal_of,
 )
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, random_spec, seeded_spec
-from unitcad.accuracy.runner import JOURNALS
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec.toml import text_of
 
 EXAMPLES = int(os.environ.get("UNITCAD_RANDOM_SPECS", "10"))
-"""Of both ranges; `unitcad accuracy --quick` builds forty more, the long study ten thousand."""
+"""Of both ranges; `python -m benchmarks.accuracy extremes --quick` builds forty more, the long study ten thousand."""
 
 
 class Drawn:
@@ -52,7 +52,7 @@ def specs(draw, ranges: Ranges):
     return random_spec(Drawn(draw), ranges)
 
 
-# Fine tolerances and large gangs take up to a minute each: the long study has them (unitcad accuracy extremes).
+# Fine tolerances and large gangs take up to a minute each: the suite extremes has them.
 COARSE = dataclasses.replace(EXTREME, tolerance_mm=(0.1, 0.2), cavities=(1, 2))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from unitcad.accuracy.proposal_reliability import left_out
+from benchmarks.accuracy.proposal_reliability import left_out
 from unitcad.attenuation.edge.answer import answer
 from unitcad.attenuation.edge.fitted_models import assessments
 from unitcad.attenuation.edge.measured_levels import measured_table

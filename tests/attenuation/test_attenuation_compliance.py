@@ -1,7 +1,6 @@
 """Surface compliance against 60-digit values, exact identities and refusals."""
 
 import json
-from importlib.resources import files
 
 import layered_mp
 import mpmath as mp
@@ -9,12 +8,13 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from unitcad.accuracy import thomson_haskell
+from benchmarks.accuracy import thomson_haskell
+from benchmarks.accuracy.stability import COMPLIANCE
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import Refusal
 
-CASES = json.loads((files("unitcad.accuracy") / "references" / "compliance.json").read_text("utf-8"))
+CASES = json.loads(COMPLIANCE.read_text("utf-8"))
 LIMIT = 1e-13
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unitcad.accuracy.hankel import DISC, OMEGA, RADII, cases
+from benchmarks.accuracy.hankel import DISC, OMEGA, RADII, cases
 from unitcad.attenuation.layered import kept as module
 from unitcad.attenuation.layered.kept import kept
 from unitcad.attenuation.layered.loads import Point, UniformDisc

@@ -39,7 +39,6 @@ MORE = [
     "coupon fdm-0.4",
     "cache ls --cache cache",
     "cache gc --cache cache",
-    "accuracy --help",
 ]
 
 

@@ -18,7 +18,6 @@ COMMANDS = {
     "design": "design",
     "estimate": "estimate",
     "experiments": "experiments",
-    "accuracy": "accuracy",
     "coupon": "coupon",
     "fit": "fit",
     "init": "init",

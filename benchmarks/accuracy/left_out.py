@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from unitcad.accuracy.result import Cell, Result, Say, Table
-from unitcad.accuracy.timing import interleaved, machine
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.result import Cell, Result, Say, Table
+from unitcad.accuracy.timing import interleaved
 from unitcad.cache import MemoryStore
 from unitcad.pipeline import plan as bodies
 from unitcad.pipeline.make import Progress, Subject

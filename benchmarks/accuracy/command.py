@@ -1,4 +1,4 @@
-"""unitcad accuracy."""
+"""The command `python -m benchmarks.accuracy [SUITE...]`."""
 
 from __future__ import annotations
 
@@ -9,39 +9,35 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.shared_options import AsJson
+from benchmarks.accuracy import runner
+from benchmarks.accuracy.result import markdown
+from unitcad.cli.output import form_of, print_json, progress, say_error
+from unitcad.errors import Missing, Refusal, UnitcadError
 
 
 def accuracy(
-    suites: Annotated[list[str] | None, typer.Argument(metavar="SUITE", help="Which suites; else all.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer cases: what CI runs.")] = False,
+    suites: Annotated[list[str] | None, typer.Argument(metavar="SUITE", help="Suites to run; default: all.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer cases: the suites as CI runs them.")] = False,
     specs: Annotated[
         int | None,
-        typer.Option(
-            min=40,
-            help="How many random specs the suite extremes takes, 3 % beyond the documented ranges; with all sweeps.",
-        ),
+        typer.Option(min=40, help="Number of random specs of the suite extremes, 3 % beyond the documented ranges."),
     ] = None,
     media: Annotated[
-        int | None,
-        typer.Option(min=10, max=90_000, help="How many random media the suite stability takes."),
+        int | None, typer.Option(min=10, max=90_000, help="Number of random media of the suite stability.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random media: another one, other media.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random media.")] = 0,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Where accuracy.md, its pages and accuracy.json go: docs; nowhere if quick."),
+        typer.Option(
+            "-o", "--out", help="Folder of accuracy.md, its pages and accuracy.json; default: docs, none if quick."
+        ),
     ] = None,
-    as_json: AsJson = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
     """Compute the tables of error against run time. Exit 1 when an error exceeds its promise.
 
-    Without a SUITE, those that need what this installation lacks are left out, each with the reason.
+    Without a SUITE, suites whose packages are not installed are left out, each with the reason.
     """
-    from unitcad.accuracy import runner
-    from unitcad.accuracy.result import markdown
-    from unitcad.cli.output import print_json, progress
-    from unitcad.errors import Missing, Refusal
-
     names = runner.chosen(suites or [])
     if specs is not None and names != ("extremes",):
         raise Refusal("SUITE", " ".join(names), "--specs goes with the suite extremes alone", "extremes")
@@ -88,3 +84,15 @@ def accuracy(
         typer.echo(f"{suite}: {promise.what}: {promise.value:g}, promised {promise.limit:g}", err=True)
     if broken:
         sys.exit(1)
+
+
+def main() -> None:
+    """Run the command; an error is one line and exit code 2."""
+    form = form_of(sys.argv)
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(accuracy)
+    try:
+        app(prog_name="python -m benchmarks.accuracy")
+    except UnitcadError as error:
+        say_error(error, form)
+        sys.exit(error.exit_code)

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.accuracy.measures import mesh_volume
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
-from unitcad.accuracy.timing import Timing, interleaved, machine
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.measures import mesh_volume
+from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
+from unitcad.accuracy.timing import Timing, interleaved
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline import Variant
 from unitcad.shape import Shape
