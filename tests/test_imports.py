@@ -16,8 +16,9 @@ from unitcad.validation import default_template, templates
 
 PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
+    {"accuracy"},
     {"cli"},
-    {"api", "accuracy", "serve"},
+    {"api", "serve"},
     {"sweeps", "search"},
     {"report"},
     {"pipeline"},

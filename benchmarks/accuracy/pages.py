@@ -19,6 +19,10 @@ computes all of it and writes these pages; `accuracy.json` holds the same number
 in one run: compare them within a table only, since seconds differ between machines. A star in a table marks the
 frontier: nothing in it is both faster and more exact. A plus after a commit: the code that ran had changes that this
 commit does not hold.
+
+`unitcad accuracy SPEC` measures error, bound and run time for one spec: its meshes at five tolerances, the response of
+the body at five rtols, the inputs that move the results most, and the time that a build saves by what it leaves out.
+Without SPEC it checks the bounds of random media and builds random specs.
 """
 
 

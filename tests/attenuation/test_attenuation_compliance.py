@@ -1,6 +1,7 @@
 """Surface compliance against 60-digit values, exact identities and refusals."""
 
 import json
+from pathlib import Path
 
 import layered_mp
 import mpmath as mp
@@ -9,11 +10,11 @@ import pytest
 from scipy import optimize
 
 from benchmarks.accuracy import thomson_haskell
-from benchmarks.accuracy.stability import COMPLIANCE
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import Refusal
 
+COMPLIANCE = Path(thomson_haskell.__file__).parent / "references" / "compliance.json"
 CASES = json.loads(COMPLIANCE.read_text("utf-8"))
 LIMIT = 1e-13
 

@@ -39,6 +39,7 @@ MORE = [
     "coupon fdm-0.4",
     "cache ls --cache cache",
     "cache gc --cache cache",
+    "accuracy --help",
 ]
 
 

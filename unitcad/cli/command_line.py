@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Annotated, Any, cast
 
 import typer
@@ -18,6 +19,7 @@ COMMANDS = {
     "design": "design",
     "estimate": "estimate",
     "experiments": "experiments",
+    "accuracy": "accuracy",
     "coupon": "coupon",
     "fit": "fit",
     "init": "init",
@@ -30,7 +32,7 @@ COMMANDS = {
     "serve": "serve",
     "cache": "cache",
 }
-"""The commands in the order of --help, and what each is called in its module."""
+"""The commands in the order of --help, and what each is called in its module, in `cli` or in the command's own room."""
 WrongArguments = cast(type[typer.BadParameter], typer.BadParameter.__mro__[2])
 """Typer's error of the command line itself, such as an unknown option: ClickException, its own or click's."""
 
@@ -53,7 +55,8 @@ def application(*commands: str) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     for name in commands:
-        command = getattr(import_module(f"unitcad.cli.{name}_command"), COMMANDS[name])
+        place = "unitcad.cli" if find_spec(f"unitcad.cli.{name}_command") else f"unitcad.{name}"
+        command = getattr(import_module(f"{place}.{name}_command"), COMMANDS[name])
         if isinstance(command, typer.Typer):
             app.add_typer(command, name=name)
         else:

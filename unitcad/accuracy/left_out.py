@@ -1,0 +1,49 @@
+"""What a build of a spec leaves out by what is asked for, and the time that it saves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from unitcad.accuracy.timing import Timing, interleaved
+from unitcad.cache import MemoryStore
+from unitcad.pipeline.make import Progress, Subject, forget
+from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.plan import OUTPUTS
+from unitcad.spec import Spec, with_formats
+
+Request = tuple[Sequence[str], Sequence[str], bool]
+"""Outputs, formats, checks."""
+EVERYTHING = "everything"
+REQUESTS: dict[str, Request] = {
+    EVERYTHING: (OUTPUTS, ("step", "stl", "3mf", "svg", "glb"), True),
+    "STL only": (OUTPUTS, ("stl",), True),
+    "STL, no checks": (("unit", "moulds"), ("stl",), False),
+    "unit only": (("unit",), ("stl",), True),
+    "estimate only": (("estimate",), ("stl",), True),
+}
+"""Without shaded pictures."""
+
+
+def time_requests(spec: Spec, requests: Mapping[str, Request], repeats: int) -> dict[str, Timing]:
+    """Return the time of each request, made from an empty store in this process; the value is its manifest."""
+    return interleaved({name: partial(_manifest, spec, request) for name, request in requests.items()}, repeats)
+
+
+def left_out_rows(spec: Spec) -> list[dict[str, Any]]:
+    """Return the time, how much less than for everything that is, and what was left out: a row for each request."""
+    requests = {EVERYTHING: REQUESTS[EVERYTHING], "as the spec asks": (OUTPUTS, spec.output.formats, True), **REQUESTS}
+    times = time_requests(spec, requests, 1)
+    whole = times[EVERYTHING].median
+    return [
+        {"request": name, "s": time.median, "saved_s": whole - time.median, "left_out": time.value["left_out"]}
+        for name, time in times.items()
+    ]
+
+
+def _manifest(spec: Spec, request: Request) -> Manifest:
+    only, formats, check = request
+    forget()
+    wanted = Subject(with_formats(spec, tuple(formats)))  # type: ignore[arg-type]
+    return wanted.make(only, check, MemoryStore(), Progress()).manifest
