@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from unitcad.accuracy.hankel_peers import adaptive
+from benchmarks.accuracy.hankel_peers import adaptive
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.crosstalk import Decays, crosstalk
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from unitcad.accuracy.mechanics_search import as_data, drawn_levels, unit_levels
+from benchmarks.accuracy.mechanics_search import as_data, drawn_levels, unit_levels
 from unitcad.attenuation.edge.measured_levels import measured_table
 
 FILE = Path(__file__).parent / "mechanics.json"

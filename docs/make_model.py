@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from unitcad.accuracy.plot import svg
-from unitcad.accuracy.result import Plot
+from benchmarks.accuracy.plot import svg
+from benchmarks.accuracy.result import Plot
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.bush import bush
 from unitcad.attenuation.edge.closed_form import Units

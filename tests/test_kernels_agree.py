@@ -92,7 +92,7 @@ def test_kernels_agree_on_bodies(name):
 
 
 IN_CI = (*shipped(), "chain")
-"""Templates that `unitcad accuracy --quick kernels` compares in the same way."""
+"""Templates that `python -m benchmarks.accuracy kernels --quick` compares in the same way."""
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ and the kinds of TOML files that it knows.
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -53,6 +54,7 @@ class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
 class _Room(Struct, frozen=True, forbid_unknown_fields=True):
     commands: dict[str, Command] = field(default_factory=dict)
     files: tuple[FileKind, ...] = ()
+    stored_spec: str = ""
 
 
 @cache
@@ -71,6 +73,11 @@ def load(reference: str) -> Any:
 def commands() -> dict[str, Command]:
     """Return the commands of the command line by name."""
     return {name: command for room in _rooms() for name, command in room.commands.items()}
+
+
+def stored_spec() -> Callable[[Path, str], str] | None:
+    """Return the function that reads a variant's spec in a batch's store, from the batch's folder and the variant's."""
+    return next((load(room.stored_spec) for room in _rooms() if room.stored_spec), None)
 
 
 def file_kinds() -> tuple[FileKind, ...]:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from unitcad.accuracy import hankel_peers
-from unitcad.accuracy.hankel import DISC, OMEGA, RADII, brute_force, cases, second_path
+from benchmarks.accuracy import hankel_peers
+from benchmarks.accuracy.hankel import DISC, OMEGA, RADII, brute_force, cases, second_path
 
 
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)

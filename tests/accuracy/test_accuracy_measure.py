@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from unitcad.accuracy import measure
-from unitcad.accuracy.synthetic_records import PLAIN, RATE, SCENARIOS, Scenario, synthetic
+from benchmarks.accuracy import measure
+from benchmarks.accuracy.synthetic_records import PLAIN, RATE, SCENARIOS, Scenario, synthetic
 
 
 def test_a_record_has_the_amplitude_it_states() -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.accuracy.level_scores import simulated
-from unitcad.accuracy.plot import LEGEND_LETTERS, svg
-from unitcad.accuracy.result import Plot
-from unitcad.accuracy.unexplained import NineLevels, unexplained
+from benchmarks.accuracy.level_scores import simulated
+from benchmarks.accuracy.plot import LEGEND_LETTERS, svg
+from benchmarks.accuracy.result import Plot
+from benchmarks.accuracy.unexplained import NineLevels, unexplained
 from unitcad.attenuation.edge.fitted_models import assessments
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.edge.scores import RANGE_HOLDS

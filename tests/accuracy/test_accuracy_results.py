@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from unitcad.accuracy import kernel_agreement, runner
-from unitcad.accuracy.accuracy_command import accuracy
-from unitcad.accuracy.pages import front
-from unitcad.accuracy.plot import svg
-from unitcad.accuracy.result import (
+from benchmarks.accuracy import kernel_agreement, runner
+from benchmarks.accuracy.command import accuracy
+from benchmarks.accuracy.pages import front
+from benchmarks.accuracy.plot import svg
+from benchmarks.accuracy.result import (
     Plot,
     Promise,
     Result,
@@ -70,7 +70,7 @@ def test_frontier_is_what_no_other_point_beats():
 
 def test_the_page_names_command_and_machine():
     text = markdown(RESULT, ["p.svg"])
-    assert "`unitcad accuracy stability --specs 9`; measured on: cores 2." in text
+    assert "`python -m benchmarks.accuracy stability --specs 9`; measured on: cores 2." in text
     assert "| y | - |" in text
     assert "2 promises, **1 broken**." in text
     assert "| broken | nan | 1 |" in text
@@ -216,7 +216,7 @@ def test_the_command_fails_on_a_broken_promise_alone(tmp_path: Path, monkeypatch
 @pytest.mark.long
 def test_stability_by_the_command_line():
     """CI runs all suites by the command line after the tests."""
-    command = [sys.executable, "-m", "unitcad", "accuracy", "stability", "--quick", "--json"]
+    command = [sys.executable, "-m", "benchmarks.accuracy", "stability", "--quick", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     (suite,) = json.loads(done.stdout)["suites"]

@@ -8,8 +8,8 @@ import pytest
 pytest.importorskip("build123d")
 pytest.importorskip("cadquery")
 
-from unitcad.accuracy import tessellation
-from unitcad.accuracy.measures import mesh_volume
+from benchmarks.accuracy import tessellation
+from benchmarks.accuracy.measures import mesh_volume
 from unitcad.accuracy.timing import timing
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Revolve

@@ -10,9 +10,9 @@ from scipy.integrate import quad
 from scipy.linalg import solve_circulant
 from scipy.stats import norm
 
-from unitcad.accuracy import cramer_rao
-from unitcad.accuracy.cramer_rao import amplitude_bound
-from unitcad.accuracy.synthetic_records import PLAIN, SCENARIOS
+from benchmarks.accuracy import cramer_rao
+from benchmarks.accuracy.cramer_rao import amplitude_bound
+from benchmarks.accuracy.synthetic_records import PLAIN, SCENARIOS
 
 TIME = np.arange(4000) / 2000
 

@@ -6,10 +6,10 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from unitcad.accuracy import extreme_responses
-from unitcad.accuracy.ball_reference import TooHard
-from unitcad.accuracy.extreme_responses import TOLERANCES, Row, cases, plot, promises, rows, summary, survey
-from unitcad.accuracy.hankel import DISC, RADII
+from benchmarks.accuracy import extreme_responses
+from benchmarks.accuracy.ball_reference import TooHard
+from benchmarks.accuracy.extreme_responses import TOLERANCES, Row, cases, plot, promises, rows, summary, survey
+from benchmarks.accuracy.hankel import DISC, RADII
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.loads import Point, UniformDisc

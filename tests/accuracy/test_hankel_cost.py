@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from unitcad.accuracy import hankel_cost
-from unitcad.accuracy.hankel import RADII, cases
+from benchmarks.accuracy import hankel_cost
+from benchmarks.accuracy.hankel import RADII, cases
 from unitcad.accuracy.timing import Timing
 
 FOREARM = cases()[0].medium

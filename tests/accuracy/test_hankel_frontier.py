@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from unitcad.accuracy import hankel_frontier
-from unitcad.accuracy.hankel import RADII, beside_fftlog, brute_force, cases
-from unitcad.accuracy.hankel_frontier import Best
+from benchmarks.accuracy import hankel_frontier
+from benchmarks.accuracy.hankel import RADII, beside_fftlog, brute_force, cases
+from benchmarks.accuracy.hankel_frontier import Best
 
 
 def test_fftlog_has_the_range_and_bias_that_come_nearest(monkeypatch):

@@ -7,8 +7,16 @@ import pytest
 
 pytest.importorskip("skfem")
 
-from unitcad.accuracy import runner
-from unitcad.accuracy.mechanics_search import AXES, drawn_levels, one_constant, search, searches, unit_levels, unit_spec
+from benchmarks.accuracy import runner
+from benchmarks.accuracy.mechanics_search import (
+    AXES,
+    drawn_levels,
+    one_constant,
+    search,
+    searches,
+    unit_levels,
+    unit_spec,
+)
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.mechanics.motor_level import level
 from unitcad.estimating import estimate_input

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import beta
 
-from unitcad.accuracy import proposal_reliability as suite
+from benchmarks.accuracy import proposal_reliability as suite
 from unitcad.attenuation.edge.measured_levels import measured_table
-from unitcad.attenuation.edge.predictive import stack
+from unitcad.attenuation.edge.predictive import HELD, stack
 
 THREE = ("crossings", "fitted", "paper")
 
@@ -70,3 +70,8 @@ def test_the_suite_runs_and_keeps_its_promises() -> None:
     searched = result.tables[-1].rows
     assert [row[0] for row in searched][1:] == ["differential evolution", "Optuna, TPE"]
     assert all(0.4 < row[1] <= 1.0 for row in searched)
+
+
+def test_how_many_ranges_held_is_counted_again() -> None:
+    for models, count in HELD.items():
+        assert sum(one.held for one in suite.left_out(models, measured_table())) == count

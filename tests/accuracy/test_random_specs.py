@@ -12,7 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from unitcad.accuracy import extremes
+from benchmarks.accuracy import extremes
+from benchmarks.accuracy.runner import JOURNALS
 from unitcad.accuracy.outcomes import (
     BUILT,
     CIRCLE,
@@ -25,13 +26,15 @@ from unitcad.accuracy.outcomes import (
     put_in,
     refusal_of,
 )
-from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, random_spec, seeded_spec
-from unitcad.accuracy.runner import JOURNALS
+from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, Seeded, random_spec, seeded_spec
+from unitcad.checks import check_moulds
 from unitcad.errors import Refusal, UnitcadError
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec.toml import text_of
+from unitcad.validation import from_data
 
 EXAMPLES = int(os.environ.get("UNITCAD_RANDOM_SPECS", "10"))
-"""Of both ranges; `unitcad accuracy --quick` builds forty more, the long study ten thousand."""
+"""Of both ranges; `python -m benchmarks.accuracy extremes --quick` builds forty more, the long study ten thousand."""
 
 
 class Drawn:
@@ -52,7 +55,7 @@ def specs(draw, ranges: Ranges):
     return random_spec(Drawn(draw), ranges)
 
 
-# Fine tolerances and large gangs take up to a minute each: the long study has them (unitcad accuracy extremes).
+# Fine tolerances and large gangs take up to a minute each: the suite extremes has them.
 COARSE = dataclasses.replace(EXTREME, tolerance_mm=(0.1, 0.2), cavities=(1, 2))
 
 
@@ -172,3 +175,23 @@ def test_an_interrupted_study_resumes(tmp_path, monkeypatch):
     journal.write_text("something else\n")
     with pytest.raises(UnitcadError, match="not a journal"):
         list(extremes._journalled(jobs, journal))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_lids_and_wires_keep_the_laws_or_are_refused(seed: int) -> None:
+    """From the documented ranges, with lids, resin and wires added: the nearest accepted values lead to a good set."""
+    data, choose = random_spec(Seeded(seed), DOCUMENTED), Seeded(1000 + seed)
+    data.setdefault("moulds", {}).update(pour=choose.pick(("open", "injected")), cavities=[1, 1])
+    data["moulds"]["printer"] = choose.pick(("fdm-0.4", "fdm-0.25", "sla"))
+    data.setdefault("output", {})["tolerance_mm"] = 0.02
+    if choose.whole(0, 2) == 0:
+        data.pop("fpcb", None)
+        data["wires"] = {"diameter_mm": choose.whole(20, 80) / 100, "count": choose.whole(1, 3)}
+    seen = set()
+    while (refusal := refusal_of(data)) is not None:
+        assert (refusal.field, refusal.limit) not in seen
+        seen.add((refusal.field, refusal.limit))
+        if refusal.nearest is None:
+            return
+        data = put_in(data, refusal.field, refusal.nearest)
+    assert [finding for finding in check_moulds(MouldSet(from_data(data))) if not finding.ok] == []

@@ -1,7 +1,7 @@
 """Surface compliance against 60-digit values, exact identities and refusals."""
 
 import json
-from importlib.resources import files
+from pathlib import Path
 
 import layered_mp
 import mpmath as mp
@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from unitcad.accuracy import thomson_haskell
+from benchmarks.accuracy import thomson_haskell
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import Refusal
 
-CASES = json.loads((files("unitcad.accuracy") / "references" / "compliance.json").read_text("utf-8"))
+COMPLIANCE = Path(thomson_haskell.__file__).parent / "references" / "compliance.json"
+CASES = json.loads(COMPLIANCE.read_text("utf-8"))
 LIMIT = 1e-13
 
 

@@ -10,7 +10,7 @@ import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
-from unitcad.accuracy.result import Plot, Result, markdown
+from benchmarks.accuracy.result import Plot, Result, markdown
 from unitcad.attenuation.curve import NO_RATIO
 from unitcad.attenuation.edge.closed_form import Section, Units
 from unitcad.attenuation.edge.estimate_summary import summary

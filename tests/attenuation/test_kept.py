@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from unitcad.accuracy.hankel import DISC, OMEGA, RADII, cases
+from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import kept as module
 from unitcad.attenuation.layered.kept import kept
 from unitcad.attenuation.layered.loads import Point, UniformDisc
+from unitcad.estimating import estimate_input
+from unitcad.validation import load as load_spec
+
+DISC = UniformDisc(3.5e-3)
+OMEGA = 2 * np.pi * 125.0
+RADII = np.array([0.5, 1, 2, 3, 4, 5, 7, 9, 12, 15, 20, 25, 30]) * 1e-3
 
 
 def _counted():
@@ -74,10 +80,10 @@ def test_a_small_result_of_large_arrays_is_not_kept():
 @pytest.mark.parametrize("load", [DISC, UniformDisc(3.5e-3, "radial"), Point("tangential")], ids=str)
 def test_a_response_at_radii_met_before_is_the_same_to_the_bit(load):
     """Others in between have all but the load, the radii, the depth or the path alike."""
-    case = cases()[0]
+    medium = body(estimate_input(load_spec("encapsulating")).tissue)
 
     def solved(load=load, r=RADII, z=0.0, rtol=1e-6):
-        found = case.medium.response(load, OMEGA, r, z=z, rtol=rtol)
+        found = medium.response(load, OMEGA, r, z=z, rtol=rtol)
         return np.stack([found.u_r, found.u_theta, found.u_z, found.error_r, found.error_theta, found.error_z])
 
     first = solved()

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("skfem")
 
-from unitcad.accuracy.mechanics_search import COMPONENTS, unit_levels
+from benchmarks.accuracy.mechanics_search import COMPONENTS, unit_levels
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.mechanics.unknowns import Draw
 

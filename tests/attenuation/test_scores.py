@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from unitcad.accuracy.level_scores import permutation_p, simulated, with_levels
+from benchmarks.accuracy.level_scores import permutation_p, simulated, with_levels
 from unitcad.attenuation.edge.fitted_models import (
     assess_all,
     assessments,

@@ -13,7 +13,7 @@ import pytest
 from scipy.io import wavfile
 from typer.testing import CliRunner
 
-from unitcad.accuracy.synthetic_records import Scenario, synthetic
+from benchmarks.accuracy.synthetic_records import Scenario, synthetic
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import read_campaign

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import curve_fit
 from scipy.stats import ttest_ind, ttest_rel
 
-from unitcad.accuracy.synthetic_records import LENGTH_S, PLAIN, RATE, Scenario, synthetic
+from benchmarks.accuracy.synthetic_records import LENGTH_S, PLAIN, RATE, Scenario, synthetic
 from unitcad.errors import Refusal
 from unitcad.lab.chains import paper
 from unitcad.lab.chains.chain import ChainTable, LineFit

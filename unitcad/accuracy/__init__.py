@@ -1,1 +1,1 @@
-"""Error against run time, and what holds at the extremes: every table of docs/accuracy/ is computed here."""
+"""The command `accuracy`: errors, bounds and run times of a spec, and the survey of random media and specs."""

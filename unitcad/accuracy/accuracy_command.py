@@ -1,90 +1,176 @@
-"""unitcad accuracy."""
+"""`unitcad accuracy`: errors and their bounds, measured here, for one spec or for random media and specs."""
 
 from __future__ import annotations
 
-import signal
 import sys
-from pathlib import Path
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import typer
+from rich.table import Table
 
-from unitcad.cli.shared_options import AsJson
+from unitcad.accuracy.amplification import amplifications, extremes
+from unitcad.accuracy.left_out import left_out_rows
+from unitcad.accuracy.meshes import mesh_rows
+from unitcad.accuracy.responses import response_rows
+from unitcad.accuracy.survey import survey_media, survey_specs
+from unitcad.cli.output import console, print_json, progress
+from unitcad.cli.shared_options import AsJson, Sets
+from unitcad.designs import design_of
+from unitcad.errors import Refusal
+from unitcad.estimating import estimate_input
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.validation import load
+
+_MEDIA, _SPECS = 20, 20
+_INPUTS = 8
+"""Inputs in the table of amplifications; JSON has all."""
+_MESHES = {
+    "tolerance_mm": "tolerance",
+    "triangles": "triangles",
+    "distance_mm": "distance, mm",
+    "distance_bound_mm": "bound",
+    "body": "worst",
+    "volume": "volume",
+    "volume_bound": "bound",
+    "s": "s",
+}
+_RESPONSE = {"rtol": "rtol", "error": "error", "bound": "bound", "over_bound": "of bound", "wavenumbers": "k", "s": "s"}
+_EXTREMES = {"what": "", "value": "value", "at": "at", "limit": "limit", "extreme": ""}
+_REQUESTS = {"request": "request", "s": "s", "saved_s": "saved", "left_out": "left out"}
+_MEDIA_HEADS = {
+    "responses": "responses",
+    "within_rtol": "within rtol",
+    "bounds_broken": "broken",
+    "over_bound": "of bound",
+    "longest_s": "longest, s",
+}
+_RANGES = ("ranges", "specs", "built", "refused", "faults", "longest_s")
 
 
 def accuracy(
-    suites: Annotated[list[str] | None, typer.Argument(metavar="SUITE", help="Which suites; else all.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer cases: what CI runs.")] = False,
-    specs: Annotated[
-        int | None,
-        typer.Option(
-            min=40,
-            help="How many random specs the suite extremes takes, 3 % beyond the documented ranges; with all sweeps.",
-        ),
+    spec: Annotated[
+        str | None, typer.Argument(metavar="SPEC", help="Template or TOML file of a unit; default: the survey.")
     ] = None,
+    sets: Sets = None,
     media: Annotated[
-        int | None,
-        typer.Option(min=10, max=90_000, help="How many random media the suite stability takes."),
+        int | None, typer.Option(min=1, max=90_000, help=f"Survey: number of random media; default: {_MEDIA}.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random media: another one, other media.")] = 0,
-    out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="Where accuracy.md, its pages and accuracy.json go: docs; nowhere if quick."),
+    specs: Annotated[
+        int | None, typer.Option(min=2, max=90_000, help=f"Survey: number of random specs; default: {_SPECS}.")
     ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Survey: seed of the random media and specs.")] = 0,
     as_json: AsJson = False,
 ) -> None:
-    """Compute the tables of error against run time. Exit 1 when an error exceeds its promise.
+    """Measure the errors of meshes and response, their bounds and what they cost. Exit 1 if an error exceeds its bound.
 
-    Without a SUITE, those that need what this installation lacks are left out, each with the reason.
+    With SPEC: error against time at five tolerances, the inputs that move the results most, and the parts that a build
+    leaves out. Without SPEC: the bounds of random media, and builds of random specs.
     """
-    from unitcad.accuracy import runner
-    from unitcad.accuracy.result import markdown
-    from unitcad.cli.output import print_json, progress
-    from unitcad.errors import Missing, Refusal
+    if spec is None:
+        if sets:
+            raise Refusal("--set", sets[0], "changes a spec: name one")
+        _survey(media or _MEDIA, specs or _SPECS, seed, as_json)
+        return
+    for option, value in (("--media", media), ("--specs", specs), ("--seed", seed or None)):
+        if value is not None:
+            raise Refusal(option, value, "is for the survey, which has no SPEC")
+    _one_spec(spec, sets, as_json)
 
-    names = runner.chosen(suites or [])
-    if specs is not None and names != ("extremes",):
-        raise Refusal("SUITE", " ".join(names), "--specs goes with the suite extremes alone", "extremes")
-    if media is not None and names != ("stability",):
-        raise Refusal("SUITE", " ".join(names), "--media goes with the suite stability alone", "stability")
-    if seed and media is None:
-        raise Refusal("--seed", seed, "goes with --media, which says how many")
-    count = specs if specs is not None else media
-    if count is not None and quick:
-        option = "--specs" if media is None else "--media"
-        raise Refusal("--quick", "set", f"does not go with {option}, which says how many; leave one out")
-    results = []
-    left_out: dict[str, str] = {}
-    folder = out if out is not None or quick else Path("docs")
-    if folder is not None:
-        runner.ready(folder)
-    for name in suites or ():
-        runner.check(name)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # worker processes end with us
-    for name in names:
-        try:
-            with progress(name) as say:
-                result = runner.run(name, quick, say, count, seed)
-        except Missing as missing:
-            if suites:
-                raise
-            left_out[name] = str(missing)
-            continue
-        except KeyboardInterrupt:
-            if count is not None:
-                typer.echo(f"{runner.JOURNALS[name]} keeps what is finished; the same command resumes", err=True)
-            raise
-        results.append(result)
-        if folder is not None:
-            runner.write([result], folder)  # an interrupted run keeps what it has
-        if not as_json:
-            typer.echo(markdown(result))
+
+def _one_spec(name: str, sets: Sequence[str] | None, as_json: bool) -> None:
+
+    spec = load(name, sets or ())
+    with progress("accuracy") as say:
+        data: dict[str, Any] = {"spec": spec.name, "meshes": mesh_rows(MouldSet(spec), say)}
+        if design_of(spec).passes is not None:
+            say("response")
+            variant = estimate_input(spec)
+            data |= {"response": response_rows(variant), "extremes": extremes(spec, variant)}
+            say("inputs")
+            data["amplification"] = amplifications(spec, variant)
+        say("requests")
+        data["left_out"] = left_out_rows(spec)
     if as_json:
-        print_json({"suites": [result.as_dict() for result in results], "left_out": left_out})
-    for name, reason in left_out.items():
-        typer.echo(f"{name}: left out: {reason}", err=True)
-    broken = [(result.suite, promise) for result in results for promise in result.promises if not promise.ok]
-    for suite, promise in broken:
-        typer.echo(f"{suite}: {promise.what}: {promise.value:g}, promised {promise.limit:g}", err=True)
-    if broken:
+        print_json(_finite(data))
+    else:
+        _print_spec(data)
+    broken = not all(row.get("within_bounds", True) for row in data["meshes"])
+    if broken or any(not row["over_bound"] <= 1 for row in data.get("response", ())):
+        typer.echo(f"{spec.name}: an error exceeds its bound", err=True)
         sys.exit(1)
+
+
+def _survey(media: int, specs: int, seed: int, as_json: bool) -> None:
+
+    with progress("accuracy") as say:
+        data = {"media": survey_media(media, seed, say), "specs": survey_specs(specs, seed, say)}
+    if as_json:
+        print_json(_finite(data))
+    else:
+        _table("Random media by rtol", {"rtol": "rtol", **_MEDIA_HEADS}, data["media"]["by_rtol"])
+        _table("Random media by class", {"class": "class", **_MEDIA_HEADS}, data["media"]["by_class"])
+        worst = data["media"]["worst"]
+        _line(f"closest to its bound: {worst['class']}, seed {worst['seed']}, rtol {worst['rtol']:g}")
+        _table("Random specs", {name: name.replace("_", " ") for name in _RANGES}, data["specs"]["by_ranges"])
+    for fault in data["specs"]["faults"]:
+        typer.echo(f"fault: {fault['ranges']} {fault['seed']}: {fault['kind']}: {fault['message']}", err=True)
+    broken = sum(row["bounds_broken"] for row in data["media"]["by_rtol"])
+    if broken:
+        typer.echo(f"{broken} bounds broken", err=True)
+    if broken or data["specs"]["faults"]:
+        sys.exit(1)
+
+
+def _print_spec(data: dict[str, Any]) -> None:
+    _table(f"{data['spec']}: meshes of unit and moulds, against the exact surfaces", _MESHES, data["meshes"])
+    if data["meshes"][0]["distance_mm"] is None:
+        _line("no exact surfaces to compare with: the extra step is not installed")
+    if "response" in data:
+        _table("Response of the skin, 0 to 30 mm from the unit's edge", _RESPONSE, data["response"])
+        rows = [{**row, "extreme": "extreme" if row["extreme"] else ""} for row in data["extremes"]]
+        _table("Stiff or extreme", _EXTREMES, rows)
+        _print_amplification(data["amplification"]["results"])
+    rows = [{**row, "left_out": ", ".join(one["what"] for one in row["left_out"])} for row in data["left_out"]]
+    _table("Left out by a request, and what that saves", _REQUESTS, rows)
+
+
+def _print_amplification(results: Sequence[dict[str, Any]]) -> None:
+    moves = {name: [one["by"].get(name) or 0.0 for one in results] for one in results for name in one["by"]}
+    most = sorted(moves, key=lambda name: -max(map(abs, moves[name])))[:_INPUTS]
+    letters = "abc"[: len(results)]
+    rows = [{"input": name, **dict(zip(letters, moves[name], strict=True))} for name in most]
+    title = f"Change of a result over the change of an input, each moved by 1e-6: the {len(most)} strongest inputs"
+    _table(title, {name: name for name in ("input", *letters)}, rows)
+    for letter, one in zip(letters, results, strict=True):
+        worst = f"at most {_shown(one['amplification'])}, by {one['worst']}" if one["worst"] else "no finite value"
+        _line(f"{letter}: {one['result']}: {worst}")
+
+
+def _table(title: str, heads: dict[str, str], rows: Sequence[dict[str, Any]]) -> None:
+
+    table = Table(box=None, header_style="")
+    for name, head in heads.items():
+        number = any(isinstance(row.get(name), int | float) for row in rows)
+        table.add_column(head, justify="right" if number else "left")
+    for row in rows:
+        table.add_row(*(_shown(row.get(name)) for name in heads))
+    console().print(title, style="bold", soft_wrap=True)
+    console().print(table)
+
+
+def _line(text: str) -> None:
+    console().print(f"  {text}", soft_wrap=True)
+
+
+def _shown(value: Any) -> str:
+    return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _finite(data: Any) -> Any:
+    """Return data with None for each number that JSON does not have."""
+    if isinstance(data, dict):
+        return {name: _finite(value) for name, value in data.items()}
+    if isinstance(data, list):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not abs(data) < float("inf") else data

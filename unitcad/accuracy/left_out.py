@@ -1,57 +1,49 @@
-"""What a build leaves out per template and request, and the time that it saves."""
+"""What a build of a spec leaves out by what is asked for, and the time that it saves."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
-from unitcad.accuracy.result import Cell, Result, Say, Table
-from unitcad.accuracy.timing import interleaved, machine
+from unitcad.accuracy.timing import Timing, interleaved
 from unitcad.cache import MemoryStore
-from unitcad.pipeline import plan as bodies
-from unitcad.pipeline.make import Progress, Subject
+from unitcad.pipeline.make import Progress, Subject, forget
 from unitcad.pipeline.manifest import Manifest
+from unitcad.spec import Spec, with_formats
 from unitcad.spec.asked import OUTPUTS
-from unitcad.validation import default_template, load, templates
 
-_ALL = ("step", "stl", "3mf", "svg", "glb")
-REQUESTS: dict[str, tuple[Sequence[str], Sequence[str], bool]] = {
-    "everything": (OUTPUTS, _ALL, True),
-    "default formats": (OUTPUTS, ("step", "stl", "3mf"), True),
+Request = tuple[Sequence[str], Sequence[str], bool]
+"""Outputs, formats, checks."""
+EVERYTHING = "everything"
+REQUESTS: dict[str, Request] = {
+    EVERYTHING: (OUTPUTS, ("step", "stl", "3mf", "svg", "glb"), True),
     "STL only": (OUTPUTS, ("stl",), True),
     "STL, no checks": (("unit", "moulds"), ("stl",), False),
     "unit only": (("unit",), ("stl",), True),
     "estimate only": (("estimate",), ("stl",), True),
 }
-"""Outputs, formats, checks. Without shaded pictures, which another process draws."""
+"""Without shaded pictures."""
 
 
-def run(quick: bool, say: Say) -> Result:
-    """Build every template and request, from an empty store each time."""
-    chosen = (default_template(),) if quick else tuple(templates())
-    rows: list[tuple[Cell, ...]] = []
-    for name in chosen:
-        say(name)
-        times = interleaved({request: partial(_manifest, name, request) for request in REQUESTS}, 1 if quick else 3)
-        whole = times["everything"].median
-        for request, time in times.items():
-            left = "; ".join(f"{entry['what']} ({entry['why']})" for entry in time.value["left_out"])
-            rows.append((name, request, str(time), time.median / whole, left or "nothing"))
-    return Result(
-        suite="left-out",
-        title="What is left out",
-        text=(
-            "A build computes what the outputs that were asked for need, and its manifest says what it left out and "
-            "why. Here every request starts from an empty store in a warm process; the share is of the time for "
-            "everything."
-        ),
-        tables=(Table("By template and request", ("template", "asked for", "time", "share", "left out"), tuple(rows)),),
-        measured=machine("manifold3d", "cadquery-ocp"),
-    )
+def time_requests(spec: Spec, requests: Mapping[str, Request], repeats: int) -> dict[str, Timing]:
+    """Return the time of each request, made from an empty store in this process; the value is its manifest."""
+    return interleaved({name: partial(_manifest, spec, request) for name, request in requests.items()}, repeats)
 
 
-def _manifest(template: str, request: str) -> Manifest:
-    only, formats, check = REQUESTS[request]
-    bodies.forget()
-    wanted = Subject(load(template, [f"output.formats={list(formats)}"]))
+def left_out_rows(spec: Spec) -> list[dict[str, Any]]:
+    """Return the time, how much less than for everything that is, and what was left out: a row for each request."""
+    requests = {EVERYTHING: REQUESTS[EVERYTHING], "as the spec asks": (OUTPUTS, spec.output.formats, True), **REQUESTS}
+    times = time_requests(spec, requests, 1)
+    whole = times[EVERYTHING].median
+    return [
+        {"request": name, "s": time.median, "saved_s": whole - time.median, "left_out": time.value["left_out"]}
+        for name, time in times.items()
+    ]
+
+
+def _manifest(spec: Spec, request: Request) -> Manifest:
+    only, formats, check = request
+    forget()
+    wanted = Subject(with_formats(spec, tuple(formats)))  # type: ignore[arg-type]
     return wanted.make(only, check, MemoryStore(), Progress()).manifest

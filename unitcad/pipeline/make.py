@@ -53,6 +53,7 @@ from unitcad.pipeline.plan import (
     possible_outputs,
     ready,
 )
+from unitcad.pipeline.plan import forget as forget_geometry
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, printer_of, spec_hash, to_json, to_toml, with_formats
 from unitcad.spec.asked import Format
@@ -331,6 +332,12 @@ def mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
 _ESTIMATES: dict[Hashable, tuple[dict[str, Any], bytes]] = {}
 """Estimates that this process made last, by what they read: variants that differ only in casting share one."""
 _MOST_ESTIMATES = 64
+
+
+def forget() -> None:
+    """Drop what this process keeps for the next result: what a measurement of times needs."""
+    forget_geometry()
+    _ESTIMATES.clear()
 
 
 def _estimate(spec: Spec, store: Store) -> tuple[dict[str, Any], bytes]:

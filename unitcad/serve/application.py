@@ -21,13 +21,13 @@ from starlette.routing import Route
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.report.page import page_data
+from unitcad.rooms import stored_spec
 from unitcad.serve.gate import Gate, Limits
 from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
 from unitcad.serve.keys import Keys
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
-from unitcad.sweeps.result_folders import JOURNAL, stored_spec
 from unitcad.text import toml
 from unitcad.workers import NoWorker, WorkerEnded
 
@@ -228,8 +228,8 @@ class Live:
         root, folder = self.setting.batch, request.path_params["folder"]
         path = _within(root, f"{folder}/spec.toml") if root else None
         try:
-            if path is None and root is not None and (root / JOURNAL).is_file():
-                text = await asyncio.wait_for(asyncio.to_thread(stored_spec, root, folder), STORE_S)
+            if path is None and root is not None and (read_stored := stored_spec()):
+                text = await asyncio.wait_for(asyncio.to_thread(read_stored, root, folder), STORE_S)
             elif path is None:
                 return PlainTextResponse("no such variant\n", 404)
             else:

@@ -123,6 +123,8 @@ def stored_spec(batch: Path, folder: str) -> str:
 
     Raises UnitcadError where no variant has a folder of that name, and for what the store has lost; OSError.
     """
+    if not (batch / JOURNAL).is_file():
+        raise WrongArgument("folder", folder, f"{batch} is not the folder of a batch")
     entry, place = _stored(batch, folder.rpartition("-")[2])
     if entry.folder != folder:
         raise WrongArgument("folder", folder, "no variant of the batch has it", entry.folder)

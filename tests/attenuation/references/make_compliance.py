@@ -13,7 +13,7 @@ from pathlib import Path
 import mpmath as mp
 
 HERE = Path(__file__).parent
-OUT = HERE.parents[2] / "unitcad" / "accuracy" / "references"
+OUT = HERE.parents[2] / "benchmarks" / "accuracy" / "references"
 sys.path.insert(0, str(HERE.parent))
 
 from layered_mp import Body, compliance, condition  # noqa: E402

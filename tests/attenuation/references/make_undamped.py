@@ -1,7 +1,7 @@
 """Makes undamped.json: responses of random media that were missed by more than their error said, or met no small rtol.
 
 The first two are those that a polynomial through six small losses missed. In the others poles lie next to a branch
-point or are known to few digits. By unitcad.accuracy.ball_reference, which takes minutes.
+point or are known to few digits. By benchmarks.accuracy.ball_reference, which takes minutes.
 
     python tests/attenuation/references/make_undamped.py
 """
@@ -9,7 +9,7 @@ point or are known to few digits. By unitcad.accuracy.ball_reference, which take
 import json
 from pathlib import Path
 
-from unitcad.accuracy.ball_reference import response
+from benchmarks.accuracy.ball_reference import response
 from unitcad.accuracy.random_media import trial
 
 MEDIA = (

@@ -5,19 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.accuracy.plot import svg
+from benchmarks.accuracy.result import Result, Table, kept, markdown, table_lines
 from unitcad import files
-from unitcad.accuracy.plot import svg
-from unitcad.accuracy.result import Result, Table, kept, markdown, table_lines
 
 FOLDER = "accuracy"
 PICTURES = ("tessellation", "hankel", "stability", "models")
 """Suites whose plot the front page shows. The others' plots are on their own pages."""
 HEAD = """# Accuracy
 
-Errors against exact or independent references, beside what they cost. `unitcad accuracy` computes all of it and writes
-these pages; `accuracy.json` holds the same numbers. Run times are medians, taken in turn in one run: compare them
-within a table only, since seconds differ between machines. A star in a table marks the frontier: nothing in it is both
-faster and more exact. A plus after a commit: the code that ran had changes that this commit does not hold.
+Errors against exact or independent references, beside what they cost. In a clone, `python -m benchmarks.accuracy`
+computes all of it and writes these pages; `accuracy.json` holds the same numbers. Run times are medians, taken in turn
+in one run: compare them within a table only, since seconds differ between machines. A star in a table marks the
+frontier: nothing in it is both faster and more exact. A plus after a commit: the code that ran had changes that this
+commit does not hold.
+
+`unitcad accuracy SPEC` measures error, bound and run time for one spec: its meshes at five tolerances, the response of
+the body at five rtols, the inputs that move the results most, and the time that a build saves by what it leaves out.
+Without SPEC it checks the bounds of random media and builds random specs.
 """
 
 

@@ -10,9 +10,9 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
+from benchmarks.accuracy import pages
+from benchmarks.accuracy.result import Result, Say, from_dict
 from unitcad import files
-from unitcad.accuracy import pages
-from unitcad.accuracy.result import Result, Say, from_dict
 from unitcad.errors import UnitcadError, missing_extra, unknown_name
 
 MODULES = {
@@ -71,15 +71,15 @@ def run(name: str, quick: bool, say: Say, count: int | None = None, seed: int = 
     """
     check(name)
     if count is not None and name == "extremes":
-        from unitcad.accuracy import extremes
+        from benchmarks.accuracy import extremes
 
         return replace(extremes.study(count, say, journal=JOURNALS[name]), options=f"--specs {count}")
     if count is not None and name == "stability":
-        from unitcad.accuracy import stability
+        from benchmarks.accuracy import stability
 
         result = stability.study(count, say, seed, JOURNALS[name])
         return replace(result, options=f"--media {count} --seed {seed}")
-    result = import_module(f"unitcad.accuracy.{MODULES[name]}").run(quick, say)
+    result = import_module(f"benchmarks.accuracy.{MODULES[name]}").run(quick, say)
     return replace(result, options="--quick" if quick else "")
 
 
@@ -117,4 +117,4 @@ def read(folder: Path) -> list[Result]:
     except files.NotThere:
         return []
     except (UnitcadError, ValueError, KeyError, TypeError) as error:
-        raise UnitcadError(f"{file}: is not a result of unitcad accuracy ({error}); write elsewhere with -o") from None
+        raise UnitcadError(f"{file}: is not a result of these suites ({error}); write elsewhere with -o") from None

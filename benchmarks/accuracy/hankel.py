@@ -10,10 +10,11 @@ from functools import partial
 import numpy as np
 from scipy import special
 
-from unitcad.accuracy import hankel_cost, hankel_frontier
-from unitcad.accuracy import hankel_peers as peers
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
-from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved, machine
+from benchmarks.accuracy import hankel_cost, hankel_frontier
+from benchmarks.accuracy import hankel_peers as peers
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
+from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium

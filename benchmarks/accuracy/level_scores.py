@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from unitcad.accuracy.result import Promise, Table
+from benchmarks.accuracy.result import Promise, Table
 from unitcad.attenuation.edge.fitted_models import (
     assessments,
     choice,

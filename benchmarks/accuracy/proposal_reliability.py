@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table
-from unitcad.accuracy.timing import machine
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
 from unitcad.attenuation.edge.predictive import STACKED, Predictive, stack
 from unitcad.errors import Refusal

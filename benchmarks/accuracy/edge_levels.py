@@ -10,11 +10,12 @@ from functools import cache, partial
 import numpy as np
 from msgspec.structs import replace
 
-from unitcad.accuracy.level_scores import score_tables
-from unitcad.accuracy.mechanics_search import unit_spec
-from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Summary, Table, stars
-from unitcad.accuracy.timing import Timing, interleaved, machine, timing
-from unitcad.accuracy.unexplained import NineLevels, unexplained
+from benchmarks.accuracy.level_scores import score_tables
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.mechanics_search import unit_spec
+from benchmarks.accuracy.result import Cell, Plot, Promise, Result, Say, Summary, Table, stars
+from benchmarks.accuracy.unexplained import NineLevels, unexplained
+from unitcad.accuracy.timing import Timing, interleaved, timing
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments, compared, edge_levels, in_order, stored
 from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable, measured_table
 from unitcad.attenuation.edge.scores import Assessment, Fit, assess

@@ -10,8 +10,8 @@ from itertools import count, product
 
 import numpy as np
 
-from unitcad.accuracy import hankel_peers as peers
-from unitcad.accuracy.result import Table
+from benchmarks.accuracy import hankel_peers as peers
+from benchmarks.accuracy.result import Table
 from unitcad.accuracy.timing import Timing, interleaved
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)

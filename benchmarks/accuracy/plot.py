@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 
-from unitcad.accuracy.result import Plot, frontier
+from benchmarks.accuracy.result import Plot, frontier
 from unitcad.export.chart import COLOURS, line, round_step, text, upward_name
 
 WIDTH, HEIGHT = 720, 440

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from unitcad.accuracy.synthetic_records import LENGTH_S, RATE, Scenario
+from benchmarks.accuracy.synthetic_records import LENGTH_S, RATE, Scenario
 from unitcad.geometry.arrays import Floats
 
 WAVES = 24

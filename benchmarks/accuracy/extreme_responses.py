@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.accuracy import ball_reference
-from unitcad.accuracy.hankel import DISC, OMEGA, RADII
-from unitcad.accuracy.long_study import in_order, journalled
+from benchmarks.accuracy import ball_reference
+from benchmarks.accuracy.hankel import DISC, OMEGA, RADII
+from benchmarks.accuracy.journal import journalled
+from benchmarks.accuracy.result import Cell, Plot, Promise, Table, shown
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
-from unitcad.accuracy.result import Cell, Plot, Promise, Table, shown
+from unitcad.accuracy.worker_jobs import in_order
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFactor
 from unitcad.errors import UnitcadError

@@ -149,7 +149,7 @@ def shown(value: Cell) -> str:
 
 def markdown(result: Result, picture: Sequence[str] | None = None) -> str:
     """Return the suite's page; `picture[i]` is the file of plot i, None links no pictures."""
-    command = f"unitcad accuracy {result.suite} {result.options}".strip()
+    command = f"python -m benchmarks.accuracy {result.suite} {result.options}".strip()
     lines = [f"# {result.title}", "", result.text, "", f"`{command}`; measured on: {measured_on(result)}.", ""]
     if result.promises:
         lines += [f"{kept(result.promises)}.", ""]

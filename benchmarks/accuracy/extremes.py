@@ -8,11 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from unitcad.accuracy.long_study import in_order, journalled
+from benchmarks.accuracy.journal import journalled
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table
 from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUSED, Outcome, outcome
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
-from unitcad.accuracy.result import Promise, Result, Say, Summary, Table
-from unitcad.accuracy.timing import machine, timing
+from unitcad.accuracy.timing import timing
+from unitcad.accuracy.worker_jobs import in_order
 from unitcad.designs import shipped
 from unitcad.validation import default_template, override, read
 

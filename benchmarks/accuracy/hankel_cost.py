@@ -13,8 +13,8 @@ from typing import get_args
 
 import numpy as np
 
-from unitcad.accuracy import ball_reference
-from unitcad.accuracy.result import Cell, Plot, Promise, Say, Table, shown
+from benchmarks.accuracy import ball_reference
+from benchmarks.accuracy.result import Cell, Plot, Promise, Say, Table, shown
 from unitcad.accuracy.timing import PROCESSOR, Timing, interleaved
 from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
 from unitcad.attenuation.layered.medium import LayeredMedium

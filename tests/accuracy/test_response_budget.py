@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from unitcad.accuracy.extreme_responses import LEAST_GAIN
-from unitcad.accuracy.hankel import DISC, RADII, cases
+from benchmarks.accuracy.extreme_responses import LEAST_GAIN
+from benchmarks.accuracy.hankel import DISC, RADII, cases
 from unitcad.accuracy.random_media import trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.loads import Point, UniformDisc

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
 
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.random_specs import seeded_spec
-from unitcad.accuracy.result import Promise, Result, Say, Summary, Table, shown
-from unitcad.accuracy.timing import machine, timing
+from unitcad.accuracy.timing import timing
 from unitcad.cache import MemoryStore
 from unitcad.checks import mould_checks
 from unitcad.errors import Refusal

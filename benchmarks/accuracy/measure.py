@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.accuracy.chain_peers import CHAINS
-from unitcad.accuracy.cramer_rao import amplitude_bound
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, shown, stars
-from unitcad.accuracy.synthetic_records import (
+from benchmarks.accuracy.chain_peers import CHAINS
+from benchmarks.accuracy.cramer_rao import amplitude_bound
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table, shown, stars
+from benchmarks.accuracy.synthetic_records import (
     LENGTH_S,
     RATE,
     SCENARIOS,
@@ -18,7 +19,7 @@ from unitcad.accuracy.synthetic_records import (
     Synthetic,
     synthetic,
 )
-from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, machine
+from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE
 from unitcad.lab.chains import paper
 from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.chains.line import Mains, fit_line

@@ -14,7 +14,7 @@ from unitcad.attenuation.layered.loads import Point, UniformDisc
 from unitcad.attenuation.layered.path import from_origin, wavenumbers
 from unitcad.attenuation.layered.rheology import LossFactor
 
-REFERENCES = json.loads((Path(__file__).parent / "references" / "undamped.json").read_text())
+REFERENCES = json.loads((Path(__file__).parents[1] / "attenuation" / "references" / "undamped.json").read_text())
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
 TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(NODES, 15))
 R = np.array([7e-3, 20e-3, 37e-3])

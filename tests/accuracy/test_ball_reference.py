@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from unitcad.accuracy.ball_reference import Kernel, TooHard, response
+from benchmarks.accuracy.ball_reference import Kernel, TooHard, response
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
@@ -121,7 +121,7 @@ def test_a_sideways_disc_on_the_forearm(medium, z):
 
 
 SLOW = ("partly damped", "undamped")
-"""CI takes other media of every class (`unitcad accuracy --quick stability`)."""
+"""CI takes other media of every class (`python -m benchmarks.accuracy stability --quick`)."""
 
 
 @pytest.mark.parametrize("kind", [pytest.param(one, marks=pytest.mark.long if one in SLOW else ()) for one in CLASSES])

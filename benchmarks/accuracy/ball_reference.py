@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from unitcad.accuracy.ball_kernel import Kernel, TooHard
+from benchmarks.accuracy.ball_kernel import Kernel, TooHard
 from unitcad.attenuation.layered.loads import Load, Point
 from unitcad.attenuation.layered.medium import LayeredMedium
 from unitcad.attenuation.layered.rheology import LossFactor

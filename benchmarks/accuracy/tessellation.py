@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from unitcad.accuracy.measures import mesh_volume
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
-from unitcad.accuracy.timing import Timing, interleaved, machine
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.measures import mesh_volume
+from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
+from unitcad.accuracy.meshes import TOLERANCES, Mesh, distance
+from unitcad.accuracy.timing import Timing, interleaved
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape
 from unitcad.spec.asked import OutputTable
 from unitcad.validation import default_template, load
 
-TOLERANCES = (0.1, 0.03, 0.01, 0.003, 0.001)
 ANGLE = 0.1
 """The angle of OCCT's tessellation, radians: the default of `tessellate` in both libraries."""
 DEFAULT = OutputTable().tolerance_mm
@@ -26,10 +26,6 @@ REVOLVED = "motor"
 """A body that is revolved alone; the others have extruded parts: layers a slot, moulds walls and bores."""
 BODIES = (REVOLVED, "layer2", "base", "cup2")
 _SAMPLES = 400
-
-
-Mesh = tuple[np.ndarray, np.ndarray]
-"""Vertices (n, 3) in mm and faces (m, 3)."""
 
 
 @dataclass(frozen=True)
@@ -232,7 +228,7 @@ def _rows(shape: Shape, radius: float, tolerances: tuple[float, ...], repeats: i
         for method, time in interleaved(_methods(shape, radius, tolerance), repeats).items():
             vertices, faces = time.value
             error = abs(mesh_volume(vertices, faces)[0] / true_volume - 1)
-            rows.append(_Row(method, tolerance, len(faces), error, _distance(vertices, faces, brep), time))
+            rows.append(_Row(method, tolerance, len(faces), error, distance(vertices, faces, brep, _SAMPLES), time))
     return sorted(rows, key=lambda row: row.method)
 
 
@@ -265,33 +261,3 @@ def _inscribed_count(radius: float, tolerance: float) -> int:
     while n < mesh.FINEST and radius * (1 - np.cos(np.pi / n)) > tolerance:
         n += 8
     return n
-
-
-def _distance(vertices: np.ndarray, faces: np.ndarray, brep: Any) -> float:
-    """Return the farthest of the sampled points from the B-rep's faces, mm."""
-    from OCP.BRep import BRep_Builder
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
-    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-    from OCP.gp import gp_Pnt
-    from OCP.TopAbs import TopAbs_FACE
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS_Compound
-
-    # Faces, not the solid: from inside a solid every distance is zero.
-    skin, builder = TopoDS_Compound(), BRep_Builder()
-    builder.MakeCompound(skin)
-    explorer = TopExp_Explorer(brep, TopAbs_FACE)
-    while explorer.More():
-        builder.Add(skin, explorer.Current())
-        explorer.Next()
-    corners = vertices[faces]
-    points = np.concatenate([vertices, (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3) / 2, corners.mean(1)])
-    sampled = points[np.random.default_rng(0).permutation(len(points))[:_SAMPLES]]
-    extrema = BRepExtrema_DistShapeShape()
-    extrema.LoadS1(skin)
-    farthest = 0.0
-    for x, y, z in sampled.tolist():
-        extrema.LoadS2(BRepBuilderAPI_MakeVertex(gp_Pnt(x, y, z)).Vertex())
-        extrema.Perform()
-        farthest = max(farthest, extrema.Value())
-    return farthest

@@ -6,20 +6,20 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from unitcad.accuracy import extreme_responses, thomson_haskell
+from benchmarks.accuracy import extreme_responses, thomson_haskell
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.random_media import CLASSES
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table
-from unitcad.accuracy.timing import machine
 from unitcad.attenuation.layered.loads import Point, UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFactor
 
+COMPLIANCE = Path(__file__).parent / "references" / "compliance.json"
 LIMIT = 1e-13
 """The promised error of the compliance, normwise over the problem's condition number."""
 
@@ -59,8 +59,7 @@ class Case:
 
 def cases() -> list[Case]:
     """Return the frozen references, made by tests/attenuation/references/make_compliance.py."""
-    file = files("unitcad.accuracy") / "references" / "compliance.json"
-    return [_case(data) for data in json.loads(file.read_text("utf-8"))]
+    return [_case(data) for data in json.loads(COMPLIANCE.read_text("utf-8"))]
 
 
 def run(quick: bool, say: Say) -> Result:

@@ -7,9 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from unitcad.accuracy.mechanics_search import DRIVES, READINGS, drawn_levels, searches, unit_spec
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table
-from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, interleaved, machine
+from benchmarks.accuracy.machine import machine
+from benchmarks.accuracy.mechanics_search import DRIVES, READINGS, drawn_levels, searches, unit_spec
+from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
+from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, interleaved
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.mechanics.motor_level import Drive, Setting, amplitude, motion, pressed_skin

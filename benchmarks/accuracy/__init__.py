@@ -1,0 +1,1 @@
+"""Studies of accuracy against peers and references: `python -m benchmarks.accuracy NAME`."""

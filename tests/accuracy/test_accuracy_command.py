@@ -1,0 +1,190 @@
+"""`unitcad accuracy`: errors against independent references, amplifications by exact laws, and its exit codes."""
+
+import json
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from msgspec.structs import replace as changed_struct
+from typer.testing import CliRunner
+
+from benchmarks.accuracy import ball_reference
+from unitcad.accuracy import survey
+from unitcad.accuracy.amplification import amplifications, extremes
+from unitcad.accuracy.left_out import left_out_rows
+from unitcad.accuracy.meshes import mesh_rows, tolerances_of
+from unitcad.accuracy.responses import COMPONENTS, REFERENCE, RTOLS, compare, respond, response_rows
+from unitcad.attenuation.inputs import Quantity, body
+from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.layered.medium import LayeredMedium
+from unitcad.attenuation.layered.response import Response
+from unitcad.cli import app
+from unitcad.errors import Refusal
+from unitcad.estimating import estimate_input
+from unitcad.kernels.mesh import area_true
+from unitcad.shape import Revolve
+from unitcad.shape.profile import Profile
+from unitcad.validation import load
+
+SPEC = load("encapsulating")
+VARIANT = estimate_input(SPEC)
+
+
+def _response(u: float, error: float) -> Response:
+    return Response(*(np.full(2, value) for value in (u, 0.0, u, error, 0.0, error)), wavenumbers=9)
+
+
+def test_an_error_counts_by_what_exceeds_the_references_own_bound() -> None:
+    found = compare(_response(1.03, 0.02), _response(1.0, 0.01))
+    assert (found.error, found.bound, found.over_bound) == pytest.approx((0.03, 0.02, 1.0))
+    assert compare(_response(1.005, 0.0), _response(1.0, 0.01)).over_bound == 0
+    assert compare(_response(math.nan, 0.02), _response(1.0, 0.01)).over_bound == math.inf
+
+
+def test_the_errors_of_the_response_are_those_against_a_reference_that_shares_no_code() -> None:
+    pytest.importorskip("flint")
+    distances = np.array([0.0, 5e-3, 30e-3])
+    load_of_motor = UniformDisc(VARIANT.motor_diameter / 2, "tangential")
+    omega = 2 * math.pi * VARIANT.frequency.middle
+    exact = ball_reference.response(body(VARIANT.tissue), load_of_motor, omega, VARIANT.diameter / 2 + distances)
+    tight = respond(VARIANT, distances, REFERENCE)
+    for rtol in RTOLS[:3]:
+        found = respond(VARIANT, distances, rtol)
+        u = np.array([getattr(found, f"u_{name}") for name in COMPONENTS])
+        error = float(np.abs(u - exact.u).max() / np.abs(exact.u).max())
+        assert compare(found, tight).error == pytest.approx(error, rel=1e-4, abs=1e-12)
+
+
+def test_every_row_of_the_response_is_within_its_bound_and_its_rtol() -> None:
+    rows = response_rows(VARIANT, repeats=1)
+    assert [row["rtol"] for row in rows] == list(RTOLS)
+    assert all(row["over_bound"] <= 1 and row["bound"] <= row["rtol"] and row["s"] > 0 for row in rows)
+
+
+def test_amplifications_obey_the_laws_of_scale() -> None:
+    """Moduli, viscosities and density times c: the same wavelengths, and 1/c of the motion."""
+    viscous = [changed_struct(layer, damping_law="kelvin_voigt", damping=Quantity(5.0)) for layer in VARIANT.tissue]
+    found = amplifications(SPEC, changed_struct(VARIANT, tissue=tuple(viscous)))
+    level, motion, decay = (one["by"] for one in found["results"])
+    scaled = ("tissue shear modulus", "tissue damping", "tissue density")
+    assert sum(motion[name] for name in scaled) == pytest.approx(-1, abs=1e-4)
+    assert sum(decay[name] for name in scaled) == pytest.approx(0, abs=1e-4)
+    # A level reads the ratio of the silicones' moduli, and nothing of the body.
+    assert level["layers.0.youngs_modulus_kpa"] + level["layers.1.youngs_modulus_kpa"] == pytest.approx(0, abs=1e-6)
+    assert [level[name] for name in scaled] == [0, 0, 0]
+    worst = found["results"][1]
+    assert worst["amplification"] == max(map(abs, motion.values())) == abs(motion[worst["worst"]])
+
+
+def test_an_extreme_design_is_named_with_its_place() -> None:
+    assert not any(row["extreme"] for row in extremes(SPEC, VARIANT))
+    thin = [changed_struct(layer, poisson_ratio=0.49999) for layer in VARIANT.tissue]
+    thin[0] = changed_struct(thin[0], thickness=Quantity(1e-5))
+    found = {row["what"]: row for row in extremes(SPEC, changed_struct(VARIANT, tissue=tuple(thin)))}
+    named = {what for what, row in found.items() if row["extreme"]}
+    assert named == {"body: thinnest layer / its shear wavelength", "body: least 1 - 2 nu"}
+    assert found["body: thinnest layer / its shear wavelength"]["at"] == VARIANT.tissue[0].name
+
+
+def test_a_cylinder_is_as_far_off_as_its_area_true_polygon() -> None:
+    """Its corners are r (a - 1) outside, which is its bound, and its volume is exact."""
+    pytest.importorskip("OCP")
+    radius = 7.0
+    shape = Revolve(Profile(((0, 0, 0), (radius, 0, 0), (radius, 5, 0), (0, 5, 0))))
+    moulds = SimpleNamespace(
+        unit=[SimpleNamespace(name="can", shape=shape)],
+        plan=SimpleNamespace(tools=[]),
+        dimensions=SimpleNamespace(outer_radius=radius),
+        spec=SPEC,
+    )
+    rows = mesh_rows(moulds, lambda stage: None, repeats=1)  # type: ignore[arg-type]
+    for row in rows:
+        assert row["distance_mm"] == pytest.approx(radius * (area_true(row["segments"]) - 1), rel=1e-6)
+        assert row["distance_mm"] == pytest.approx(row["distance_bound_mm"], rel=1e-6)
+        assert row["volume"] < 1e-12
+        assert row["within_bounds"]
+        assert row["body"] == "can"
+
+
+def test_the_specs_own_tolerance_is_among_the_five() -> None:
+    assert tolerances_of(0.02) == (0.1, 0.02, 0.01, 0.003, 0.001)
+    assert tolerances_of(0.0005) == (0.1, 0.03, 0.01, 0.003, 0.0005)
+
+
+def test_a_request_leaves_out_what_it_does_not_ask_for() -> None:
+    spec = load("single-embedded", ["output.formats=['stl']"])
+    rows = {row["request"]: row for row in left_out_rows(spec)}
+    left = {name: {one["what"] for one in row["left_out"]} for name, row in rows.items()}
+    assert {"moulds", "estimate", "casting"} <= left["unit only"]
+    assert left["STL, no checks"] >= {"mould checks", "mesh checks"}
+    assert "boundary representation" in left["as the spec asks"] - left["everything"]
+    assert rows["unit only"]["s"] + rows["unit only"]["saved_s"] == pytest.approx(rows["everything"]["s"])
+
+
+def test_a_survey_repeats_by_its_seed_and_names_what_is_worst() -> None:
+    first, again, other = (survey.survey_media(2, seed, lambda stage: None) for seed in (0, 0, 1))
+    errors = [[row["error"] for row in found["by_rtol"]] for found in (first, again, other)]
+    assert errors[0] == errors[1] != errors[2]
+    assert sum(row["bounds_broken"] for row in first["by_class"]) == 0
+    worst = first["worst"]
+    assert worst["over_bound"] == max(row["over_bound"] for row in first["by_rtol"])
+    assert (worst["class"], worst["seed"]) in {("ordinary", 0), ("film on the forearm", 0)}
+
+
+def test_a_response_off_by_more_than_its_bound_is_exit_code_1(monkeypatch: pytest.MonkeyPatch) -> None:
+    exact = LayeredMedium.response
+
+    def off(*arguments, rtol, **keywords):
+        found = exact(*arguments, rtol=rtol, **keywords)
+        return replace(found, u_z=found.u_z * 1.2) if rtol > REFERENCE else found
+
+    monkeypatch.setattr(LayeredMedium, "response", off)
+    monkeypatch.setattr(survey, "survey_specs", lambda *_: {"by_ranges": [], "faults": []})
+    done = CliRunner().invoke(app, ["accuracy", "--media", "1", "--json"])
+    assert done.exit_code == 1
+    assert json.loads(done.stdout)["media"]["by_rtol"][4]["bounds_broken"] == 1
+
+
+def test_a_spec_that_is_neither_built_nor_refused_is_exit_code_1(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(survey, "outcome", lambda data: survey.Outcome("crash", "KeyError: 'x'"))
+    found = survey.survey_specs(4, 2, lambda stage: None)
+    assert [row["faults"] for row in found["by_ranges"]] == [3, 1]
+    assert found["faults"][3] == {"ranges": "extreme", "seed": 200_000, "kind": "crash", "message": "KeyError: 'x'"}
+    monkeypatch.setattr(survey, "survey_media", lambda *_: {"by_rtol": [], "by_class": []})
+    done = CliRunner().invoke(app, ["accuracy", "--specs", "2", "--json"])
+    assert done.exit_code == 1
+    assert "fault: extreme 0: crash: KeyError: 'x'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        (["encapsulating", "--media", "9"], "--media"),
+        (["encapsulating", "--seed", "9"], "--seed"),
+        (["--set", "diameter_mm=15"], "--set"),
+    ],
+)
+def test_options_of_the_survey_are_refused_for_a_spec(words: list[str], field: str) -> None:
+    done = CliRunner().invoke(app, ["accuracy", *words])
+    assert isinstance(done.exception, Refusal)
+    assert done.exception.field == field
+
+
+@pytest.mark.parametrize("form", [[], ["--json"]], ids=["text", "json"])
+def test_the_command_shows_every_part(form: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh_row = {"tolerance_mm": 0.1, "distance_mm": None, "triangles": 12, "within_bounds": False}
+    monkeypatch.setattr("unitcad.accuracy.meshes.mesh_rows", lambda *_: [mesh_row])
+    monkeypatch.setattr("unitcad.accuracy.left_out.left_out_rows", lambda spec: [])
+    done = CliRunner().invoke(app, ["accuracy", "single-embedded", *form])
+    assert done.exit_code == 1, done.stderr
+    assert "an error exceeds its bound" in done.stderr
+    if form:
+        assert list(json.loads(done.stdout)) == [
+            "spec", "meshes", "response", "extremes", "amplification", "left_out"
+        ]  # fmt: skip
+    else:
+        for part in ("meshes of unit", "Response of the skin", "Stiff or extreme", "motion of the skin", "Left out"):
+            assert part in done.stdout
+        assert len(done.stdout.splitlines()) < 60
