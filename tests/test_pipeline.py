@@ -21,6 +21,7 @@ import unitcad
 from unitcad import cli
 from unitcad.errors import UnitcadError
 from unitcad.kernels import mesh
+from unitcad.moulds import mould_set
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import make as artifacts
 from unitcad.pipeline.variant import Variant
@@ -288,7 +289,7 @@ def test_ctrl_c_stops_without_a_traceback(tmp_path: Path) -> None:
     ],
 )
 def test_ctrl_c_while_a_module_is_loaded_leaves_with_130(met: str, tmp_path: Path) -> None:
-    (tmp_path / "command.py").write_text(f"import unitcad.cli as c; c._run = lambda _: {met}; c.main()")
+    (tmp_path / "command.py").write_text(f"import unitcad.cli as c; c.command_line.run = lambda _: {met}; c.main()")
     command = [sys.executable, "-m", "command"]  # python -m alone passes on what Python noted of the interrupt
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
@@ -320,7 +321,7 @@ def test_few_files_and_frames_lie_between_the_command_and_the_mesh_of_a_cup(monk
             paths.append([frame for frame in traceback.extract_stack() if frame.filename.startswith(PACKAGE)])
         return realise(shape, segments)
 
-    monkeypatch.setattr(mesh, "realise", spy)
+    monkeypatch.setattr(mould_set, "realise", spy)
     monkeypatch.setattr(sys, "argv", ["unitcad", "build", "encapsulating", "--formats", "stl", "-o", str(tmp_path)])
     with pytest.raises(SystemExit) as left:
         cli.main()

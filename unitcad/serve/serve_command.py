@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import threading
+import webbrowser
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from unitcad.cli.shared_options import AllowCode
+from unitcad.errors import missing_extra
 from unitcad.serve.addresses import TOKEN
-from unitcad.serve.server import serve as run
 
 
 def serve(
@@ -36,10 +37,12 @@ def serve(
     def ready(address: str) -> None:
         typer.echo(address)
         if browser:
-            import webbrowser
-
             # open() waits for the end of a browser in the terminal, or of one that $BROWSER names.
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
+    try:
+        from unitcad.serve.server import serve as run
+    except ImportError as error:
+        raise missing_extra("serve", f"the live page needs {error.name}") from None
     token = os.environ.pop(TOKEN, None)  # not for the programs that it starts
     run(source, host=host, port=port, token=token, out=out, code=code, ready=ready)

@@ -10,7 +10,9 @@ from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from unitcad.errors import Refusal, UnitcadError, WrongArgument, missing_extra
+import uvicorn
+
+from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text
 from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
@@ -45,10 +47,9 @@ def serve(
 
     `source` is a file of a spec, an array or a campaign, a template's name, a result's folder, or a batch's, whose rows
     open live; None: the default template. `port` 0: any that is free.
-    Raises Missing without the extra, WrongArgument for an address beyond the loopback without a `token`, Refusal for a
+    Raises WrongArgument for an address beyond the loopback without a `token`, Refusal for a
     spec whose design is code unless `code`, and UnitcadError for a port that is taken.
     """
-    uvicorn = _uvicorn()
 
     check_address(host, token)
     token = token or secrets.token_urlsafe(24)
@@ -146,16 +147,6 @@ def _page_kind(data: Mapping[str, Any]) -> FileKind | None:
 def is_own(source: str | None) -> bool:
     """Tell whether a source is a file of the person's own, not a template's name."""
     return source is not None and is_path(source) and source not in custom_templates()
-
-
-def _uvicorn():
-    try:
-        import starlette  # noqa: F401  # asked for here, so that its lack is told with the extra
-        import tomlkit  # noqa: F401
-        import uvicorn
-    except ImportError as error:
-        raise missing_extra("serve", f"the live page needs {error.name}") from None
-    return uvicorn
 
 
 def _listening(host: str, port: int) -> socket.socket:
