@@ -82,6 +82,7 @@ def folder_for(data: Mapping[str, Any], trusted: Trusted) -> Path | None:
 
 def _unit(spec: Spec, answer: Answer) -> None:
     from unitcad import catalogue
+    from unitcad.designs import widths
     from unitcad.estimating import motor_mass
     from unitcad.export.svg import unit_section
     from unitcad.moulds.mould_set import MouldSet
@@ -100,7 +101,9 @@ def _unit(spec: Spec, answer: Answer) -> None:
     answer.warnings = warnings(spec)
     boxes = [solid.bounding_box() for solid in solids.values()]
     height = max(box[5] for box in boxes) - min(box[2] for box in boxes)
-    answer.figures = [("diameter", spec.diameter_mm, "mm"), ("height", height, "mm")]
+    across = widths(spec, [solids[body.name].bounding_box() for body in moulds.unit if body.made != "bought"])
+    names = ("diameter",) if not is_custom(spec.design) else ("width",) if len(across) == 1 else ("length", "width")
+    answer.figures = [(name, size, "mm") for name, size in zip((*names, "height"), (*across, height), strict=True)]
     grams = _grams(
         spec, [solids[f"layer{i + 1}"].volume() for i in range(len(spec.layers)) if f"layer{i + 1}" in solids]
     )
