@@ -351,15 +351,16 @@ def test_a_decision_between_two_candidates() -> None:
     known = decision_between({"stiff inside": load("embedded", stiff), "soft inside": load("embedded", soft)})
     assert known.first_higher > 0.99
     assert known.sentence.startswith("No measurement is needed to order the two: stiff inside has the higher level")
-    asked = {"flat": load("encapsulating"), "three layers": load("three-layer")}
+    thin = {"layers.0.wall_mm": 1.8, "layers.1.material": "dragon-skin-10-medium", "layers.1.cap_mm": 0.5}
+    asked = {"flat": load("encapsulating"), "thin cap": load("encapsulating", thin)}
     found = decision_between(asked)
-    assert found.sentence.startswith("Measure flat over three layers, at 125 Hz on forearm: crossings ")
+    assert found.sentence.startswith("Measure flat over thin cap, at 125 Hz on forearm: crossings ")
     assert found.sentence.count(".\n") == 0
     assert 0.1 < found.order.bits < found.open_bits <= 1
     assert found.open_bits == pytest.approx(_entropy(found.first_higher))
     assert found.predicted["bush"]["low"] > 2 > 1 > found.predicted["crossings"]["low"]
     assert found == decision_between(asked)
-    turned = decision_between({"three layers": asked["three layers"], "flat": asked["flat"]})
+    turned = decision_between({"thin cap": asked["thin cap"], "flat": asked["flat"]})
     assert turned.first_higher == pytest.approx(1 - found.first_higher, abs=0.05)
     # Each at its own frequency: the small motor turns faster.
     small = decision_between({"small": load("motor-10mm"), "flat": load("encapsulating")})

@@ -19,6 +19,8 @@ from unitcad.search.proposals import invert
 from unitcad.search.target_file import load_target, target_of
 from unitcad.validation import load
 
+THIN_CAP = load("encapsulating", {"layers.1.cap_mm": 0.6})
+
 
 def _data(**tables: Any) -> dict[str, Any]:
     return {"target": {"edge_max": 0.06}, **tables}
@@ -66,7 +68,7 @@ def test_where_both_were_measured_the_sentence_follows_the_measurements() -> Non
 
 
 def test_weights_count_in_a_decision() -> None:
-    specs = {"flat": load("encapsulating"), "three layers": load("three-layer")}
+    specs = {"flat": load("encapsulating"), "thin cap": THIN_CAP}
     alone = decision_between(specs, ["crossings"]).first_higher
     assert decision_between(specs, {"crossings": 1.0, "bush": 0.0}).first_higher == pytest.approx(alone, abs=1e-9)
     both = [decision_between(specs, {"crossings": 1.0 - w, "bush": w}).first_higher for w in (0.1, 0.5, 0.9)]
@@ -75,7 +77,7 @@ def test_weights_count_in_a_decision() -> None:
 
 
 def test_the_order_by_the_ranking_is_that_of_drawn_levels() -> None:
-    pair = [predictive_of([estimate_input(load(name))]) for name in ("encapsulating", "three-layer")]
+    pair = [predictive_of([estimate_input(spec)]) for spec in (load("encapsulating"), THIN_CAP)]
     rng, drawn = np.random.default_rng(2), []
     one = pair[0]
     for k, weight in enumerate(one.weights):

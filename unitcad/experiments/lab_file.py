@@ -22,6 +22,7 @@ from typing import Annotated, Any
 from msgspec import Meta, Struct, field
 from msgspec.structs import replace
 
+from unitcad.attenuation.edge.variant_units import MANY_LAYERS, MOST_LAYERS
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import MaterialEntry, TissueEntry, tissue
 from unitcad.catalogue.entries import Frequency
@@ -134,6 +135,8 @@ def lab_of_specs(specs: Mapping[str, Spec], settings: LabFile, name: str = "lab"
             asked = from_data(_on(spec, body)) if spec.estimate.tissue != body else spec
             for hertz in settings.frequencies_hz:
                 variant = estimate_input(asked, hertz)
+                if len(variant.layers) > MOST_LAYERS:
+                    raise Refusal(f"units.{unit}.layers", len(spec.layers), MANY_LAYERS)
                 for at, layer in enumerate(variant.layers):
                     if not layer.youngs_modulus.known:
                         raise Refusal(f"units.{unit}.layers.{at}", layer.material, layer.youngs_modulus.note)

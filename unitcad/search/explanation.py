@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.predictive import stack_of
-from unitcad.attenuation.edge.variant_units import stacked
+from unitcad.attenuation.edge.variant_units import MANY_LAYERS, MOST_LAYERS, stacked
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.attenuation.receivers import unit_mass
 from unitcad.errors import Refusal, unknown_name
@@ -132,7 +132,9 @@ def _of_spec(made: Inversion, spec: Spec) -> dict[str, Any]:
         "edge": None,
     }
     without = [layer for layer in variant.layers if layer.youngs_modulus.value is None]
-    if without:
+    if len(variant.layers) > MOST_LAYERS:
+        reasons.append(f"no level: {MANY_LAYERS}")
+    elif without:
         names = listed(dict.fromkeys(layer.material for layer in without))
         reasons.append(f"{names}: {without[0].youngs_modulus.note}")
     else:

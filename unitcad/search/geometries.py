@@ -17,7 +17,7 @@ from unitcad.designs import dimensions
 from unitcad.designs import shipped as designs
 from unitcad.designs.dimensions import MOTOR_CLEARANCE
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input
+from unitcad.estimating import drawn_input
 from unitcad.search.target_file import MOST_GEOMETRIES, Target
 from unitcad.spec import Spec
 from unitcad.validation import from_data
@@ -73,7 +73,7 @@ def height_of(spec: Spec) -> float:
 def geometry_of(target: Target, lengths: Lengths) -> Geometry:
     """Return the geometry of lengths. Raises Refusal where the design does not accept them."""
     spec = from_data(spec_data(target, lengths, (target.materials[0],) * len(lengths.walls)))
-    return Geometry(lengths, spec, estimate_input(spec), height_of(spec))
+    return Geometry(lengths, spec, drawn_input(spec), height_of(spec))
 
 
 @dataclass

@@ -29,8 +29,7 @@ def length_notes(found: Candidates, lengths: Lengths) -> list[str]:
     """Return what is to be said of walls, caps and diameter that no measured unit had, and which models read them."""
     shared, count = measurements().unit, len(lengths.walls)
     wall = 2 * shared.wall_mm / count
-    had = f"the measured units of {_layers(count)} had {wall:g} mm each"
-    of = had if count in _counts(measurements()) else f"no unit of {_layers(count)} was measured"
+    of = f"the measured units of {_layers(count)} had {wall:g} mm each"
     notes = []
     if any(abs(each - wall) > _SAME for each in lengths.walls):
         notes.append(f"walls of {_mm(lengths.walls)}: {of}{_unread(found, 'wall')}")
@@ -45,17 +44,13 @@ def length_notes(found: Candidates, lengths: Lengths) -> list[str]:
 def _kinds(found: Candidates, row: int, data: Measurements) -> list[str]:
     lengths, names = found.lengths(row), found.materials(row)
     notes = []
-    counts = _counts(data)
-    if len(names) not in counts:
-        measured = listed(str(count) for count in sorted(counts))
-        notes.append(f"{_layers(len(names))}: only units of {measured} layers were measured")
     if lengths.design not in data.designs:
         notes.append(f"the design {lengths.design}: none of it was measured")
     tried = {name for unit in _units(data) for name in data.layers(unit)}
     new = [name for name in dict.fromkeys(names) if name not in tried]
     if new:
         notes.append(f"{listed(new)}: in no measured unit")
-    elif len(names) in counts and lengths.design in data.designs and len(names) > 1:
+    elif lengths.design in data.designs and len(names) > 1:
         pairs = {data.layers(unit) for unit in data.designs[lengths.design].levels}
         if names not in pairs:
             notes.append("these silicones in this order: measured in no unit of this design")
@@ -68,11 +63,6 @@ def _kinds(found: Candidates, row: int, data: Measurements) -> list[str]:
         hertz, measured = number(variant.frequency.middle, 3), number(data.unit.frequency_hz, 3)
         notes.append(f"{hertz} Hz: measured was at {measured} Hz{_unread(found, 'frequency')}")
     return notes
-
-
-def _counts(data: Measurements) -> set[int]:
-    """Return the numbers of layers of the measured units."""
-    return {len(data.layers(unit)) for unit in _units(data)}
 
 
 def _units(data: Measurements) -> list[str]:
