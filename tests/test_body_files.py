@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from unitcad.checks import check_moulds
+from unitcad.cli.build_summary import summary
+from unitcad.designs import unit_bodies
 from unitcad.errors import Refusal, Unfinished, UnitcadError
 from unitcad.estimating import estimate_spec
 from unitcad.export import stl
@@ -235,6 +237,36 @@ def test_what_goes_with_no_body_is_refused(tmp_path: Path) -> None:
     for damaged in ("", "unitcad bodies 1\nlayer1 AAAA AAAA\n", str(spec.design_source)[:-40]):
         with pytest.raises(UnitcadError, match=r"design_source is damaged|is required"):
             build(load(spec, {"design_source": damaged}), tmp_path / "out", only=("unit",))
+
+
+def test_a_layer_without_a_silicone_is_no_printed_part(tmp_path: Path) -> None:
+    """A body that is named as a layer is silicone; the spec says which, or is refused."""
+    spec = load(spec_of(tmp_path, threemf_design(tmp_path), layers=1))
+    with pytest.raises(Refusal, match=r"layers = 1: .* has the body layer2, and the spec has no \[\[layers\]\] table"):
+        build(spec, tmp_path / "out", only=("unit",))
+    flex = load(spec_of(tmp_path, step_of(tmp_path, layer1=INNER, fpcb=cylinder(3.5, 2, 2.1)), layers=1))
+    with pytest.raises(Refusal, match=r"fpcb: .* has the body fpcb, and the spec has no \[fpcb\] table"):
+        build(flex, tmp_path / "out", only=("unit",))
+    more = load(spec_of(tmp_path, "body.3mf", layers=2))
+    assert [body.made for body in unit_bodies(more)] == ["cast", "cast", "bought"]
+
+
+def test_the_summary_says_how_wide_the_bodies_are(tmp_path: Path) -> None:
+    """Not how wide `diameter_mm`, 17, is."""
+    ring = cut(extruded_box(30, 20), [MOTOR])
+    (tmp_path / "body.stl").write_bytes(stl_of(ring))
+    spec = load(spec_of(tmp_path, "body.stl", layers=1))
+    first = next(iter(summary(spec, build(spec, tmp_path / "out", only=("unit",)))))
+    assert first.startswith("30 x 20 mm across, 5 mm high")
+    (tmp_path / "body.stl").write_bytes(stl_of(cut(extruded_box(30, 30), [MOTOR])))
+    spec = load(spec_of(tmp_path, "body.stl", layers=1))
+    first = next(iter(summary(spec, build(spec, tmp_path / "out", only=("unit",)))))
+    assert first.startswith("30 mm across, 5 mm high")
+
+
+def extruded_box(x: float, y: float) -> Extrude:
+    """Return a box on the skin, 5 mm high, its sides along x and y."""
+    return Extrude(polygon((-x / 2, -y / 2), (x / 2, -y / 2), (x / 2, y / 2), (-x / 2, y / 2)), 0, 5)
 
 
 def test_step_without_the_extra_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from unitcad.attenuation.edge.closed_form import CONTROL_PASSES
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded, rounded_layered
 from unitcad.attenuation.edge.lab_fit import LabFit
+from unitcad.attenuation.edge.variant_units import merged
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.attenuation.receivers import neighbours_block
@@ -92,7 +93,15 @@ def neighbours_of_specs(specs: Sequence[Spec], pitch_mm: float, frequencies_hz: 
 
 
 def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
-    """Return a spec's unit on its body, in SI. `frequency_hz` overrides the spec's and the motor's."""
+    """Return a spec's unit on its body, in SI, neighbouring layers of one silicone as one layer.
+
+    `frequency_hz` overrides the spec's and the motor's.
+    """
+    return merged(drawn_input(spec, frequency_hz))
+
+
+def drawn_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
+    """Return the same with the spec's layers as they are."""
     passes = design_of(spec).passes
     if passes is None:
         raise Refusal("design", spec.design, f"has no estimate: {no_estimate()}")

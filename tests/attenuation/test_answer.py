@@ -71,9 +71,10 @@ def test_what_the_model_does_not_read_is_said_in_words() -> None:
 
 
 def test_a_layer_that_alone_is_not_read_is_named_by_its_place() -> None:
-    """The divider of three layers reads the outermost and the innermost modulus."""
-    found = lead("three-layer", 'estimate.models=["fitted"]')
-    assert "layers.1.youngs_modulus_kpa" in found["not_seen"]
+    """Layer 1 reaches the motor whatever its wall, if it fills the gap."""
+    found = lead("encapsulating", "motor.fill=true")
+    assert found["model"] == "bush"
+    assert "layers.0.wall_mm" in found["not_seen"]
 
 
 def test_a_model_of_another_drive_does_not_lead() -> None:
@@ -167,7 +168,6 @@ def test_how_many_ranges_held_is_said_of_all_models_together() -> None:
         ("embedded", ("diameter_mm=17",), ["diameter"]),
         ("embedded", ("layers.0.material=dragon-skin-30", "layers.1.material=ecoflex-00-10"), []),
         ("embedded", ("layers.0.material=ecoflex-00-30",), ["silicones"]),
-        ("three-layer", (), ["number of layers", "diameter"]),
     ],
 )
 def test_what_no_measured_unit_had_is_said_with_the_error(spec: str, changes: tuple[str, ...], new: list[str]) -> None:

@@ -16,7 +16,6 @@ SPECS = {
     "encapsulating": (),
     "embedded": (),
     "filled": ("motor.fill=true",),
-    "three-layer": (),
     "single-encapsulating": (),
 }
 STEP = 1e-3

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from unitcad.attenuation.crosstalk import crosstalk_ratio
+from unitcad.attenuation.edge.variant_units import MANY_LAYERS
 from unitcad.errors import Refusal, UnknownKey
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.search.design_files import contents, ranking
@@ -46,13 +47,6 @@ def test_the_estimate_of_a_proposals_spec_has_its_range(paper: Inversion, quiet:
             assert ends == pytest.approx([one["edge"][end] for end in ("p10", "p50", "p90")], rel=1e-6)
             assert answer["weights"] == pytest.approx(made.data["models"]["weights"])
     assert paper.specs[0].estimate.models == ("fitted", "paper")
-
-
-def test_lengths_of_no_measured_number_of_layers_are_not_called_measured() -> None:
-    one = _target({"layers": [3], "wall_mm": [1.0, 1.0]}).data["proposals"][0]
-    notes = " | ".join(one["relies_on"])
-    assert "number of layers" in notes
-    assert "0.83" not in notes
 
 
 def test_only_lengths_that_some_candidate_has_are_counted(paper: Inversion) -> None:
@@ -99,8 +93,11 @@ def test_a_mass_is_shown_as_exactly_as_its_limit() -> None:
 def test_another_diameter_and_a_unit_that_was_not_tried_are_explained(paper: Inversion, quiet: Inversion) -> None:
     why = explain(paper, "motor-10mm")["reasons"]
     assert any("diameters from 14 to 15.2 mm are tried (vary.diameter_mm), not 17" in line for line in why)
-    head = explanation_lines(explain(quiet, "three-layer"))[0]
+    head = explanation_lines(explain(quiet, "chain"))[0]
     assert head.endswith(" if it were tried")
+    layers = explanation_lines(explain(quiet, "three-layer"))
+    assert layers[0] == "three-layer"
+    assert f"  no level: {MANY_LAYERS}" in layers
 
 
 def _spec(made: Inversion, at: int, folder: Path, **changes: Any) -> str:

@@ -14,9 +14,13 @@ from running import Server, serving
 
 from unitcad.checks import check_moulds
 from unitcad.estimating import estimate_spec
+from unitcad.export import stl
+from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
 from unitcad.serve.messages import Field
+from unitcad.shape import Extrude, polygon
+from unitcad.spec import to_toml
 from unitcad.sweeps.sweep import from_file
 from unitcad.validation import load, templates
 
@@ -35,6 +39,16 @@ def test_answers_are_those_of_the_commands(server: Server, name: str) -> None:
     assert len(judged["lines"]) == 2
     if name == "encapsulating":
         assert server.ask(text, "estimate")["estimate"] == json.loads(json.dumps(estimate_spec(spec)))
+
+
+def test_a_design_of_ones_own_is_as_wide_as_its_bodies(server: Server, tmp_path: Path) -> None:
+    """Its `diameter_mm` is not: the form's figures are those of the solids."""
+    bar = realise(Extrude(polygon((-15, -10), (15, -10), (15, 10), (-15, 10)), 0, 5), 96)
+    (tmp_path / "bar.stl").write_bytes(stl.content(*arrays(bar), "bar"))
+    layer = '[[layers]]\nmaterial = "ecoflex-00-30"\nwall_mm = 2.0\ncap_mm = 1.25\n'
+    (tmp_path / "bar.toml").write_text(f'name = "bar"\ndesign = "bar.stl"\ndiameter_mm = 17.0\n{layer}')
+    figures = server.ask(to_toml(load(tmp_path / "bar.toml")))["figures"]
+    assert figures[:3] == [["length", 30.0, "mm"], ["width", 20.0, "mm"], ["height", 5.0, "mm"]]
 
 
 def test_every_fault_is_told_with_its_line_and_what_would_do(server: Server, text: str) -> None:

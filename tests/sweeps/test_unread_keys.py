@@ -125,3 +125,14 @@ def test_a_control_s_wall_is_that_of_the_measured_controls() -> None:
     found = swept_estimate(sweep, sweep.count)
     assert found is not None
     assert found.not_measured == {"layers.0.wall_mm": 2.5}
+
+
+def test_units_without_a_level_say_nothing_of_what_models_read() -> None:
+    """Of three layers no length was measured, and no model has an error."""
+    sweep = from_file({"base": "three-layer", "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "three")
+    assert swept_estimate(sweep, sweep.count) is None
+    both = {"base": ["three-layer", "encapsulating"], "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}
+    sweep = from_file(both, Path(), "both")
+    found = swept_estimate(sweep, sweep.count)
+    assert found is not None
+    assert found.not_measured == {"layers.0.wall_mm": 1.25}

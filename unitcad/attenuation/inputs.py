@@ -45,7 +45,10 @@ class Quantity(msgspec.Struct, frozen=True):
 
 
 class SiliconeLayer(msgspec.Struct, frozen=True):
-    """A layer of the unit: wall thickness (m), density (kg/m3), Young's modulus (Pa), Poisson's ratio, tan delta."""
+    """A layer of the unit: wall thickness (m), density (kg/m3), Young's modulus (Pa), Poisson's ratio, tan delta.
+
+    `first` is its number in the spec, from 0, if that is not its place among the unit's layers.
+    """
 
     material: str
     thickness: float
@@ -53,6 +56,7 @@ class SiliconeLayer(msgspec.Struct, frozen=True):
     youngs_modulus: Quantity
     poisson_ratio: Quantity
     tan_delta: Quantity
+    first: int | None = None
 
 
 class LayerShape(msgspec.Struct, frozen=True):

@@ -7,8 +7,9 @@ import shlex
 from collections.abc import Iterator
 
 from unitcad.casting.steps import in_short
+from unitcad.designs import widths
 from unitcad.meshcheck.findings import counted
-from unitcad.pipeline.manifest import row
+from unitcad.pipeline.manifest import PartRecord, row
 from unitcad.pipeline.write import PAGE, Built
 from unitcad.spec import Spec, assumed_lengths
 from unitcad.text import listed, number
@@ -25,7 +26,7 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         silicone = f", {number(mass, 3)} g of silicone" if isinstance(mass, float) else ""
         cells = json.loads((built.folder / "casting.json").read_bytes())["cells"] if manifest["casting"] else 1
         each = f"{cells} units, each " if cells > 1 else ""
-        yield f"{each}{number(spec.diameter_mm, 3)} mm across, {number(height, 3)} mm high{silicone}"
+        yield f"{each}{_across(spec, manifest['parts'])} mm across, {number(height, 3)} mm high{silicone}"
     if assumed := assumed_lengths(spec):
         yield f"assumed: {listed(assumed)}; measure the motor before you print"
     if manifest["casting"]:
@@ -39,3 +40,9 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         yield level["answer"]
     if (built.folder / PAGE).is_file():
         yield f"open {shlex.quote(str(built.folder / PAGE))}"
+
+
+def _across(spec: Spec, parts: list[PartRecord]) -> str:
+    """Return a unit's width without motor, circuit and wires, as text: "14", or "30 x 20"."""
+    boxes = [part["bbox_mm"] for part in parts if part["role"] == "unit" and part["made"] != "bought"]
+    return " x ".join(number(width, 3) for width in widths(spec, boxes))

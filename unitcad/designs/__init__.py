@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pkgutil
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -31,6 +33,7 @@ __all__ = [
     "no_estimate",
     "shipped",
     "unit_bodies",
+    "widths",
 ]
 
 _LAYER_COLOURS = (
@@ -41,6 +44,9 @@ _LAYER_COLOURS = (
     (0.55, 0.85, 0.85),
     (0.95, 0.60, 0.55),
 )
+_RESERVED = re.compile(r"(layer|wire)[0-9]+|fpcb")
+"""Names of bodies that are not printed."""
+_TABLES = {"layer": ("layers", "[[layers]] table"), "wire": ("wires", "wire"), None: ("fpcb", "[fpcb] table")}
 _MOTOR_COLOUR, CIRCUIT_COLOUR = (0.70, 0.70, 0.78), (0.93, 0.56, 0.15)
 
 
@@ -88,12 +94,22 @@ def unit_bodies(spec: Spec) -> tuple[Body, ...]:
 
     "layer1" ... are cast. Motor ("motor"), circuit ("fpcb") and wires ("wire1" ...) are bought, and added where the
     design draws none. Whatever else it names is printed.
+
+    Raises Refusal for a layer, circuit or wire that the spec lacks.
     """
     design = design_of(spec)
     dims = design.dimensions(spec)
     drawn = design.layers(spec, dims)
     names = [f"layer{i + 1}" for i in range(len(spec.layers))]
     inside = {body.name: body for body in _inside(spec, dims)}
+    for name in drawn:
+        if (reserved := _RESERVED.fullmatch(name)) and name not in names and name not in inside:
+            field, word = _TABLES[reserved[1]]
+            limit = (
+                f"design {spec.design} has the body {name}, and the spec has no {word} for it; "
+                "add it, or name the body otherwise if it is a printed part"
+            )
+            raise Refusal(field, len(names) if field == "layers" else None, limit)
     bodies = []
     for i, (name, shape) in enumerate(drawn.items()):
         if name in inside:
@@ -103,6 +119,17 @@ def unit_bodies(spec: Spec) -> tuple[Body, ...]:
         kind, made = ("layer", "cast") if step else ("printed", "printed")
         bodies.append(Body(name, "unit", kind, shape, layer_colour(i), made=made, step=step))
     return (*bodies, *(body for body in inside.values() if body.name not in drawn))
+
+
+def widths(spec: Spec, boxes: Sequence[Sequence[float]]) -> tuple[float, ...]:
+    """Return a unit's diameter, mm; of a custom design its width, or those along x and y if they differ.
+
+    `boxes` are the bounding boxes of its bodies without motor, circuit and wires: x0, y0, z0, x1, y1, z1.
+    """
+    if not (is_custom(spec.design) and boxes):
+        return (spec.diameter_mm,)
+    x, y = (max(box[k + 3] for box in boxes) - min(box[k] for box in boxes) for k in (0, 1))
+    return (x, y) if abs(x - y) > 0.005 * max(x, y) else (max(x, y),)
 
 
 def inserts(spec: Spec) -> tuple[Body, ...]:

@@ -29,7 +29,7 @@ from unitcad.attenuation.edge.shrunk_fit import (
     paired,
     shrunk,
 )
-from unitcad.attenuation.edge.variant_units import nominal
+from unitcad.attenuation.edge.variant_units import MANY_LAYERS, MOST_LAYERS, nominal
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import materials
 from unitcad.catalogue.entries import Frequency, MaterialEntry
@@ -243,6 +243,9 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
     if not settings.with_paper and len(lab.units) < LEAST_ALONE:
         limit = f"{len(lab.units)} units; without the paper's {LEAST_ALONE} are needed"
         raise Refusal("unit", None, limit)
+    for i, unit in enumerate(lab.units):
+        if len(estimate_input(unit.spec, unit.frequency_hz).layers) > MOST_LAYERS:
+            raise Refusal(f"unit.{i}", unit.name, f"can't be fitted: {MANY_LAYERS}")
     by_source: dict[str, Compared] = {}
     for moduli in SOURCES:
         say(f"{moduli} moduli")

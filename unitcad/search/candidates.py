@@ -24,7 +24,7 @@ from unitcad.designs import dimensions
 from unitcad.designs import shipped as designs
 from unitcad.designs.dimensions import MOTOR_CLEARANCE
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input, silicone_layer
+from unitcad.estimating import drawn_input, silicone_layer
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search.target_file import MOST_GEOMETRIES, Target
 from unitcad.spec import Spec
@@ -160,7 +160,7 @@ def spec_data(target: Target, lengths: Lengths, materials: Sequence[str], name: 
 def geometry_of(target: Target, lengths: Lengths) -> Geometry:
     """Return the geometry of lengths. Raises Refusal if the design does not accept them."""
     spec = from_data(spec_data(target, lengths, (target.materials[0],) * len(lengths.walls)))
-    return Geometry(lengths, spec, estimate_input(spec))
+    return Geometry(lengths, spec, drawn_input(spec))
 
 
 def geometries(target: Target, say: Say = lambda stage: None) -> tuple[list[Geometry], dict[str, list[str]]]:

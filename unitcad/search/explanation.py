@@ -11,6 +11,7 @@ import numpy as np
 from msgspec import structs
 
 from unitcad.attenuation.edge.estimates import rounded
+from unitcad.attenuation.edge.variant_units import MANY_LAYERS, MOST_LAYERS
 from unitcad.errors import unknown_name
 from unitcad.estimating import estimate_input
 from unitcad.search.candidates import Candidates, Geometry, Lengths, tabulate
@@ -86,6 +87,8 @@ def _of_spec(made: Inversion, spec: Spec, alike: str | None) -> dict[str, Any]:
         reasons.append(f"not tried: {other if alike else 'its lengths lie between the steps, see vary.step_mm'}")
     variant, body = estimate_input(spec, found.target.wish.frequency_hz), found.geometries[0].variant
     data = _data(made, spec.name, measurement(found.target, variant))
+    if len(variant.layers) > MOST_LAYERS:
+        return {**data, "reasons": [*reasons, f"no level: {MANY_LAYERS}"]}
     unknown = [layer for layer in variant.layers if layer.youngs_modulus.value is None]
     if unknown:
         names = listed(dict.fromkeys(layer.material for layer in unknown))

@@ -25,6 +25,7 @@ from unitcad import catalogue
 from unitcad.attenuation.edge.fitted_models import MODELS
 from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.attenuation.edge.predictive import STACKED, check_models
+from unitcad.attenuation.edge.variant_units import MOST_LAYERS
 from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
@@ -44,7 +45,7 @@ Pitch = Annotated[float, Meta(ge=1, le=MOST_PITCH_MM, description="between the m
 CureHours = Annotated[
     float, Meta(ge=0.01, le=1e5, description="from the first weighing until the unit is out of the mould")
 ]
-Layers = Annotated[int, Meta(ge=1, le=5)]
+Layers = Annotated[int, Meta(ge=1, le=MOST_LAYERS, description="units of more have no level")]
 Wall = Annotated[float, Meta(ge=LEAST_LAYER, le=20)]
 Step = Annotated[float, Meta(ge=0.01, le=10)]
 Name = Annotated[str, Meta(min_length=1, max_length=60)]
@@ -87,7 +88,7 @@ class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     Without `wall_mm` see `walls`.
     """
 
-    layers: Annotated[tuple[Layers, ...], Meta(min_length=1, max_length=5)] = (1, 2)
+    layers: Annotated[tuple[Layers, ...], Meta(min_length=1, max_length=MOST_LAYERS)] = (1, 2)
     wall_mm: tuple[Wall, Wall] | None = None
     cap_mm: tuple[Wall, Wall] | None = None
     diameter_mm: tuple[kinds.MotorDiameter, kinds.MotorDiameter] | None = None

@@ -11,7 +11,7 @@ from unitcad import catalogue
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.steps import in_short
 from unitcad.checks import check_moulds
-from unitcad.designs import design_of, no_estimate
+from unitcad.designs import design_of, no_estimate, widths
 from unitcad.errors import Refusal
 from unitcad.estimating import closed_forms, estimate_spec, motor_mass
 from unitcad.export.svg import unit_section
@@ -109,7 +109,9 @@ def _unit(spec: Spec, answer: Answer) -> None:
     answer.warnings = warnings(spec)
     boxes = [solid.bounding_box() for solid in solids.values()]
     height = max(box[5] for box in boxes) - min(box[2] for box in boxes)
-    answer.figures = [("diameter", spec.diameter_mm, "mm"), ("height", height, "mm")]
+    across = widths(spec, [solids[body.name].bounding_box() for body in moulds.unit if body.made != "bought"])
+    names = ("diameter",) if not is_custom(spec.design) else ("width",) if len(across) == 1 else ("length", "width")
+    answer.figures = [(name, size, "mm") for name, size in zip((*names, "height"), (*across, height), strict=True)]
     grams = _grams(
         spec, [solids[f"layer{i + 1}"].volume() for i in range(len(spec.layers)) if f"layer{i + 1}" in solids]
     )

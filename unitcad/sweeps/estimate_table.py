@@ -10,18 +10,19 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from unitcad.attenuation.edge.bush import sections
-from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.closed_form import CONTROL_PASSES, Section, Units
 from unitcad.attenuation.edge.fitted_models import edge_levels, stored
+from unitcad.attenuation.edge.variant_units import MANY_LAYERS, MOST_LAYERS
 from unitcad.attenuation.inputs import Geometry
 from unitcad.errors import UnitcadError
-from unitcad.estimating import closed_forms, estimate_input
+from unitcad.estimating import closed_forms, drawn_input
 from unitcad.spec import Spec
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.batch_options import BatchOptions
@@ -46,7 +47,7 @@ FIELDS = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
 
 @dataclass(frozen=True)
 class _Known:
-    """Input of the models for one combination: passes, lengths (m), omega, and (N, 4) of the layers' FIELDS.
+    """Input of the models for one combination: passes, lengths (m), omega, the layers' silicones and (N, 4) FIELDS.
 
     A silicone that is known as a range only has NaN: no number can be given.
     """
@@ -58,6 +59,7 @@ class _Known:
     omega: float
     geometry: Geometry
     walls: tuple[float, ...]
+    materials: tuple[str, ...]
     silicones: np.ndarray
     models: tuple[str, ...]
     fit: str | None = None
@@ -66,11 +68,15 @@ class _Known:
 
 @dataclass(frozen=True)
 class EstimateBlock:
-    """Variants from `start` on: edge levels by model (NaN: no number), and the input of each or why it is refused."""
+    """Variants from `start` on: edge levels by model (NaN: no number), and the input of each or why it is refused.
+
+    `layered`: whether a variant has too many layers for a level.
+    """
 
     start: int
     levels: dict[str, np.ndarray]
     known: list[_Known | UnitcadError]
+    layered: np.ndarray
 
 
 def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
@@ -143,7 +149,7 @@ def _of(sweep: Sweep, index: int, free: set[str]) -> _Known | UnitcadError:
 
 
 def _known(spec: Spec) -> _Known:
-    asked = estimate_input(spec)
+    asked = drawn_input(spec)
     return _Known(
         design=spec.design,
         name=spec.name,
@@ -152,6 +158,7 @@ def _known(spec: Spec) -> _Known:
         omega=2.0 * np.pi * asked.frequency.middle,
         geometry=asked.geometry,
         walls=tuple(layer.thickness for layer in asked.layers),
+        materials=tuple(layer.material for layer in asked.layers),
         silicones=np.array([_silicone(layer) for layer in asked.layers]),
         models=closed_forms(spec.estimate.models),
         fit=spec.estimate.fit_source,
@@ -170,6 +177,7 @@ def _block(
 ) -> EstimateBlock:
     """Evaluate one block: the combinations' inputs, with the free axes' values put in."""
     levels: dict[str, np.ndarray] = {}
+    layered = np.zeros(len(known), dtype=bool)
     by_layers: dict[int, list[int]] = {}
     for row, entry in enumerate(known):
         if isinstance(entry, _Known):
@@ -178,6 +186,7 @@ def _block(
         chosen = np.array(rows)
         there = [entry for entry in (known[row] for row in rows) if isinstance(entry, _Known)]
         silicones = np.array([entry.silicones for entry in there])
+        materials = np.array([entry.materials for entry in there], dtype=object)
         omega = np.array([entry.omega for entry in there])
         for position in free:
             path, at = sweep.axes[position].path, digits[position + 1][chosen]
@@ -193,7 +202,8 @@ def _block(
                 elif path == "estimate.frequency_hz":
                     omega[here] = value.omega
                 elif match := re.fullmatch(r"layers\.(\d+)\.material", path):
-                    silicones[here, int(match[1])] = value.silicones[int(match[1])]
+                    layer = int(match[1])
+                    silicones[here, layer], materials[here, layer] = value.silicones[layer], value.materials[layer]
         units = Units(
             **{field: silicones[..., i] for i, field in enumerate(FIELDS)},
             thickness=np.array([entry.walls for entry in there]),
@@ -201,16 +211,45 @@ def _block(
             passes=np.array([entry.passes for entry in there]),
             section=sections([entry.geometry for entry in there]),
         )
+        alike = list(_merged(units, materials[:, 1:] == materials[:, :-1]))
+        for rows, own in alike:
+            layered[chosen[rows]] = own.thickness.shape[1] > MOST_LAYERS
         unknown = np.isnan(silicones).any(axis=(1, 2))
         for model in dict.fromkeys(model for entry in there for model in entry.models):
             column = levels.setdefault(model, np.full(len(known), np.nan))
             for fit, moduli in dict.fromkeys((entry.fit, entry.moduli) for entry in there):
                 of_these = [model in one.models and (one.fit, one.moduli) == (fit, moduli) for one in there]
                 constants = lab_fit(fit).constants(model) if fit else stored(moduli)[model]
-                column[chosen] = np.where(
-                    np.array(of_these) & ~unknown, edge_levels(units, model, constants), column[chosen]
-                )
-    return EstimateBlock(start, levels, known)
+                found = np.full(len(there), np.nan)
+                for rows, own in alike:
+                    found[rows] = edge_levels(own, model, constants)
+                column[chosen] = np.where(np.array(of_these) & ~unknown, found, column[chosen])
+    return EstimateBlock(start, levels, known, layered)
+
+
+def _merged(units: Units, same: np.ndarray) -> Iterator[tuple[np.ndarray, Units]]:
+    """Yield rows of units and these units, neighbouring layers of one silicone as one: `variant_units.merged`.
+
+    `same` (rows, N - 1) tells where a layer is of the silicone of the one inside it.
+    """
+    assert units.section is not None
+    for pattern in np.unique(same, axis=0):
+        rows = np.flatnonzero((same == pattern).all(axis=1))
+        first = np.flatnonzero(np.append(True, ~pattern))
+        last = np.append(first[1:], units.thickness.shape[1]) - 1
+        section = {field.name: getattr(units.section, field.name)[rows] for field in fields(Section)}
+        section["outer_radii"] = section["outer_radii"][:, last]
+        section["caps"] = np.add.reduceat(section["caps"], first, axis=1)
+        yield (
+            rows,
+            Units(
+                **{field: getattr(units, field)[rows][:, first] for field in FIELDS},
+                thickness=np.add.reduceat(units.thickness[rows], first, axis=1),
+                omega=units.omega[rows],
+                passes=units.passes[rows] if len(first) > 1 else np.full(len(rows), CONTROL_PASSES),
+                section=Section(**section),
+            ),
+        )
 
 
 def _frequencies(sweep: Sweep, position: int, values: dict) -> np.ndarray | None:
@@ -251,7 +290,8 @@ def _entries(sweep: Sweep, blocks: list[EstimateBlock]) -> Iterator[JournalEntry
             edges = {name: _rounded(column[row]) for name, column in levels.items()}
             name = values.get("name", known.name)
             columns = {"name": name, "design": known.design, "diameter_mm": known.diameter_mm, **edges}
-            yield JournalEntry(index=index, status=OK, values=values, row=columns)
+            reason = MANY_LAYERS if block.layered[row] else ""
+            yield JournalEntry(index=index, status=OK, reason=reason, values=values, row=columns)
 
 
 def _rounded(level: float) -> float | None:

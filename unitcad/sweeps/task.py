@@ -14,6 +14,7 @@ from functools import cache, partial
 from pathlib import Path
 
 from unitcad import files
+from unitcad.attenuation.edge.variant_units import MANY_LAYERS
 from unitcad.cache import Bundle, DiskStore, MemoryStore, MissingContent, SharedStore, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import write as folders
@@ -223,13 +224,14 @@ def _outcome(
     job: Job, spec: Subject, folder: str, manifest: Manifest, sha256: str, counts: Counter[str]
 ) -> VariantOutcome:
     """Return the outcome of a variant that is there; `sha256` is that of its manifest.json."""
-    codes = failed_codes(manifest)
+    codes, level = failed_codes(manifest), manifest["estimate"]
+    reason = MANY_LAYERS if level and MANY_LAYERS in level["answer"] else ""
     return VariantOutcome(
         job.index,
         BROKEN if codes else OK,
         folder,
         row(spec.unit, manifest),
-        f"broken: {', '.join(codes)}" if codes else "",
+        f"broken: {', '.join(codes)}" if codes else reason,
         manifest=sha256,
         built=counts["file built"] + counts["data built"],
         reused=counts["file reused"] + counts["data reused"],

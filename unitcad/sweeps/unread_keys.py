@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from unitcad.attenuation.edge.answer import typical_errors
 from unitcad.attenuation.edge.fitted_models import edge_levels, stored
-from unitcad.attenuation.edge.variant_units import nominal
+from unitcad.attenuation.edge.variant_units import MOST_LAYERS, nominal
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.errors import UnitcadError
@@ -84,9 +84,10 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
 def _not_measured(sweep: Sweep, specs: Sequence[Spec]) -> dict[str, float]:
     """Return the swept lengths with values that no measured unit of as many layers had, and the one that these had."""
     shared, found = measurements().unit, dict[str, float]()
-    walls = [2 * shared.wall_mm / count for count in sorted({len(spec.layers) for spec in specs})]
+    counts = {len(spec.layers) for spec in specs}
+    walls = [2 * shared.wall_mm / count for count in sorted(counts) if count <= MOST_LAYERS]
     for path in sweep.paths:
-        if not _LENGTH.fullmatch(path):
+        if not _LENGTH.fullmatch(path) or not walls:
             continue
         measured = [shared.diameter_mm] if path == "diameter_mm" else walls
         values = [value for value in _values(sweep, path) if isinstance(value, int | float)]
@@ -129,14 +130,14 @@ def _spread(count: int, most: int) -> list[int]:
 
 
 def _spec(sweep: Sweep, index: int) -> Spec | None:
-    """Return a variant's spec; None where it is refused or has no estimate."""
+    """Return a variant's spec; None if it is refused, or has no estimate or no level for its layers."""
     try:
         spec = sweep.spec(index)
         assert isinstance(spec, Spec)
-        estimate_input(spec)
+        variant = estimate_input(spec)
     except UnitcadError:
         return None
-    return spec
+    return spec if len(variant.layers) <= MOST_LAYERS else None
 
 
 def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[str, list[float]]:

@@ -19,6 +19,7 @@ from unitcad.attenuation.edge.bush import CHOSEN, Form, bush
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.measured_levels import MeasuredTable, Moduli, Predict, measured_table
 from unitcad.attenuation.edge.scores import Assessment, Choice, Fit, assess, choose_without, sign_flip_p
+from unitcad.attenuation.edge.variant_units import MOST_LAYERS
 
 MODELS = ("bush", "fitted", "paper", "consistent")
 """The models that give an estimate."""
@@ -188,6 +189,8 @@ def path_of(model: str, constants: Mapping[str, float] | None = None) -> Predict
 
 def edge_levels(units: Units, model: str, constants: Mapping[str, float] | None = None) -> Any:
     """Return the edge level (motor amplitude = 1) by a model of `MODELS`, shape (...), by the stored
-    constants of moduli at the motor's frequency where none are given.
+    constants of moduli at the motor's frequency where none are given. NaN for units of more than `MOST_LAYERS`.
     """
+    if units.thickness.shape[-1] > MOST_LAYERS:
+        return np.full(units.thickness.shape[:-1], np.nan)
     return (constants or stored()[model])["s"] * path_of(model, constants)(units)

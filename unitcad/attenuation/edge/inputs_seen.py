@@ -60,12 +60,13 @@ def changed(variant: EstimateInput) -> Mapping[str, Scaled]:
     """Return every input of a variant by its name: a function from the variant and a factor to the changed variant."""
     by_name: dict[str, Scaled] = {}
     geometry = variant.geometry
-    for i, shape in enumerate(geometry.layers):
-        by_name[f"layers.{i}.wall_mm"] = partial(_wall, i)
+    for i, (layer, shape) in enumerate(zip(variant.layers, geometry.layers, strict=True)):
+        path = f"layers.{i if layer.first is None else layer.first}"
+        by_name[f"{path}.wall_mm"] = partial(_wall, i)
         if shape.cap:
-            by_name[f"layers.{i}.cap_mm"] = partial(_cap, i)
+            by_name[f"{path}.cap_mm"] = partial(_cap, i)
         for name, field in _SILICONE.items():
-            by_name[f"layers.{i}.{name}"] = partial(_silicone, i, field)
+            by_name[f"{path}.{name}"] = partial(_silicone, i, field)
     by_name["diameter_mm"] = _diameter
     by_name["motor.diameter_mm"] = _motor_diameter
     by_name["motor.thickness_mm"] = _motor_height

@@ -140,11 +140,11 @@ def quantiles(df: int, centre: float, scale: float) -> tuple[float, ...]:
     return tuple(float(np.exp(centre + scale * stdtrit(df, percent / 100))) for percent in PERCENT)
 
 
-def predictive_block(fit: LabFit, model: str, variant: EstimateInput) -> dict[str, Any]:
-    """Return a variant's predictive as data: P10, P90, and the distribution of ln level."""
+def predictive_block(fit: LabFit, model: str, variant: EstimateInput, reason: str) -> dict[str, Any]:
+    """Return a variant's predictive as data: P10, P90, and the distribution of ln level; `reason` says why not."""
     df, centre, scale = predictive(fit, model, variant)
     if not np.isfinite(centre):
-        return {"p10": None, "p90": None, "reason": "an input is not known"}
+        return {"p10": None, "p90": None, "reason": reason}
     low, high = quantiles(df, centre, scale)
     return {
         "p10": low,

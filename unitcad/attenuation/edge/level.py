@@ -14,7 +14,7 @@ from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import edge_levels, path_of, stored
 from unitcad.attenuation.edge.inputs_seen import STEP, ends, inputs_seen
 from unitcad.attenuation.edge.lab_fit import LabFit, predictive_block
-from unitcad.attenuation.edge.variant_units import FIELDS, nominal, stacked
+from unitcad.attenuation.edge.variant_units import FIELDS, MANY_LAYERS, MOST_LAYERS, nominal, stacked
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 
 _MOST_CORNERS = 12
@@ -114,7 +114,9 @@ def _control_corners(variant: EstimateInput, layer: int) -> Units:
 
 @lru_cache(maxsize=4)
 def unknown(variant: EstimateInput) -> str:
-    """Return why there can be no number: the first input that is not known; empty if all are."""
+    """Return why there can be no number: too many layers, or the first input that is not known; empty for neither."""
+    if len(variant.layers) > MOST_LAYERS:
+        return MANY_LAYERS
     for (name, field), quantity in _inputs(variant):
         if not quantity.known:
             return f"{name} {field}: {quantity.note}"
@@ -183,7 +185,7 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
         },
     }
     if fit:
-        block["predictive"] = predictive_block(fit, model, variant)
+        block["predictive"] = predictive_block(fit, model, variant, unknown(variant))
     if variant.amplitude is not None:
         factor = scale * variant.amplitude * 1e6
         block["edge_amplitude_um"] = spread(variant, lambda: factor * path("s", None))

@@ -9,6 +9,7 @@ from typing import Any, get_args
 import numpy as np
 from scipy.stats import binom
 
+from unitcad.attenuation.edge.variant_units import no_level
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.attenuation.mechanics.harmonic_response import Contact
 from unitcad.attenuation.mechanics.motor_level import Drive, Reading, level
@@ -42,7 +43,7 @@ def range_block(
     The draws are spread evenly (`Draw.of`). low, median and high are percentiles; `by_contact` has them for bonded and
     for resting skin apart. median_error: `MEDIAN_ERROR`; None below three draws. `drawn_as`: the level of the unit as
     its spec draws it, bonded, all values nominal: one of many, not the estimate. A unit with a silicone of unknown
-    modulus has an empty `levels` and a `reason`.
+    modulus, or with more than two layers, has an empty `levels` and a `reason`.
     """
     data: dict[str, Any] = {
         "kind": KIND,
@@ -53,8 +54,7 @@ def range_block(
         "percent": list(PERCENT),
         "median_error": MEDIAN_ERROR,
     }
-    reason = next((layer.youngs_modulus.note for layer in variant.layers if not layer.youngs_modulus.known), None)
-    if reason:
+    if reason := no_level(variant):
         return {**data, "levels": [], "reason": reason}
     cases: list[tuple[Drive, Reading]] = [(drive, at) for drive in get_args(Drive) for at in get_args(Reading)]
     found: dict[tuple[Drive, Reading], list[float]] = {case: [] for case in cases}

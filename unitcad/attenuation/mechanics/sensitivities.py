@@ -8,6 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from unitcad.attenuation.edge.inputs_seen import inputs_seen
+from unitcad.attenuation.edge.variant_units import no_level
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.attenuation.mechanics.motor_level import Reading, amplitude, motion
 from unitcad.attenuation.mechanics.unknowns import Setting
@@ -19,11 +20,11 @@ STEP, FINENESS = 0.01, 0.5
 def mechanics_inputs(
     variant: EstimateInput, say: Callable[[str], None] = lambda line: None, step: float = STEP
 ) -> list[dict[str, Any]]:
-    """Return `inputs_seen` of each reading, of the unit as drawn, bonded, all values nominal; [] without a modulus.
+    """Return `inputs_seen` of each reading, of the unit as drawn, bonded, all values nominal; [] without a level.
 
     One finite-element solution for each end of each input serves both readings.
     """
-    if not all(layer.youngs_modulus.known for layer in variant.layers):
+    if no_level(variant):
         return []
     drive = variant.drive
     levels: dict[Reading, list[float]] = {reading: [] for reading in get_args(Reading)}
