@@ -95,6 +95,12 @@ class Layer:
     colours: np.ndarray
     patches: np.ndarray
 
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """The rectangle, as an index."""
+        rows, columns = self.depth.shape
+        return slice(self.top, self.top + rows), slice(self.left, self.left + columns)
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -283,8 +289,7 @@ def compose(layers: Sequence[Layer], view: Camera, wires: bool = False) -> tuple
     tints, patches = [np.full((1, 4), 255, np.uint8)], [np.zeros(1, np.int32)]
     count = 1
     for one in layers:
-        rows, columns = one.depth.shape
-        at = np.s_[one.top : one.top + rows, one.left : one.left + columns]
+        at = one.window
         nearer = one.depth > depth[at] - 0.05 / view.scale
         np.copyto(depth[at], one.depth, where=nearer)
         np.add(one.face, np.int32(count), out=shown[at], where=nearer)
