@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import textwrap
 
 from benchmarks.accuracy.result import Plot, frontier
-from unitcad.export.chart import COLOURS, line, round_step, text, upward_name
+from unitcad.export.chart import COLOURS, axis, frame, legend, line, page, text
 
 WIDTH, HEIGHT = 720, 440
 LEFT, RIGHT, TOP, BOTTOM = 70, 190, 36, 52
@@ -28,38 +27,17 @@ def svg(plot: Plot) -> str:
         for name, points in plot.series.items()
     }
     everything = [point for points in series.values() for point in points]
-    xs = [x for x, _ in everything]
-    x0, x1 = (min(xs, default=0.0), max(xs, default=1.0)) if plot.linear_x else _decades(xs)
-    y0, y1 = _decades([y for _, y in everything])
-
-    def at(x: float, y: float) -> tuple[float, float]:
-        across = ((x if plot.linear_x else math.log10(x)) - x0) / ((x1 - x0) or 1)
-        up = (math.log10(y) - y0) / (y1 - y0)
-        return LEFT + across * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM)
-
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
-        'font-family="sans-serif" font-size="12">',
-        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
-        text(LEFT, 20, plot.title, size=14),
-    ]
-    for value, label in _ticks(x0, x1) if plot.linear_x else _powers(int(x0), int(x1)):
-        x, low = at(value, 10.0**y0)
-        parts += [line(x, low, x, TOP, "#e2e2e2"), text(x, low + 16, label, "middle")]
-    for value, label in _powers(y0, y1):
-        left, y = at(x0 if plot.linear_x else 10.0**x0, value)
-        parts += [line(left, y, WIDTH - RIGHT, y, "#e2e2e2"), text(left - 6, y + 4, label, "end")]
-    parts += [
-        line(LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, HEIGHT - BOTTOM, "#444444"),
-        line(LEFT, HEIGHT - BOTTOM, LEFT, TOP, "#444444"),
-        text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 14, plot.x_label, "middle"),
-        upward_name(16, (TOP + HEIGHT - BOTTOM) / 2, plot.y_label),
-    ]
+    xs, right, bottom = [x for x, _ in everything], WIDTH - RIGHT, HEIGHT - BOTTOM
+    whole = (min(xs, default=0.0), max(xs, default=1.0)) if plot.linear_x else None
+    across = axis(xs, LEFT, right, not plot.linear_x, whole)
+    up = axis([y for _, y in everything], bottom, TOP, log=True)
+    parts = [text(LEFT, 20, plot.title, size=14)]
+    parts += frame(across, up, (LEFT, right, TOP, bottom), plot.x_label, plot.y_label, aside=54)
     best = {point for point, on in zip(everything, frontier(everything), strict=True) if on} if plot.frontier else None
-    drawn, legend, y, marked = [], [], TOP + 12, 0
+    drawn, key, y, marked = [], [], TOP + 12, 0
     for i, (name, points) in enumerate(series.items()):
         colour = COLOURS[i % len(COLOURS)]
-        spots = [at(x, y) for x, y in points]
+        spots = [(across.at(x), up.at(y)) for x, y in points]
         curve = name in plot.curves
         one = []
         if (plot.lines or curve) and len(spots) > 1:
@@ -67,25 +45,24 @@ def svg(plot: Plot) -> str:
             stroke = 'stroke-width="2"' if curve else 'stroke-opacity="0.5"'
             one.append(f'<polyline points="{path}" fill="none" stroke="{colour}" {stroke}/>')
         if curve:
-            legend.append(line(WIDTH - RIGHT + 10, y - 4, WIDTH - RIGHT + 22, y - 4, colour))
+            key.append(line(right + 10, y - 4, right + 22, y - 4, colour))
         else:
             size = 3.5 + 1.2 * (marked % 4) + 0.6 * (marked // 4)
             filled = [best is None or point in best for point in points]
             one += [_marker(marked, *spot, size, colour, full) for spot, full in zip(spots, filled, strict=True)]
-            legend.append(_marker(marked, WIDTH - RIGHT + 16, y - 4, 4.0, colour, True))
+            key.append(_marker(marked, right + 16, y - 4, 4.0, colour, True))
             marked += 1
         drawn.append(one)
-        for words in textwrap.wrap(name, LEGEND_LETTERS):
-            legend.append(text(WIDTH - RIGHT + 26, y, words))
-            y += 15
-        y += 4
+        words = legend(right + 26, y, name, LEGEND_LETTERS)
+        key += words
+        y += 15 * len(words) + 4
     if best is not None:
-        legend += [
-            text(WIDTH - RIGHT + 10, y + 6 + 15 * i, words)
+        key += [
+            text(right + 10, y + 6 + 15 * i, words)
             for i, words in enumerate(("filled: on the frontier", "hollow: beaten in both"))
         ]
     # The last series has the largest markers: where series coincide, the smaller ones lie on top of it.
-    return "\n".join([*parts, *(part for one in reversed(drawn) for part in one), *legend, "</svg>", ""])
+    return page(WIDTH, HEIGHT, [*parts, *(part for one in reversed(drawn) for part in one), *key])
 
 
 def _marker(kind: int, x: float, y: float, size: float, colour: str, full: bool) -> str:
@@ -96,24 +73,3 @@ def _marker(kind: int, x: float, y: float, size: float, colour: str, full: bool)
         return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size:g}" {fill}/>'
     path = " ".join(f"{x + size * dx:.1f},{y + size * dy:.1f}" for dx, dy in corners)
     return f'<polygon points="{path}" {fill}/>'
-
-
-def _powers(low: int, high: int) -> list[tuple[float, str]]:
-    """Return nine powers of ten or fewer between the ends, and how they are written."""
-    decades = range(low, high + 1, max(1, math.ceil((high - low) / 8)))
-    return [(10.0**d, f"{10.0**d:g}" if -3 <= d <= 4 else f"1e{d}") for d in decades]
-
-
-def _ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Return six round numbers or fewer between the ends."""
-    step = round_step(high - low, 6)
-    return [
-        (k * step, f"{k * step:g}") for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
-    ]
-
-
-def _decades(values: list[float]) -> tuple[int, int]:
-    if not values:
-        return 0, 1
-    low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
-    return low, max(high, low + 1)

@@ -131,7 +131,8 @@ def axis(
         first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
         last = max(last, first + 1)
         step = max(1, math.ceil((last - first) / 8))
-        ticks = [(10.0**d, f"{10.0**d:g}") for d in range(first, last + 1, step)]
+        powers = range(first, last + 1, step)
+        ticks = [(10.0**d, f"{10.0**d:g}" if -5 < d < 6 else f"1e{d}") for d in powers]
         return Axis(lambda v: start + (math.log10(v) - first) / (last - first) * (end - start), ticks)
     if whole is not None and whole[1] > whole[0]:
         low, high = whole

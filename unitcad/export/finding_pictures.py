@@ -241,9 +241,9 @@ class _View:
         if near is None:  # what is marked shows through what lies before it
             hidden = Surface(scene.vertices, scene.faces[kind > 0], colour, inside=colour)
             one = raster.render(hidden, self.view)
-            at = np.s_[one.top : one.top + one.depth.shape[0], one.left : one.left + one.depth.shape[1]]
-            under = (one.face >= 0) & (one.depth < depth[at] - 0.5 / self.view.scale)
-            pixels[at][under, :3] = 0.55 * pixels[at][under, :3] + 0.45 * 255 * np.array(colour)
+            under = (one.face >= 0) & (one.depth < depth[one.window] - 0.5 / self.view.scale)
+            seen = pixels[one.window]
+            seen[under, :3] = 0.55 * seen[under, :3] + 0.45 * 255 * np.array(colour)
         self.pixels = Image.fromarray(pixels).convert("RGB").reduce(raster.SHARPER)
         self.depth = depth[:: raster.SHARPER, :: raster.SHARPER]
         self.sides = np.ptp(scene.vertices, axis=0)

@@ -95,6 +95,12 @@ class Layer:
     colours: np.ndarray
     patches: np.ndarray
 
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """The rectangle, as an index."""
+        rows, columns = self.depth.shape
+        return slice(self.top, self.top + rows), slice(self.left, self.left + columns)
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -198,14 +204,15 @@ def rasterise(
     That is the rectangle's first row and column, and of each pixel the face, -1 for none, and the depth in mm. Of two
     faces in one place, to a part of a pixel, the later one is seen.
     """
-    points = view.project(vertices[np.unique(faces)] if len(faces) else np.zeros((1, 3)))
-    low, high = np.floor(points[:, :2].min(axis=0)), np.ceil(points[:, :2].max(axis=0)) + 1
-    (left, top), (right, bottom) = (np.clip(ends, 0, view.size).astype(int) for ends in (low, high))
-    shape = int(bottom - top), int(right - left)
+    points = view.project(vertices)
+    reached = points[faces].reshape(-1, 3)[:, :2]
+    ends = reached.min(axis=0, initial=np.inf), reached.max(axis=0, initial=-np.inf) + 1
+    (left, top), (right, bottom) = (np.clip(np.floor(end), 0, view.size).astype(int) for end in ends)
+    shape = max(int(bottom - top), 0), max(int(right - left), 0)
     steps = 16 * view.scale
     least = np.full(shape[0] * shape[1], -np.inf)
     shown = np.full(len(least), -1, np.int32)
-    for face, pixel, depth in _fragments(view.project(vertices) - (left, top, 0.0), faces, shape):
+    for face, pixel, depth in _fragments(points - (left, top, 0.0), faces, shape):
         depth = np.round(depth * steps)
         kept = (depth <= cut * steps) & (depth >= least[pixel])
         face, pixel, depth = face[kept], pixel[kept], depth[kept]
@@ -282,8 +289,7 @@ def compose(layers: Sequence[Layer], view: Camera, wires: bool = False) -> tuple
     tints, patches = [np.full((1, 4), 255, np.uint8)], [np.zeros(1, np.int32)]
     count = 1
     for one in layers:
-        rows, columns = one.depth.shape
-        at = np.s_[one.top : one.top + rows, one.left : one.left + columns]
+        at = one.window
         nearer = one.depth > depth[at] - 0.05 / view.scale
         np.copyto(depth[at], one.depth, where=nearer)
         np.add(one.face, np.int32(count), out=shown[at], where=nearer)
