@@ -248,7 +248,7 @@ def test_step_without_the_extra_is_one_sentence(tmp_path: Path, monkeypatch: pyt
 
 def test_a_shipped_design_loads_no_mesh_rules() -> None:
     code = "import sys\nfrom unitcad.validation import load\nload('embedded')\n"
-    code += "print('unitcad.meshcheck.one_file' in sys.modules)"
+    code += "print('unitcad.meshcheck.file_checks' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 

@@ -54,7 +54,7 @@ class Asked:
 def run(asked: Asked) -> int:
     """Check the files and print or save the report; return the exit code. Raises UnitcadError or Refusal."""
     from unitcad.cli import check_settings
-    from unitcad.meshcheck import Options, many_files, output
+    from unitcad.meshcheck import Options, file_checks, output
     from unitcad.meshcheck.findings import MOST, SHOWN
     from unitcad.meshcheck.output import FORMATS, render
     from unitcad.meshcheck.rules.registry import check_prefixes, rules
@@ -113,9 +113,9 @@ def run(asked: Asked) -> int:
 
         draw = partial(finding_pictures.write, Path(asked.show))
     memory = asked.memory or configuration.value("memory") or 8000
-    check_all = partial(many_files.check_files, jobs=asked.jobs, memory_mb=memory, then=draw)
+    check_all = partial(file_checks.check_files, jobs=asked.jobs, memory_mb=memory, then=draw)
     left_out = configuration.left_out(asked.exclude or [])
-    files, unread = many_files.expand(asked.files or [], left_out)
+    files, unread = file_checks.expand(asked.files or [], left_out)
     reports = unread + _reports(files, configuration, options, asked.manifest, check_all)
     shown = MOST if asked.all_locations else SHOWN
     if base is not None:
@@ -132,7 +132,7 @@ def run(asked: Asked) -> int:
         written = render(reports, output_format, fail_on, configuration.shown, used)
         _write(written, plain=output_format == "text")
         sys.stderr.write(table)
-    return many_files.worst(reports, fail_on)
+    return file_checks.worst(reports, fail_on)
 
 
 def _copy(given: str, formats: Sequence[str]) -> tuple[str, Path]:
@@ -184,10 +184,11 @@ def _reports(
 
     if manifest is None:
         return list(check_all([(path, of_path(path)) for path in paths]))
+    from unitcad.catalogue import printers
     from unitcad.meshcheck import manifest as listing
 
     listed = listing.read(manifest)
-    work = listing.work(listed, paths, of_path, options.printer is not None)
+    work = listing.work(listed, paths, of_path, None if options.printer is not None else printers())
     compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
     return compared + listing.unchecked(listed, [path for path, _ in work], of_path)
 
