@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from unitcad import shape as shape
     from unitcad.api.build_call import BuildResult as BuildResult
     from unitcad.api.build_call import build as build
+    from unitcad.api.check_call import CheckResult as CheckResult
+    from unitcad.api.check_call import check as check
     from unitcad.api.estimate_call import EdgeEstimate as EdgeEstimate
     from unitcad.api.estimate_call import estimate as estimate
     from unitcad.catalogue import MaterialEntry as Material
@@ -32,8 +34,6 @@ if TYPE_CHECKING:
     from unitcad.catalogue import tissue as tissue
     from unitcad.errors import Refusal as Refusal
     from unitcad.errors import UnitcadError as UnitcadError
-    from unitcad.meshcheck.check_call import CheckResult as CheckResult
-    from unitcad.meshcheck.check_call import check as check
     from unitcad.pipeline.variant import Variant as Variant
     from unitcad.spec import Spec as Spec
     from unitcad.spec.asked import CastingTable as Casting
@@ -83,7 +83,7 @@ __all__ = [
 _PLACES = {
     "BuildResult": "api.build_call:BuildResult",
     "Casting": "spec.asked:CastingTable",
-    "CheckResult": "meshcheck.check_call:CheckResult",
+    "CheckResult": "api.check_call:CheckResult",
     "EdgeEstimate": "api.estimate_call:EdgeEstimate",
     "Estimate": "spec.asked:EstimateTable",
     "Fpcb": "spec.asked:FpcbTable",
@@ -100,7 +100,7 @@ _PLACES = {
     "attenuation": "attenuation",
     "build": "api.build_call:build",
     "catalogue": "catalogue",
-    "check": "meshcheck:check",
+    "check": "api.check_call:check",
     "estimate": "api.estimate_call:estimate",
     "load": "validation:load",
     "materials": "catalogue:materials",

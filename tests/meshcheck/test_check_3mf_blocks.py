@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from unitcad.meshcheck.findings import Unreadable
-from unitcad.meshcheck.readers.threemf import elements, model_part, uniform_blocks
+from unitcad.meshcheck.readers import threemf_model
+from unitcad.meshcheck.readers import threemf_schema as schema
 from unitcad.meshcheck.rules.f_file import Limits
 
 VERTICES = [
@@ -92,7 +93,7 @@ def _model(vertices: str, triangles: str = "", prefix: str = "", opened: str = "
     name = f"xmlns:{prefix[:-1]}" if prefix else "xmlns"
     body = f"{opened.format(prefix)}{vertices}</{prefix}vertices>\n<{prefix}triangles>{triangles}</{prefix}triangles>"
     return (
-        f'<{prefix}model {name}="{elements.CORE}"><{prefix}resources>'
+        f'<{prefix}model {name}="{schema.CORE}"><{prefix}resources>'
         f'<{prefix}object id="1"><{prefix}mesh>{body}</{prefix}mesh></{prefix}object></{prefix}resources>'
         f'<{prefix}build><{prefix}item objectid="1"/></{prefix}build></{prefix}model>'
     ).encode()
@@ -109,7 +110,7 @@ def _read(text: bytes, chunk: int) -> Any:
     """Return all that is read of a model part, or the findings that end it, in plain data."""
     chunks = [text[i : i + chunk] for i in range(0, len(text), chunk)]
     try:
-        model = model_part.read_model(chunks, "3D/a.model", Limits(max_faces=40))
+        model = threemf_model.read_model(chunks, "3D/a.model", Limits(max_faces=40))
     except Unreadable as stop:
         return str(stop.findings[-1].as_dict())
     meshes = [one.mesh for one in model.objects().values() if one.mesh]
@@ -119,10 +120,10 @@ def _read(text: bytes, chunk: int) -> Any:
 
 def _confirm_equal(text: bytes, chunk: int, block: int) -> None:
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(uniform_blocks, "_BLOCK", block)
-        patched.setattr(uniform_blocks, "_SHORTEST", 1)
+        patched.setattr(threemf_model, "_BLOCK", block)
+        patched.setattr(threemf_model, "_SHORTEST", 1)
         at_once = _read(text, chunk)
-        patched.setattr(model_part, "rest_for_parser", lambda chunks, _: chunks)
+        patched.setattr(threemf_model, "rest_for_parser", lambda chunks, _: chunks)
         assert at_once == _read(text, chunk)
 
 
@@ -157,15 +158,15 @@ def test_a_blank_that_xml_forbids_is_refused(blank: str) -> None:
 def test_a_comment_full_of_tags_goes_to_the_parser_in_one_piece() -> None:
     """The parser looks through an unfinished comment again with every piece."""
     text = _model(f"<!--{20_000 * '<vertices>'}-->")
-    reader = model_part._Reader(model_part.Model("a"), Limits(), 0)
+    reader = threemf_model._Reader(threemf_model.Model("a"), Limits(), 0)
     pieces = []
 
     def watched(chunks: Any) -> Any:
-        for piece in uniform_blocks.rest_for_parser(chunks, reader):
+        for piece in threemf_model.rest_for_parser(chunks, reader):
             pieces.append(piece)
             yield piece
 
-    model_part.stream(watched([text]), "a", reader.start, reader.end, reader.namespace, reader.parser)
+    threemf_model.stream(watched([text]), "a", reader.start, reader.end, reader.namespace, reader.parser)
     assert len(pieces) < 10
     assert b"".join(pieces) == text
 
@@ -175,23 +176,23 @@ def test_most_of_a_part_is_read_at_once(line_end: str) -> None:
     vertices = "".join(f'  <vertex x="{i}.5" y="-{i}" z="1e-{i % 9}"/>{line_end}' for i in range(5000))
     triangles = "".join(f'<triangle v1="{i}" v2="{i + 1}" v3="{i + 2}" />{line_end}' for i in range(4998))
     text = (
-        f'<model xmlns="{elements.CORE}"><resources><object id="1"><mesh>{line_end}<vertices>{line_end}{vertices}'
+        f'<model xmlns="{schema.CORE}"><resources><object id="1"><mesh>{line_end}<vertices>{line_end}{vertices}'
         f"</vertices><triangles>{triangles}</triangles></mesh></object></resources><build/></model>"
     ).encode()
     left = bytearray()
 
-    class Parsed(model_part._Reader):
+    class Parsed(threemf_model._Reader):
         pass
 
-    model = model_part.Model("a")
+    model = threemf_model.Model("a")
     reader = Parsed(model, Limits(), 0)
 
     def watched(chunks: Any) -> Any:
-        for piece in uniform_blocks.rest_for_parser(chunks, reader):
+        for piece in threemf_model.rest_for_parser(chunks, reader):
             left.extend(piece)
             yield piece
 
-    model_part.stream(watched([text]), "a", reader.start, reader.end, reader.namespace, reader.parser)
+    threemf_model.stream(watched([text]), "a", reader.start, reader.end, reader.namespace, reader.parser)
     assert len(left.strip()) < 400 + text.count(b"\n")
     (mesh,) = (one.mesh for one in model.objects().values())
     assert mesh is not None

@@ -1,4 +1,4 @@
-"""The mesh check works without the rest of the package: in a folder that holds nothing but the rooms below it."""
+"""The mesh check works without the rest of the package: copied with the few modules that it uses."""
 
 from __future__ import annotations
 
@@ -8,49 +8,45 @@ import subprocess
 import sys
 from pathlib import Path
 
-from shapes import box, package, stl
+from shapes import CUBE_CORNERS, CUBE_FACES, box, obj, package, stl
 
 import unitcad
 
-BELOW = (
-    "__init__.py",
-    "arguments.py",
-    "errors.py",
-    "text.py",
-    "files.py",
-    "workers.py",
-    "geometry",
-    "catalogue",
-    "meshcheck",
-)
+PARTS = ("__init__.py", "errors.py", "text.py", "files.py", "workers.py", "geometry", "meshcheck")
+LIBRARIES = {"numpy", "scipy", "manifold3d", "msgspec", "typing_extensions"}  # the last one if numpy finds it
 CODE = """
 import json, sys
-from unitcad.catalogue import printers
-from unitcad.meshcheck import Options, baseline, check_file, manifest
-from unitcad.meshcheck.many_files import check_files
+from types import SimpleNamespace
+from unitcad.meshcheck import Options, baseline, manifest
+from unitcad.meshcheck.file_checks import check_files
 from unitcad.meshcheck.output import FORMATS, render
 
 assert baseline.EMPTY.files == {} and callable(manifest.read)
-options = Options(printer=printers()["fdm-0.4"])
-reports = list(check_files([(path, options) for path in sys.argv[1:]]))
+sides = dict.fromkeys(("bed_x_mm", "bed_y_mm", "bed_z_mm"), 200.0)
+floors = dict.fromkeys(("least_wall_mm", "least_flat_wall_mm", "least_feature_mm", "layer_mm", "xy_play_mm"), 0.4)
+printer = SimpleNamespace(name="own", overhang_deg=45.0, bridge_mm=5.0, support=None, **sides, **floors)
+work = [(path, Options(printer=printer)) for path in sys.argv[1:]]
+reports = list(check_files(work))
+assert list(check_files(work, jobs=2)) == reports
 assert all(render(reports, form) for form in FORMATS)
-rooms = {name.split(".")[1] for name in sys.modules if name.startswith("unitcad.")}
-print(json.dumps([[[item.code for item in report.findings] for report in reports], sorted(rooms)]))
+loaded = {name: getattr(module, "__file__", None) or "" for name, module in sys.modules.items()}
+libraries = {name.partition(".")[0] for name, path in loaded.items() if "site-packages" in path}
+print(json.dumps([[[item.code for item in report.findings] for report in reports], sorted(libraries)]))
 """
 
 
-def test_check_needs_only_the_rooms_below_it(tmp_path: Path) -> None:
+def test_check_needs_only_the_modules_below_it(tmp_path: Path) -> None:
     whole, alone = Path(unitcad.__file__).parent, tmp_path / "unitcad"
     alone.mkdir()
-    for name in BELOW:
+    for name in PARTS:
         source = whole / name
         (shutil.copytree if source.is_dir() else shutil.copy)(source, alone / name)
     (tmp_path / "open.stl").write_bytes(stl(box()[2:]))
     (tmp_path / "whole.3mf").write_bytes(package())
-    done = subprocess.run(
-        [sys.executable, "-c", CODE, "open.stl", "whole.3mf"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    (tmp_path / "thin.obj").write_text(obj(CUBE_CORNERS * [10, 10, 0.2], CUBE_FACES))
+    command = [sys.executable, "-c", CODE, "open.stl", "whole.3mf", "thin.obj"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    codes, rooms = json.loads(done.stdout)
-    assert codes == [["T001"], []]
-    assert set(rooms) <= {Path(name).stem for name in BELOW}
+    codes, libraries = json.loads(done.stdout)
+    assert codes == [["T001"], [], ["D001"]]
+    assert set(libraries) <= LIBRARIES

@@ -18,7 +18,7 @@ from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.export import glb
 from unitcad.meshcheck.findings import Finding
-from unitcad.meshcheck.readers.sniff import reader_of
+from unitcad.meshcheck.readers import reader_of
 from unitcad.meshcheck.rules.f_file import Deadline, Limits
 
 CUBE = (CUBE_CORNERS * 0.01).astype("<f4")  # metres

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from shapes import CUBE_CORNERS, CUBE_FACES, ROOT_RELS, TYPES, box, mesh_xml, model_xml, package, stl, text_stl
 
 from unitcad.meshcheck import Limits, Options, check_file, check_mesh
-from unitcad.meshcheck.many_files import check_files, guarded
+from unitcad.meshcheck.file_checks import check_files, guarded
 
 OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in CUBE_CORNERS * 10)
 OBJ += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in CUBE_FACES)
@@ -174,7 +174,7 @@ def test_memory_limit_is_a_finding(tmp_path: Path) -> None:
     path.write_bytes(stl(np.tile(box(), (60_000, 1, 1)) + np.arange(720_000)[:, None, None] // 12 * 0.001))
     code = (
         "import sys, scipy.spatial, scipy.sparse.csgraph, manifold3d; from unitcad.meshcheck import Options; "
-        "from unitcad.meshcheck.many_files import check_files; import resource; "
+        "from unitcad.meshcheck.file_checks import check_files; import resource; "
         "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize() // 1_000_000; "
         f"r = list(check_files([({str(path)!r}, Options())], 1, used + 60)); "
         "sys.exit(0 if r[0].has('F011') else repr(r))"
@@ -194,7 +194,7 @@ def test_a_worker_that_dies_names_its_file(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_inner_fault_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("unitcad.meshcheck.many_files.check_file", lambda *_: 1 / 0)
+    monkeypatch.setattr("unitcad.meshcheck.file_checks.check_file", lambda *_: 1 / 0)
     report = guarded(str(tmp_path / "a.stl"), Options())
     assert report.has("F011")
     assert "ZeroDivisionError" in report.findings[0].message

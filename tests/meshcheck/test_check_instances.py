@@ -89,7 +89,7 @@ def test_depth_is_counted_over_what_was_visited_before(judge: Judge) -> None:
 def test_a_printers_rules_are_applied_once_to_instances_that_differ_by_their_place_on_the_bed(
     judge: Judge, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from unitcad.meshcheck import threemf_build
+    from unitcad.meshcheck import builds
 
     thin = mesh_xml(CUBE_CORNERS * [20, 0.2, 20])
     turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
@@ -105,8 +105,8 @@ def test_a_printers_rules_are_applied_once_to_instances_that_differ_by_their_pla
 
     single = [findings([matrix]) for matrix in matrices]
     calls = []
-    real = threemf_build.check_on_bed
-    monkeypatch.setattr(threemf_build, "check_on_bed", lambda *given: calls.append(1) or real(*given))
+    real = builds.check_on_bed
+    monkeypatch.setattr(builds, "check_on_bed", lambda *given: calls.append(1) or real(*given))
     found = findings(matrices)
     assert len(calls) == 2
     assert set(found) == set(single[0]) >= {"D001"}

@@ -13,10 +13,11 @@ import pytest
 from shapes import box, stl
 
 import unitcad
+from unitcad.catalogue import printers
 from unitcad.errors import UnitcadError
 from unitcad.meshcheck import FileReport, Options
 from unitcad.meshcheck import manifest as listing
-from unitcad.meshcheck.many_files import check_files
+from unitcad.meshcheck.file_checks import check_files
 
 BASE = stl(box((20, 20, 5)))
 FILM = stl(box((20, 3, 0.11)))
@@ -41,7 +42,7 @@ def _part(name: str, role: str, path: str, content: bytes, volume: float) -> dic
 
 def judged(folder: Path) -> dict[str, FileReport]:
     listed = listing.read(str(folder))
-    reports = list(check_files(listing.work(listed, [], lambda path: Options(), False)))
+    reports = list(check_files(listing.work(listed, [], lambda path: Options(), printers())))
     compared = [listing.compare(listed, report, Options()) for report in reports]
     return {Path(report.path).name: report for report in compared}
 
@@ -82,7 +83,7 @@ def test_m004_a_file_that_the_manifest_does_not_list(tmp_path: Path) -> None:
     folder = written(tmp_path)
     (folder / "other.stl").write_bytes(BASE)
     listed = listing.read(str(folder))
-    (report,) = check_files(listing.work(listed, [str(folder / "other.stl")], lambda path: Options(), False))
+    (report,) = check_files(listing.work(listed, [str(folder / "other.stl")], lambda path: Options(), printers()))
     assert codes(listing.compare(listed, report, Options())) == ["M004"]
 
 

@@ -16,7 +16,7 @@ from shapes import CUBE_CORNERS
 
 from unitcad.meshcheck.findings import Finding
 from unitcad.meshcheck.geometry.mesh import Mesh
-from unitcad.meshcheck.readers.sniff import reader_of
+from unitcad.meshcheck.readers import reader_of
 from unitcad.meshcheck.rules.f_file import Deadline, Limits
 
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]

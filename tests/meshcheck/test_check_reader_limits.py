@@ -14,7 +14,7 @@ import pytest
 from polygon_files import obj, off, ply
 from shapes import CUBE_CORNERS, box, text_stl
 
-from unitcad.meshcheck.readers.sniff import reader_of
+from unitcad.meshcheck.readers import reader_of
 from unitcad.meshcheck.rules.f_file import Deadline, Limits, Unreadable
 
 FACET = "\n".join(text_stl(box()).split("\n")[1:8]) + "\n"

@@ -11,7 +11,7 @@ from polygon_files import off, ply
 from shapes import CUBE_CORNERS, CUBE_FACES, box, mesh_xml, model_xml, obj, package, text_stl
 
 from unitcad.meshcheck import check_mesh
-from unitcad.meshcheck.readers.threemf.elements import CORE, ELEMENTS, MATERIAL
+from unitcad.meshcheck.readers.threemf_schema import CORE, ELEMENTS, MATERIAL
 
 SPELLINGS = (
     "nan",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.meshcheck import Limits, Options, check_file, many_files
+from unitcad.meshcheck import Limits, Options, check_file, file_checks
 from unitcad.meshcheck.readers import read_step
 
 
@@ -27,10 +27,10 @@ def test_step_in_a_folder_is_a_warning_without_the_extra(
     (tmp_path / "a.STEP").write_text("x")
     (tmp_path / "b.stl").write_text("x")
     monkeypatch.setattr(read_step, "installed", lambda: there)
-    paths, reports = many_files.expand([str(tmp_path)])
+    paths, reports = file_checks.expand([str(tmp_path)])
     assert [Path(path).name for path in paths] == (["a.STEP", "b.stl"] if there else ["b.stl"])
     assert [(report.verdict, report.has("F012")) for report in reports] == ([] if there else [("warning", True)])
-    assert many_files.expand([str(tmp_path / "a.STEP")]) == ([str(tmp_path / "a.STEP")], [])
+    assert file_checks.expand([str(tmp_path / "a.STEP")]) == ([str(tmp_path / "a.STEP")], [])
 
 
 @pytest.mark.parametrize(

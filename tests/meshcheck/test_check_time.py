@@ -115,18 +115,18 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
     import signal
     import time
 
-    from unitcad.meshcheck import many_files
+    from unitcad.meshcheck import file_checks
     from unitcad.meshcheck.rules import g_shells
     from unitcad.meshcheck.rules.f_file import Limits
 
     if not hasattr(signal, "setitimer"):
         pytest.skip("no interval timer")
-    monkeypatch.setattr(many_files, "_GRACE", 0.1)
+    monkeypatch.setattr(file_checks, "_GRACE", 0.1)
     monkeypatch.setattr(g_shells, "check_mesh", lambda *_: time.sleep(60))
     path = tmp_path / "a.stl"
     path.write_bytes(_stl())
-    report = many_files.guarded(str(path), Options(limits=Limits(seconds=1.0)))
+    report = file_checks.guarded(str(path), Options(limits=Limits(seconds=1.0)))
     assert {"F011", "T001", "G001"} <= {item.code for item in report.findings}
     assert next(item.message for item in report.findings if item.code == "F011") == "not finished within --timeout 1 s"
-    with pytest.raises(Unreadable), many_files._alarm(0.01):
+    with pytest.raises(Unreadable), file_checks._alarm(0.01):
         time.sleep(60)

@@ -9,12 +9,12 @@ from functools import partial
 from pathlib import Path
 
 from unitcad import catalogue, files
-from unitcad.catalogue import Printer
+from unitcad.catalogue import Printer, printers
 from unitcad.cli import check_settings
 from unitcad.cli.check_settings import Configuration
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.export import finding_pictures
-from unitcad.meshcheck import FileReport, Limits, Options, many_files, output
+from unitcad.meshcheck import FileReport, Limits, Options, file_checks, output
 from unitcad.meshcheck import baseline as baselines
 from unitcad.meshcheck import manifest as listing
 from unitcad.meshcheck.findings import MOST, SHOWN
@@ -109,9 +109,9 @@ def run(asked: Asked) -> int:
     if asked.show is not None:
         draw = partial(finding_pictures.write, Path(asked.show))
     memory = asked.memory or configuration.value("memory") or 8000
-    check_all = partial(many_files.check_files, jobs=asked.jobs, memory_mb=memory, then=draw)
+    check_all = partial(file_checks.check_files, jobs=asked.jobs, memory_mb=memory, then=draw)
     left_out = configuration.left_out(asked.exclude or [])
-    files, unread = many_files.expand(asked.files or [], left_out)
+    files, unread = file_checks.expand(asked.files or [], left_out)
     reports = unread + _reports(files, configuration, options, asked.manifest, check_all)
     shown = MOST if asked.all_locations else SHOWN
     if base is not None:
@@ -128,7 +128,7 @@ def run(asked: Asked) -> int:
         written = render(reports, output_format, fail_on, configuration.shown, used)
         _write(written, plain=output_format == "text")
         sys.stderr.write(table)
-    return many_files.worst(reports, fail_on)
+    return file_checks.worst(reports, fail_on)
 
 
 def _copy(given: str, formats: Sequence[str]) -> tuple[str, Path]:
@@ -181,7 +181,7 @@ def _reports(
         return list(check_all([(path, of_path(path)) for path in paths]))
 
     listed = listing.read(manifest)
-    work = listing.work(listed, paths, of_path, options.printer is not None)
+    work = listing.work(listed, paths, of_path, None if options.printer is not None else printers())
     compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
     return compared + listing.unchecked(listed, [path for path, _ in work], of_path)
 

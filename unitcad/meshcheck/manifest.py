@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 
 import msgspec
 
-from unitcad import catalogue, files
+from unitcad import files
 from unitcad.errors import UnitcadError, misfit
 from unitcad.meshcheck.findings import FileReport, counted, merge
 from unitcad.meshcheck.options import Options
+from unitcad.meshcheck.rules.inspection import Printer
 from unitcad.meshcheck.rules.m_manifest import M004, M005, ListedFile, check_listed
 
 _MESHES = ("stl", "3mf")
@@ -96,20 +97,21 @@ def _together(old: ListedFile, new: ListedFile) -> ListedFile:
     return ListedFile(old.names + new.names, old.tool and new.tool, old.sha256, volume, old.solids + new.solids)
 
 
-def work(listing: Listing, paths: Sequence[str], options: Choice, printer_named: bool) -> list[tuple[str, Options]]:
+def work(
+    listing: Listing, paths: Sequence[str], options: Choice, printers: Mapping[str, Printer] | None
+) -> list[tuple[str, Options]]:
     """Choose what to check: the named files, or all meshes of the manifest; tools with a printer, other parts without.
 
-    `options` gives those of a path.
+    `options` gives those of a path; `printers`: the known ones by name, None if the caller chose the printer.
     """
     chosen = list(paths) or [files.seen_from(path) for path in listing.files if path.lower().endswith(_MESHES)]
-    known = catalogue.printers()
     pairs = []
     for path in chosen:
         part = listing.files.get(os.path.abspath(path))
         chosen_here = options(path)
         printer = chosen_here.printer
-        if part is not None and not printer_named:
-            printer = known.get(listing.printer or "fdm-0.4") if part.tool else None
+        if part is not None and printers is not None:
+            printer = printers.get(listing.printer or "fdm-0.4") if part.tool else None
         elif part is not None and not part.tool:
             printer = None
         pairs.append((path, replace(chosen_here, printer=printer)))

@@ -15,13 +15,13 @@ import numpy as np
 
 from unitcad.errors import Refusal, Unfinished, UnitcadError
 from unitcad.files import LARGEST, read
+from unitcad.meshcheck import readers
+from unitcad.meshcheck.file_checks import check_file
 from unitcad.meshcheck.findings import Finding
-from unitcad.meshcheck.one_file import check_file
 from unitcad.meshcheck.options import Options
-from unitcad.meshcheck.readers import sniff
-from unitcad.meshcheck.readers.step_bodies import step_bodies
-from unitcad.meshcheck.readers.threemf.opc import open_package
-from unitcad.meshcheck.readers.threemf.read_3mf import read_build
+from unitcad.meshcheck.readers.read_3mf import read_build
+from unitcad.meshcheck.readers.read_step import step_bodies
+from unitcad.meshcheck.readers.threemf_package import open_package
 from unitcad.meshcheck.rules import s_scale
 from unitcad.meshcheck.rules.f_file import F011, Deadline, Limits, Unreadable
 from unitcad.shape import Polyhedron
@@ -50,7 +50,7 @@ def body_text(design: str, path: Path) -> str:
         raise Refusal("design", design, str(error)) from None
     # The solids of an assembly may share volume: a layer is what the ones inside it leave.
     report = check_file(path, Options(ignore=("G002",)) if _is_step(path) else Options())
-    scale = s_scale.likely_unit(report.facts, None) if sniff.kind_of(path.name) == "step" else ()
+    scale = s_scale.likely_unit(report.facts, None) if readers.kind_of(path.name) == "step" else ()
     for finding in (*report.findings, *scale):
         if finding.code == F011.code:
             raise Unfinished(f"{path}: its check was not finished: {finding.message}")
@@ -93,7 +93,7 @@ def bodies_in(design: str, text: str) -> dict[str, Polyhedron]:
 
 
 def _is_step(path: Path) -> bool:
-    return sniff.kind_of(path.name) == "step"
+    return readers.kind_of(path.name) == "step"
 
 
 def _sentence(finding: Finding) -> str:
@@ -106,12 +106,12 @@ def _bodies(path: Path) -> list[tuple[str, np.ndarray, np.ndarray]]:
     deadline, data = Deadline(limits.seconds), memoryview(path.read_bytes())
     if _is_step(path):
         return step_bodies(path, TOLERANCE, limits.seconds)
-    if sniff.kind_of(path.name) == "3mf":
+    if readers.kind_of(path.name) == "3mf":
         build = read_build(open_package(data, limits, deadline, strict=False), limits)
         instances = build.instances if build else []
         placed = [(one.object.attributes.get("name", ""), one.mesh(placed=True)) for one in instances]
         return [(name, mesh.vertices, mesh.faces) for name, mesh in placed]
-    mesh = sniff.reader_of("stl")(data, limits, deadline, [])
+    mesh = readers.reader_of("stl")(data, limits, deadline, [])
     return [("", mesh.vertices, mesh.faces)] if mesh else []
 
 

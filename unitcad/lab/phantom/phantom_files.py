@@ -13,13 +13,14 @@ import numpy as np
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import to_csv
+from unitcad.catalogue import printers
 from unitcad.export import stl, svg, threemf
 from unitcad.export.chart import Series, chart
 from unitcad.export.printing import print_ready
 from unitcad.export.raster import Surface, draw
 from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.lab.phantom import SEGMENTS, PhantomSet, bench, printed, tissue_table
-from unitcad.meshcheck import check
+from unitcad.meshcheck import Options, check_file
 from unitcad.shape.body import Body
 from unitcad.text import toml, toml_key
 
@@ -122,10 +123,11 @@ def write(folder: Path, found: Mapping[str, bytes], printer: str) -> list[str]:
     """
     files.replace_all(folder, found, FINISHED)
     meshes = sorted(str(folder / name) for name in found if name.endswith((".stl", ".3mf")))
+    options = Options(printer=printers()[printer])
     return [
-        f"{Path(report.path).name}: {finding.code} {finding.message}"
-        for report in check(*meshes, printer=printer).reports
-        for finding in report.findings
+        f"{Path(path).name}: {finding.code} {finding.message}"
+        for path in meshes
+        for finding in check_file(path, options).findings
         if finding.severity == "error"
     ]
 

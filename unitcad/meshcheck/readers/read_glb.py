@@ -108,7 +108,7 @@ class _Part:
 def read_glb(
     data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding], unit_mm: float = 1000.0
 ) -> Mesh | None:
-    """Read a GLB file, as `sniff.Reader` says. `unit_mm` is the length in mm that a 1 in the scene stands for."""
+    """Read a GLB file, as `readers.Reader` says. `unit_mm` is the length in mm that a 1 in the scene stands for."""
     document, binary = _chunks(data, findings)
     for name in document.extensions_required:
         if not name.startswith(_HARMLESS):

@@ -38,7 +38,7 @@ class _Read:
 
 
 def read_obj(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
-    """Read an OBJ file, as `sniff.Reader` says."""
+    """Read an OBJ file, as `readers.Reader` says."""
     raw = rows.plain(bytes(data), findings)
     if not _ANY.search(raw):
         raise F005.unreadable("named .obj, but has no line of one")

@@ -18,7 +18,7 @@ _KINDS = re.compile(rb"(?:ST)?C?N?", re.IGNORECASE)
 
 
 def read_off(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
-    """Read an OFF file, as `sniff.Reader` says."""
+    """Read an OFF file, as `readers.Reader` says."""
     raw = rows.plain(bytes(data), findings)
     start = _START.match(raw[:100_000])
     if start is None:

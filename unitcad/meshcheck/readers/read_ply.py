@@ -49,7 +49,7 @@ class _Element:
 
 
 def read_ply(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
-    """Read a PLY file, as `sniff.Reader` says."""
+    """Read a PLY file, as `readers.Reader` says."""
     raw = bytes(data)
     if raw.startswith(rows.UTF16) or _TEXT.search(raw[:1000]):
         raw = rows.plain(raw, findings)

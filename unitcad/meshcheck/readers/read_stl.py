@@ -47,7 +47,7 @@ _FACES = 1 << 14  # faces whose corners stay in the processor's cache
 
 
 def read_stl(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
-    """Read an STL file, as `sniff.Reader` says."""
+    """Read an STL file, as `readers.Reader` says."""
     size = len(data)
     head = bytes(data[:2048])
     if _is_text(head, data):

@@ -8,15 +8,15 @@ import numpy as np
 
 from unitcad.geometry.arrays import Ints
 from unitcad.meshcheck.findings import Location, counted
-from unitcad.meshcheck.readers.threemf import elements
-from unitcad.meshcheck.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
+from unitcad.meshcheck.readers import threemf_schema as schema
+from unitcad.meshcheck.readers.threemf_schema import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.meshcheck.rules.p_package import P011, P012, P017, P019
 
 _MATERIALS = ("basematerials", "compositematerials")
 _GROUPS = (*_MATERIALS, "colorgroup", "texture2dgroup", "multiproperties")
 _TEXTURED = ("speculartextureid", "glossinesstextureid", "metallictextureid", "roughnesstextureid")
 SOLID = ("model", "solidsupport")
-_STACK = f"{elements.SLICE} slicestackid"
+_STACK = f"{schema.SLICE} slicestackid"
 
 
 def check_references(model: Model) -> None:
@@ -32,7 +32,7 @@ def check_references(model: Model) -> None:
         if not item.path:
             _used(model, item.object, item.rank, "a build item")
     model.where = Location
-    if elements.PRODUCTION in (model.namespaces.get(prefix) for prefix in model.required):
+    if schema.PRODUCTION in (model.namespaces.get(prefix) for prefix in model.required):
         _uuids(model)
 
 
@@ -200,7 +200,7 @@ def _multi(model: Model, resource: Resource) -> None:
 def _solid_stacks(model: Model) -> set[int]:
     """Return slice stacks of objects that must be solids: their polygons must be closed."""
     named = (thing.attributes.get(_STACK, "") for thing in model.objects().values() if thing.type in SOLID)
-    return {int(text) for text in named if elements.resource_id(text)}
+    return {int(text) for text in named if schema.resource_id(text)}
 
 
 def _slicestack(model: Model, resource: Resource, solid: bool) -> None:
@@ -244,12 +244,12 @@ def _slicestack(model: Model, resource: Resource, solid: bool) -> None:
 
 def _sliced(model: Model, resource: Object) -> None:
     stack = resource.attributes.get(_STACK)
-    resolution = resource.attributes.get(f"{elements.SLICE} meshresolution", "fullres")
+    resolution = resource.attributes.get(f"{schema.SLICE} meshresolution", "fullres")
     who = f"object {resource.id}"
     if resolution not in ("fullres", "lowres"):
         model.add(P017, f"mesh resolution {resolution[:40]!r} of {who}")
     if stack is not None:
-        if not elements.resource_id(stack):
+        if not schema.resource_id(stack):
             model.add(P017, f"slice stack {stack[:40]!r} of {who} is no id")
         else:
             _earlier(model, int(stack), resource.rank, who, "slicestack")
@@ -292,7 +292,7 @@ def _uuids(model: Model) -> None:
     if any(not item.uuid for item in model.items):
         missing.append("an item")
     for resource in model.objects().values():
-        if f"{elements.PRODUCTION} UUID" not in resource.attributes:
+        if f"{schema.PRODUCTION} UUID" not in resource.attributes:
             missing.append(f"object {resource.id}")
         if any(not use.uuid for use in resource.components):
             missing.append(f"a component of object {resource.id}")

@@ -7,19 +7,19 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
+from unitcad import notebook
 from unitcad.arguments import check_number, path, texts
+from unitcad.catalogue import Printer, choose, printers
 from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.meshcheck.file_checks import check_files, expand
 from unitcad.meshcheck.findings import FileReport, Finding
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.rules.f_file import Limits
+from unitcad.meshcheck.rules.registry import check_prefixes
 from unitcad.meshcheck.rules.s_scale import unit_named
 
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
-
-    StrPath = str | os.PathLike[str]
+StrPath = str | os.PathLike[str]
 
 _MOST = 1e9
 """What a limit is below: faces, seconds, processes."""
@@ -57,8 +57,6 @@ class CheckResult:
         return f"CheckResult({files} {'file' if files == 1 else 'files'}: {self.verdict}{counted})"
 
     def _repr_html_(self) -> str:
-        from unitcad import notebook
-
         rows: list[tuple[object, ...]] = []
         for report in self.reports:
             if not report.findings:
@@ -88,12 +86,7 @@ def check(
     `timeout` is in seconds a file. With `jobs` above 1 worker processes check the files. What is wrong with a file, or
     that it is missing, is in the result; lengths in mm. Raises Refusal or UnitcadError for an invalid argument.
     """
-    from unitcad.meshcheck import many_files
-    from unitcad.meshcheck.rules.registry import check_prefixes
-
     if printer is not None:
-        from unitcad.catalogue import Printer, choose, printers
-
         if isinstance(printer, str):
             printer = choose("printer", printer, printers())
         elif not isinstance(printer, Printer):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -119,9 +112,9 @@ def check(
             seconds=default.seconds if timeout is None else timeout,
         ),
     )
-    paths, missing = many_files.expand(names)
+    paths, missing = expand(names)
     work = [(path, options) for path in paths]
-    return CheckResult((*missing, *many_files.check_files(work, jobs=jobs)))
+    return CheckResult((*missing, *check_files(work, jobs=jobs)))
 
 
 def _listed(name: str, codes: Sequence[str]) -> list[str]:

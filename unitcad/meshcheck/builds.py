@@ -1,4 +1,4 @@
-"""The geometry rules on a 3MF: each object that is built, and its instances in their places and against each other.
+"""The rules on files of several solids: the objects and instances of a 3MF, the solids of a STEP file.
 
 Solids may share volume though each is sound by itself (G002). 3MF's core specification (4.1, 4.1.1) lets overlapping
 components and objects be, and says what is filled, so this is a warning.
@@ -10,24 +10,27 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import compress
+from pathlib import Path
 
 import numpy as np
 
 from unitcad.geometry.arrays import Floats, cross, extent
-from unitcad.meshcheck.findings import Facts, Finding, ending, point
-from unitcad.meshcheck.geometry.mesh import LARGEST
+from unitcad.meshcheck.findings import Facts, Finding, counted, ending, number, point
+from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, weld_exact
 from unitcad.meshcheck.geometry.topology import diagonals, topology_of
-from unitcad.meshcheck.one_mesh import CheckedMesh, check_on_bed, check_surface
+from unitcad.meshcheck.one_mesh import CheckedMesh, Solid, check_on_bed, check_surface, overlapping
 from unitcad.meshcheck.options import Options
-from unitcad.meshcheck.overlaps import Solid, overlapping
-from unitcad.meshcheck.readers.threemf import elements
-from unitcad.meshcheck.readers.threemf.opc import Package, open_package
-from unitcad.meshcheck.readers.threemf.placement import Instance, Key
-from unitcad.meshcheck.readers.threemf.read_3mf import Build, read_build
-from unitcad.meshcheck.readers.threemf.references import SOLID
+from unitcad.meshcheck.readers import threemf_schema as schema
+from unitcad.meshcheck.readers.read_3mf import Build, Instance, Key, read_build
+from unitcad.meshcheck.readers.read_step import Measured, measured
+from unitcad.meshcheck.readers.threemf_package import Package, open_package
+from unitcad.meshcheck.readers.threemf_references import SOLID
 from unitcad.meshcheck.rules import g_shells, s_scale, v_values
-from unitcad.meshcheck.rules.f_file import Deadline, Unreadable, keeping
+from unitcad.meshcheck.rules.f_file import F012, Deadline, Unreadable, keeping
+from unitcad.meshcheck.rules.g_crossing import G001
+from unitcad.meshcheck.rules.g_shells import G007, T008, expected
 from unitcad.meshcheck.rules.inspection import Inspection, Printer
+from unitcad.meshcheck.rules.s_scale import likely_unit
 from unitcad.meshcheck.rules.v_values import V001
 
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
@@ -135,7 +138,7 @@ def _geometry(
 def _check_object(instance: Instance, options: Options, deadline: Deadline) -> CheckedMesh:
     """Apply the geometry rules to one object, if it must be a solid and no slices stand in for its mesh."""
     mesh, one = instance.mesh(placed=False), instance.object
-    if one.type not in SOLID or one.attributes.get(f"{elements.SLICE} meshresolution") == "lowres":
+    if one.type not in SOLID or one.attributes.get(f"{schema.SLICE} meshresolution") == "lowres":
         return CheckedMesh((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)))
     judged = partial(_filled, strict=options.strict_3mf)
     with keeping(change=judged):
@@ -181,3 +184,56 @@ def _shifted(findings: Sequence[Finding], by: Floats) -> Iterator[Finding]:
     for item in findings:
         places = (replace(place, xyz=point(place.xyz + by)) if place.xyz else place for place in item.locations)
         yield replace(item, locations=tuple(places))
+
+
+def check_step(path: Path, data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
+    """Return findings about a STEP file's text and, with OCP there, about its solids."""
+    step = measured(path, data, options.limits.seconds)
+    findings: list[Finding] = []
+    if not step.valid:
+        findings.append(G001.finding("the B-rep is not valid by BRepCheck"))
+    facts = Facts(
+        shells=step.solids,
+        volume_mm3=step.volume,
+        area_mm2=step.area,
+        bbox_mm=step.box,
+        watertight=step.solids > 0,
+    )
+    if not step.solids:
+        findings.append(G007.finding("no solid in the file"))
+    elif step.volume < 0:
+        findings.append(T008.finding(f"volume {number(step.volume)} mm3"))
+    findings += expected(step.solids, options.shells, "solid")
+    findings += likely_unit(facts, None)
+    with keeping(findings, facts):
+        options.limits.check_faces(sum(len(faces) for _, faces in step.meshes))
+        findings += _by_mesh(step, options, deadline)
+    return findings, facts
+
+
+def _by_mesh(step: Measured, options: Options, deadline: Deadline) -> Iterator[Finding]:
+    """Apply G002 to the solids and the rules for a printer to them together, or say which of that was not done."""
+    solids, opened = list[Solid](), 0
+    for place, (vertices, faces) in enumerate(step.meshes, 1):
+        topology = topology_of(_mesh([(vertices, faces)]), deadline.tick)
+        if topology.watertight and topology.oriented:
+            solids.append(Solid(topology.mesh, abs(float(topology.volumes.sum())), f"solid {place}"))
+        else:
+            opened += 1
+    if opened:
+        text = f"{counted(opened, 'solid')} without a closed mesh; overlap (G002) and printability (D) are not judged"
+        yield F012.finding(f"OCCT makes {text}", opened, severity="warning")
+    if options.cross:
+        yield from overlapping(solids, "solids", deadline, thick=2 * step.tolerance)
+    if options.printer is not None and step.meshes:
+        whole = _mesh(step.meshes)
+        part = Inspection(whole, topology_of(whole, deadline.tick), deadline.tick)
+        for item in check_on_bed(part, options.printer):
+            places = (replace(place, face=None, faces=()) for place in item.locations)  # STEP has no such faces
+            yield replace(item, locations=tuple(places))
+
+
+def _mesh(meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> Mesh:
+    """Return solids as one mesh, its vertices as an STL would have them: those of neighbouring B-rep faces are one."""
+    corners = np.concatenate([vertices[faces] for vertices, faces in meshes]).astype(np.float32)
+    return Mesh(*weld_exact(corners.reshape(-1, 3, 3)), indexed=False)

@@ -1,27 +1,241 @@
-"""A 3MF model part read element by element into plain data, against the schema, within the limits.
-
-Vertices and triangles go into arrays in batches; their text is never held as a whole. Uniform blocks
-of them are read at once (`uniform_blocks`).
-"""
+"""A 3MF model part, read element by element; vertices and triangles in uniform blocks are read by numpy."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Location
 from unitcad.meshcheck.geometry.mesh import LARGEST
-from unitcad.meshcheck.readers.threemf import elements
-from unitcad.meshcheck.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
-from unitcad.meshcheck.readers.threemf.numeric_text import coordinate, transform
-from unitcad.meshcheck.readers.threemf.uniform_blocks import UniformBlock, rest_for_parser
-from unitcad.meshcheck.readers.threemf.xml_stream import forbidden, new_parser, stream
-from unitcad.meshcheck.rules.f_file import F011, Limits, Unreadable
-from unitcad.meshcheck.rules.p_package import P010, P016, P017, P018
+from unitcad.meshcheck.readers import threemf_schema as schema
+from unitcad.meshcheck.readers.rows import NEWLINE, NOT_FINITE, SPACE, numbers_of, table_of
+from unitcad.meshcheck.readers.threemf_package import forbidden, new_parser, stream
+from unitcad.meshcheck.readers.threemf_schema import LINE, Model, Object, Resource, Triangles, Use
+from unitcad.meshcheck.rules.f_file import F004, F011, Limits, Unreadable, not_a_number
+from unitcad.meshcheck.rules.p_package import P010, P013, P015, P016, P017, P018
 from unitcad.meshcheck.rules.v_values import V001
+
+_NOT_FINITE = re.compile(NOT_FINITE, re.ASCII | re.IGNORECASE)
+
+
+def coordinate(text: str, model: Model, line: int) -> float:
+    """Return the number of an attribute's text; NaN for one that is not finite, 0 with a finding for no number."""
+    text = text.strip(" \t\r\n")
+    if schema.number(text):
+        return float(text)
+    if _NOT_FINITE.fullmatch(text):
+        return math.nan
+    model.add(F004, not_a_number(text).message, line=line)
+    return 0.0
+
+
+def transform(text: str | None, model: Model, regular: set[tuple[str, ...]]) -> Floats:
+    """Return the transform (4, 3) of an attribute's text; the identity, with a finding of `model`, where it is none.
+
+    `regular`: linear parts that are known to be sound; this one is added.
+    """
+    identity = np.vstack([np.eye(3), np.zeros(3)])
+    if text is None:
+        return identity
+    parts = schema.words(text)
+    if len(parts) == 12 and all(schema.number(part) for part in parts):
+        matrix = np.array([float(part) for part in parts]).reshape(4, 3)
+        if not (np.abs(matrix) <= LARGEST).all():
+            model.add(P013, f'transform="{text[:60]}" is not twelve float32 numbers')
+            return identity
+        if (linear := tuple(parts[:9])) not in regular:  # most items of a build differ by their shift only
+            det = float(np.linalg.det(matrix[:3]))
+            scale = float(np.prod(np.linalg.norm(matrix[:3], axis=1)))
+            if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
+                model.add(P013, "a transform has determinant zero")
+            elif det < 0:
+                model.add(P015, "a transform mirrors")
+            else:
+                regular.add(linear)
+        return matrix
+    rule = P013 if len(parts) == 12 and any(_NOT_FINITE.fullmatch(part) for part in parts) else P017
+    model.add(rule, f'transform="{text[:60]}" is not twelve numbers')
+    return identity
+
+
+_BLOCK = 1 << 18
+_OPEN = re.compile(rb"<(vertices|triangles)>")
+_LONGEST_TAG = len(b"<triangles>")
+_HEAD = {name: re.compile(rb"[ \t\r\n]*<" + name + rb'[ \t\r\n]+(\w+)="') for name in (b"vertex", b"triangle")}
+_WITHIN = re.compile(rb'"[ \t\r\n]+(\w+)="')
+_AFTER = re.compile(rb'"[ \t\r\n]*/>[ \t\r\n]*')
+_ELEMENTS = {b"vertices": b"vertex", b"triangles": b"triangle"}
+_NAMES = {b"vertex": (b"x", b"y", b"z"), b"triangle": (b"v1", b"v2", b"v3", b"p1", b"p2", b"p3", b"pid")}
+"""Attributes, of which each element needs the first three."""
+_SHORTEST = 1500  # bytes; a shorter block costs the parser less
+_LONGEST_GAP = 200  # bytes between two numbers
+_MOST_DIGITS = 9  # an index goes to 2^31 - 1; longer ones are left to the parser
+_QUOTE = ord('"')
+
+
+_DIGITS = table_of(b"0123456789")
+_IN_NUMBERS = table_of(b"0123456789+-.eE")  # no blanks: each number fills its quotes
+
+
+@dataclass(frozen=True)
+class UniformBlock:
+    """The elements of a uniform block.
+
+    columns: the numbers (n,) of each attribute by its name; lines: the line (n,) of each element, 0 for the one on
+    which the block begins; line_ends: how many there are in the block.
+    """
+
+    columns: dict[str, Floats | Ints]
+    lines: Ints
+    line_ends: int
+
+
+class Reader(Protocol):
+    """A reader of the elements that the parser reports."""
+
+    def inside(self, fed: int) -> tuple[int, str]:
+        """Return the number of open elements and the name of the innermost one if it belongs to the core.
+
+        The name is empty while the parser holds back some of the `fed` bytes.
+        """
+        ...
+
+    def take(self, name: str, found: UniformBlock) -> bool:
+        """Keep the elements of a list; return False where they have to be read one by one."""
+        ...
+
+
+def rest_for_parser(chunks: Iterable[bytes], reader: Reader) -> Iterator[bytes]:
+    """Yield what the parser has to read of a part. It must have parsed each piece before it asks for the next one."""
+    left, held, at, fed, open_list = iter(chunks), b"", 0, 0, b""  # `at` bytes of `held` are done
+    while True:
+        if not open_list:
+            found = _OPEN.search(held, at)
+            if found is None:
+                last = held.rfind(b"<", max(len(held) - _LONGEST_TAG, at))  # of a tag that may go on in the next chunk
+                cut = len(held) if last < 0 else last
+            else:
+                cut = found.start()
+            if cut > at:
+                yield held[at:cut]
+                fed, at = fed + cut - at, cut
+            if found is None:
+                chunk = next(left, b"")
+                if not chunk:
+                    break
+                held, at = held[at:] + chunk, 0
+                continue
+            depth, _ = reader.inside(fed)
+            yield found.group()
+            fed, at = fed + len(found.group()), found.end()
+            if reader.inside(fed) == (depth + 1, found.group(1).decode()):
+                open_list = found.group(1)
+            elif at < len(held):  # in a comment, for example: one full of tags would take long, tag by tag
+                yield held[at:]
+                fed, held, at = fed + len(held) - at, b"", 0
+            continue
+        while len(held) - at < _BLOCK and held.find(b"</", at) < 0 and (chunk := next(left, b"")):
+            held, at = held[at:] + chunk, 0
+        end = held.find(b"</", at, at + _BLOCK)
+        cut = held.rfind(b"/>", at, end if end >= 0 else at + _BLOCK) + 2
+        if cut < 2:
+            open_list = b""
+            continue
+        block, at = held[at:cut], cut
+        uniform = read_uniform(block, _ELEMENTS[open_list]) if len(block) >= _SHORTEST else None
+        if uniform is not None and reader.take(open_list.decode(), uniform):
+            block = b"\n" * uniform.line_ends
+            if block:
+                yield block
+            fed += len(block)
+            continue
+        yield block
+        fed += len(block)
+        # A comment or a section of characters may hold what looks like elements.
+        if b"<!" in block or b"<?" in block or reader.inside(fed)[1] != open_list.decode():
+            open_list = b""
+    if at < len(held):
+        yield held[at:]
+
+
+def read_uniform(block: bytes, element: bytes) -> UniformBlock | None:
+    """Return the elements of a block, `vertex` or `triangle`, or None where the block is not uniform.
+
+    In a uniform block all text between the numbers repeats, and each attribute is one of the core's.
+    """
+    if b"\r" in block and block.count(b"\r") != block.count(b"\r\n"):
+        return None
+    head = _HEAD[element].match(block)
+    if head is None:
+        return None
+    names = [head.group(1)]
+    at = head.end()
+    while within := _WITHIN.match(block, block.find(b'"', at)):
+        names.append(within.group(1))
+        at = within.end()
+    known = _NAMES[element]
+    if len(set(names)) < len(names) or not set(known[:3]) <= set(names) <= set(known):
+        return None
+    text = np.frombuffer(block, np.uint8)
+    quotes = np.flatnonzero(text == _QUOTE)
+    each = 2 * len(names)
+    if len(quotes) % each or _AFTER.fullmatch(block, int(quotes[-1])) is None:
+        return None
+    quotes = quotes.reshape(-1, each)
+    begin, end = quotes[:, ::2] + 1, quotes[:, 1::2]
+    if not _same_between(text, quotes, block, head.group()):
+        return None
+    numbers = _numbers(text, begin, end, whole=element == b"triangle")
+    if numbers is None:
+        return None
+    line_ends = np.flatnonzero(text == NEWLINE)
+    first = block.index(b"<")
+    starts = np.append(first, quotes[1:, 0] - (int(quotes[0, 0]) - first))
+    lines = np.searchsorted(line_ends, starts)
+    return UniformBlock({name.decode(): numbers[:, i] for i, name in enumerate(names)}, lines, len(line_ends))
+
+
+def _same_between(text: Ints, quotes: Ints, block: bytes, head: bytes) -> bool:
+    """Tell whether the text between the numbers of the first element, and after it, repeats in the others."""
+    opened, closed = quotes.ravel()[::2], quotes.ravel()[1::2]
+    width = opened[1:] - closed[:-1]
+    each = quotes.shape[1] // 2
+    for k in range(each):
+        some, gap = closed[:-1][k::each], width[k::each]
+        if not len(some):
+            continue
+        if gap[0] > _LONGEST_GAP or not (gap == gap[0]).all():
+            return False
+        pattern = text[some[0] : some[0] + gap[0] + 1]
+        if k == each - 1:
+            after = _AFTER.match(pattern.tobytes())
+            if after is None or pattern.tobytes()[after.end() :] != head.lstrip():
+                return False
+        for i, character in enumerate(pattern.tolist()):
+            if not (text[some + i] == character).all():
+                return False
+    return True
+
+
+def _numbers(text: Ints, begin: Ints, end: Ints, *, whole: bool) -> Floats | Ints | None:
+    """Return the numbers between quotes, shape as `begin`; None where one may be none."""
+    size = end - begin
+    if size.min() < 1 or (whole and size.max() > _MOST_DIGITS):
+        return None
+    marks = np.zeros(len(text) + 1, np.int8)
+    marks[begin], marks[end] = 1, -1
+    inside = np.cumsum(marks[:-1], dtype=np.int8).view(bool)
+    if not (_DIGITS if whole else _IN_NUMBERS)[text[inside]].all():
+        return None
+    values = numbers_of(np.where(inside, text, np.uint8(SPACE)).tobytes(), begin.size, integers=whole)
+    return None if values is None else values.reshape(begin.shape)
+
 
 _BATCH = 50_000
 _DEPTH = 60
@@ -33,7 +247,7 @@ class _Open:
 
     space: str
     name: str
-    rules: elements.ElementSchema | None
+    rules: schema.ElementSchema | None
     counts: dict[str, int] = field(default_factory=dict)
     last: int = -1
     told: bool = False
@@ -79,7 +293,7 @@ class _Reader:
         The name is empty while the parser holds back some of the `fed` bytes.
         """
         last = self.stack[-1]
-        whole = self.parser.CurrentByteIndex == fed and not self.skip and last.space == elements.CORE
+        whole = self.parser.CurrentByteIndex == fed and not self.skip and last.space == schema.CORE
         return len(self.stack) + self.skip, last.name if whole else ""
 
     def take(self, name: str, found: UniformBlock) -> bool:
@@ -111,7 +325,7 @@ class _Reader:
                 raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
             return
         above = self.stack[-1]
-        if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == elements.CORE:
+        if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == schema.CORE:
             self.numbers += flat[1::2]
             self.lines.append(self.parser.CurrentLineNumber)
             self.stack.append(_LEAF)
@@ -122,12 +336,12 @@ class _Reader:
             raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
         space, _, local = name.rpartition(" ")
         attributes = dict(zip(flat[::2], flat[1::2], strict=True))
-        rules = elements.ELEMENTS.get(space, {}).get(local)
+        rules = schema.ELEMENTS.get(space, {}).get(local)
         self._child(space, local, rules)
         if rules is None:
             if space in _SHAPES and isinstance(self.resource, Object):
                 self.resource.other_shape = True
-            if self.stack[-1].name == "resources" and elements.resource_id(attributes.get("id", "")):
+            if self.stack[-1].name == "resources" and schema.resource_id(attributes.get("id", "")):
                 self._once(int(attributes["id"]))
                 self.model.foreign.add(int(attributes["id"]))
             for attribute in attributes:
@@ -158,32 +372,32 @@ class _Reader:
         for child, least, _most in done.rules.children:
             if done.counts.get(child, 0) < least:
                 self.model.add(P017, f"<{done.name}> lacks <{child}>")
-        if done.space == elements.CORE and done.name == "vertices":
+        if done.space == schema.CORE and done.name == "vertices":
             self._flush_vertices()
-        elif done.space == elements.CORE and done.name == "triangles":
+        elif done.space == schema.CORE and done.name == "triangles":
             self._flush_triangles()
-        elif done.space == elements.CORE and done.name == "mesh":
+        elif done.space == schema.CORE and done.name == "mesh":
             self._close_mesh()
         elif done.name == "object" and isinstance(self.resource, Object):
             self._close_object(self.resource)
         if self.stack[-1].name == "resources":
             self.resource = None
 
-    def _child(self, space: str, local: str, rules: elements.ElementSchema | None) -> None:
+    def _child(self, space: str, local: str, rules: schema.ElementSchema | None) -> None:
         """Check that this child may stand here, and in this order."""
         parent = self.stack[-1]
         if parent is _LEAF:
             self.model.add(P017, f"<{local}> inside <vertex>")
             return
         if not parent.name:
-            if (space, local) != (elements.CORE, "model"):
+            if (space, local) != (schema.CORE, "model"):
                 raise P017.unreadable(f"the root is <{local}> in {space or 'no namespace'!r}, not the core's <model>",
                             places=[Location(part=self.model.part)])  # fmt: skip
             return
         if space != parent.space:
             if not space:
                 self.model.add(P017, f"<{local}> without a namespace")
-            elif space == elements.CORE:
+            elif space == schema.CORE:
                 self.model.add(P017, f"<{local}> inside <{parent.name}>")
             return
         assert parent.rules is not None
@@ -197,12 +411,12 @@ class _Reader:
                 self.model.add(P017, f"<{local}> is out of order in <{parent.name}>")
             parent.last = max(parent.last, place)
             return
-        if space in (elements.CORE, elements.MATERIAL, elements.SLICE, elements.BEAM) and not (
+        if space in (schema.CORE, schema.MATERIAL, schema.SLICE, schema.BEAM) and not (
             rules is not None and parent.name == "resources"
         ):
             self.model.add(P017, f"<{local}> inside <{parent.name}>")
 
-    def _attributes(self, local: str, rules: elements.ElementSchema, attributes: dict[str, str]) -> bool:
+    def _attributes(self, local: str, rules: schema.ElementSchema, attributes: dict[str, str]) -> bool:
         """Check them; return whether all required ones are there and well typed. Others of a wrong type are dropped."""
         good = True
         for name in rules.required:
@@ -229,14 +443,14 @@ class _Reader:
     def _take(self, space: str, local: str, attributes: dict[str, str]) -> None:
         """Keep what the element says."""
         parent = self.stack[-2].name
-        if space == elements.CORE:
+        if space == schema.CORE:
             take = getattr(self, f"_take_{local}", None)
             if take is not None:
                 take(attributes)
                 return
         if "id" in attributes and parent == "resources":
             self._resource(Resource(local, int(attributes["id"]), self.rank, attributes))
-        elif space == elements.BEAM or space == elements.BALLS:
+        elif space == schema.BEAM or space == schema.BALLS:
             self._take_lattice(local, attributes)
         elif self.resource is not None and not isinstance(self.resource, Object):
             self.resource.members.append({"": local, **attributes})
@@ -255,14 +469,14 @@ class _Reader:
 
     def _take_model(self, attributes: dict[str, str]) -> None:
         self.model.unit = attributes.get("unit", "millimeter")
-        if self.model.unit not in elements.UNITS:
+        if self.model.unit not in schema.UNITS:
             self.model.add(P010, f"unit {self.model.unit[:40]!r}")
         self.model.required = attributes.get("requiredextensions", "").split()
         for prefix in self.model.required:
             uri = self.model.namespaces.get(prefix)
             if uri is None:
                 self.model.add(P016, f"required extension {prefix!r} has no namespace")
-            elif uri not in elements.KNOWN:
+            elif uri not in schema.KNOWN:
                 self.model.add(P016, f"required extension {uri!r} is not known")
 
     def _take_metadata(self, attributes: dict[str, str]) -> None:
@@ -306,16 +520,16 @@ class _Reader:
 
     def _take_build(self, attributes: dict[str, str]) -> None:
         self.model.has_build = True
-        self.model.build_uuid = f"{elements.PRODUCTION} UUID" in attributes
+        self.model.build_uuid = f"{schema.PRODUCTION} UUID" in attributes
 
     def _use(self, attributes: dict[str, str]) -> Use:
         self.uses += 1
         if self.uses > self.limits.max_instances:
             raise F011.unreadable(f"more items and components than the limit of {self.limits.max_instances} instances")
-        uuid = attributes.get(f"{elements.PRODUCTION} UUID")
-        if uuid is not None and not elements.uuid(uuid):
+        uuid = attributes.get(f"{schema.PRODUCTION} UUID")
+        if uuid is not None and not schema.uuid(uuid):
             self.model.add(P017, f"UUID {uuid[:40]!r} is none")
-        path = attributes.get(f"{elements.PRODUCTION} path", "")
+        path = attributes.get(f"{schema.PRODUCTION} path", "")
         matrix = transform(attributes.get("transform"), self.model, self.regular)
         return Use(
             int(attributes["objectid"]), path, matrix, self.rank, uuid is not None, self.parser.CurrentLineNumber
@@ -379,11 +593,16 @@ class _Reader:
 
 
 # Extensions whose elements take the place of an object's mesh.
-_SHAPES = {elements.BOOLEAN, elements.DISPLACEMENT, elements.OLD_DISPLACEMENT, elements.IMPLICIT}
+_SHAPES = {
+    schema.BOOLEAN,
+    schema.DISPLACEMENT,
+    schema.OLD_DISPLACEMENT,
+    schema.IMPLICIT,
+}
 _XYZ = ["x", "y", "z"]
 _COLUMNS = ("v1", "v2", "v3", "p1", "p2", "p3", "pid")
-_LEAF = _Open(elements.CORE, "vertex", None)
-_VERTEX = f"{elements.CORE} vertex"
+_LEAF = _Open(schema.CORE, "vertex", None)
+_VERTEX = f"{schema.CORE} vertex"
 
 
 def read_model(

@@ -1,1 +1,0 @@
-"""3MF: an OPC package of XML parts, read against the consortium's schemas."""
