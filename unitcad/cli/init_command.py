@@ -14,6 +14,7 @@ from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import names_device, write_new
 from unitcad.rooms import file_kinds, load
 from unitcad.validation import default_template
+from unitcad.validation.shipped_files import shipped_of
 from unitcad.validation.starter import commented
 
 
@@ -33,7 +34,7 @@ def init(
     Its first line names the schema that an editor checks it with; `unitcad schema -o FILE` writes that.
     """
     kinds = [kind for kind in file_kinds() if kind.command]
-    starts = {shipped: (kind, file) for kind in reversed(kinds) for shipped, file in load(kind.shipped)().items()}
+    starts = {shipped: (kind, file) for kind in reversed(kinds) for shipped, file in shipped_of(kind).items()}
     template = template or default_template()
     if template not in starts:
         raise unknown_name("--template", template, starts)

@@ -15,7 +15,8 @@ from unitcad.cli.shared_options import AsJson
 from unitcad.designs import shipped as designs
 from unitcad.errors import unknown_name
 from unitcad.meshcheck.rules.registry import rules
-from unitcad.rooms import file_kinds, load
+from unitcad.rooms import file_kinds
+from unitcad.validation.shipped_files import shipped_of
 
 
 def list_(
@@ -47,9 +48,7 @@ def list_(
 def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
     """Return the kinds in the order of the list, each with the function that returns its entries by name."""
     return {
-        **{
-            kind.plural: lambda kind=kind: _first_comments(load(kind.shipped)()) for kind in file_kinds() if kind.plural
-        },
+        **{kind.plural: lambda kind=kind: _first_comments(shipped_of(kind)) for kind in file_kinds() if kind.plural},
         "designs": lambda: {name: design.about for name, design in designs().items()},
         "materials": lambda: _values(catalogue.materials()),
         "motors": lambda: _values(catalogue.motors()),
