@@ -67,6 +67,6 @@ def design(
         plain(f"   {design_text.level_line(one)}")
         for line in design_text.lines(one):
             plain(f"   - {line}")
-    for line in [*design_text.left_out_lines(data), *([data["decides"]] if data["decides"] else [])]:
+    for line in design_text.left_out_lines(data):
         plain(line)
     typer.echo(str(folder))
