@@ -21,7 +21,7 @@ from unitcad.casting.procedure import procedure
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.search import design_files, proposals
+from unitcad.search import design_files, explanation, proposals
 from unitcad.search.candidates import Candidates, candidates, grid, sequences_of, spec_data
 from unitcad.search.design_files import front
 from unitcad.search.explanation import explain
@@ -283,7 +283,8 @@ def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch: pytest.
     def judged(spec: Any) -> tuple[int, list[str]]:
         return 9, ["C300 layer1: 0.1 against 0.2 mm"] if spec.layers[0].wall_mm == 1.25 else []
 
-    monkeypatch.setattr(proposals, "castability", judged)
+    for module in (proposals, explanation):
+        monkeypatch.setattr(module, "castability", judged)
     made = invert(_target(PAPER))
     assert all(one["walls_mm"][0] != 1.25 for one in made.data["proposals"])
     assert made.data["not_castable"][0]["failed"] == ["C300 layer1: 0.1 against 0.2 mm"]

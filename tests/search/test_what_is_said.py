@@ -179,7 +179,7 @@ def test_a_crosstalk_that_is_out_of_reach_says_what_reaches_it() -> None:
 
 def test_what_is_typed_in_per_cent_has_a_nearest() -> None:
     with pytest.raises(Refusal) as refused:
-        target_of({"target": {"edge_max": "6 %"}})
+        target_of({"target": {"edge_max": 6}})
     assert (refused.value.field, refused.value.nearest) == (FIELD, 0.06)
 
 

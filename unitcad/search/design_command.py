@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.text import Text
 
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
 from unitcad.files import seen_from
-from unitcad.search import design_files, design_text
-from unitcad.search.explanation import explain as explained
-from unitcad.search.proposals import invert
-from unitcad.search.target_file import load_target
 
 
 def design(
@@ -34,6 +30,11 @@ def design(
     Each proposal has its probability of meeting the level at the edge, with a range, and what no measurement covers.
     The last line printed is the folder: the page design.html, ranking.csv, and specs to build.
     """
+    from unitcad.search import design_files, design_text
+    from unitcad.search.explanation import explain as explained
+    from unitcad.search.proposals import invert
+    from unitcad.search.target_file import load_target
+
     wish = load_target(target)
     if explain is None:
         design_files.check_out(out)
@@ -55,18 +56,17 @@ def design(
     if as_json:
         print_json({"folder": str(folder), **data})
         return
-    _print(data)
-    typer.echo(str(folder))
-
-
-def _print(data: dict[str, Any]) -> None:
-    screen = console()
-    screen.print(Text.assemble((data["name"], "bold"), f": {design_text.wish_line(data['wish'])}"), soft_wrap=True)
-    lines: list[str | Text] = [f"  {line}" for line in design_text.head_lines(data)]
+    plain, bold = partial(console().print, soft_wrap=True), partial(console().print, soft_wrap=True, style="bold")
+    bold(f"{data['name']}: {design_text.wish_line(data['wish'])}")
+    for line in design_text.head_lines(data):
+        plain(f"  {line}")
     for i, one in enumerate(data["proposals"]):
-        lines += [f"{design_text.OTHERS}:"] if design_text.is_first_other(data["proposals"], i) else []
-        lines += [Text(design_text.title(one), style="bold"), f"   {design_text.level_line(one)}"]
-        lines += [f"   - {line}" for line in design_text.lines(one)]
-    lines += [*design_text.left_out_lines(data), *([data["decides"]] if data["decides"] else [])]
-    for line in lines:
-        screen.print(line, soft_wrap=True)
+        if design_text.is_first_other(data["proposals"], i):
+            plain(f"{design_text.OTHERS}:")
+        bold(design_text.title(one))
+        plain(f"   {design_text.level_line(one)}")
+        for line in design_text.lines(one):
+            plain(f"   - {line}")
+    for line in design_text.left_out_lines(data):
+        plain(line)
+    typer.echo(str(folder))

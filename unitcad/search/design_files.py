@@ -155,8 +155,6 @@ def page(data: Mapping[str, Any], charts: Mapping[str, str]) -> str:
         made += [f"## {markdown(design_text.title(one))}", "", f"**{markdown(design_text.level_line(one))}**", ""]
         made += [f"- {markdown(line)}" for line in design_text.lines(one)]
         made += [f"- build it: `unitcad build {shlex.quote(one['file'])}`", ""]
-    if data["decides"]:
-        made += ["## The best two", "", markdown(data["decides"]), ""]
     made += [f"![probability of the level]({name})\n" for name in charts]
     if left_out := design_text.left_out_lines(data):
         made += ["## Left out", "", *(f"- {markdown(line)}" for line in left_out), ""]
@@ -177,7 +175,7 @@ def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequ
         f"<section><h2>Proposals</h2>{_table(data['proposals'])}",
         f'<p class="note">Levels in per cent of the motor; mm: diameter x height. The {models}. The probability is '
         "that of meeting the level; it counts what the models missed on measured units, not that a unit has never been "
-        f"made.</p><p>{escape(data['decides'] or '')}</p></section>",
+        "made.</p></section>",
         *(
             f'<section id="proposal-{one["rank"]}"><h2>{escape(design_text.title(one))}</h2>'
             f"<p><strong>{escape(design_text.level_line(one))}</strong></p>{_list(design_text.lines(one))}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from unitcad.estimating import estimate_input
 from unitcad.search.candidates import Candidates, Geometry, Lengths, tabulate
 from unitcad.search.limits import limits
 from unitcad.search.proposals import Inversion, castability, name_from, name_of
-from unitcad.search.ranking import measurement, ordered
+from unitcad.search.ranking import measurement
 from unitcad.spec import Spec
 from unitcad.text import listed
 from unitcad.validation import load, templates
@@ -28,94 +27,64 @@ def explain(made: Inversion, named: str) -> dict[str, Any]:
     """Return the answer for the name of a proposal or a candidate, a template or a spec file.
 
     {name, listed, nearest_other, rank, of, among, measured, probability_min, probability, edge, reasons}: `listed` is
-    the unit's number in the list, None if it is not listed; `reasons` is empty for a proposal. Raises Refusal for any
-    other name.
+    the unit's number in the list, None if it is not listed; `among`: whether it was tried; `reasons` is empty for a
+    proposal. Raises Refusal for any other name.
     """
-    found = made.found
+    found, proposals = made.found, made.data["proposals"]
+    target, specs = found.target, {spec.name: spec for spec in made.specs}
     rows = {name_of(found, row): row for row in range(found.count)}
-    listed_names = [one["name"] for one in made.data["proposals"]]
-    if named in rows or named in listed_names:
-        return rounded(_of_name(made, named, rows.get(named)))
-    if not (is_path(named) or named in templates() or os.path.isfile(named)):
-        raise unknown_name("--explain", named, [*listed_names, *templates(), *rows])
-    spec = load(named)
-    faults = [f"can't be cast: {fault}" for fault in castability(spec)[1]]
-    own = next((one for one in made.specs if _is_same_unit(spec, one)), None)
-    names = [layer.material for layer in spec.layers]
-    name = own.name if own else name_from(found.target, _lengths(spec), names)
-    if own or (name in rows and _is_same_unit(spec, found.spec(rows[name]))):
-        data = {**_of_name(made, name, rows.get(name)), "name": spec.name}
+    if named in specs or named in rows:
+        spec = specs.get(named) or found.spec(rows[named], named)
+    elif is_path(named) or named in templates() or os.path.isfile(named):
+        spec = load(named)
     else:
-        data = _of_spec(made, spec, name if name in rows else None)
-    return rounded({**data, "reasons": list(dict.fromkeys([*data["reasons"], *faults]))})
-
-
-def _of_name(made: Inversion, name: str, row: int | None) -> dict[str, Any]:
-    """Explain a candidate of the table or, without a row, a proposal between the grid's steps."""
-    found, proposals, reasons = made.found, made.data["proposals"], []
-    one = next((one for one in proposals if one["name"] == name), None)
-    if one:
-        if one["nearest_other"]:
-            why = "was measured outside the wish" if one["measured"] else "is below the probability that is asked for"
-            reasons.append(f"it is no proposal: it {why}, and stands among the nearest others as number {one['rank']}")
-        level = {key: one[key] for key in ("nearest_other", "probability", "edge")}
-        data = _data(made, name, one["measured"], listed=one["rank"], **level)
-    else:
-        assert row is not None
-        reasons += [f"over a limit: {limit.shown(row)}" for limit in limits(found) if not limit.met[row]]
-        kind = [one for one in proposals if (one["design"], one["motor"], tuple(one["materials"])) == found.kind(row)]
-        if kind:
-            reasons.append(f"{kind[0]['name']} is the best of its kind: it has {kind[0]['probability']:.2f}")
-        else:
-            last = f"{proposals[-1]['name']}, has {proposals[-1]['probability']:.2f}"
-            reasons.append(f"{len(proposals)} kinds come before it; the last of them, {last}")
-        out = [one["failed"] for one in made.data["not_castable"] if one["name"] == name]
-        reasons += [f"can't be cast: {fault}" for failed in out for fault in failed]
-        data = _data(made, name, made.measured.get(row), **_level(found, row))
-    place = _place(made, data["probability"])
-    if row is not None:
-        at = np.flatnonzero(ordered(found, made.rows) == row)
-        place = int(at[0]) + 1 if at.size else None
-    return {**data, "rank": place, "among": True, "reasons": reasons}
-
-
-def _of_spec(made: Inversion, spec: Spec, alike: str | None) -> dict[str, Any]:
-    """Explain a spec that is no candidate; `alike`: the candidate of its lengths, with another motor or circuit."""
-    found, reasons = made.found, _not_tried(made.found, spec)
-    if not reasons:
-        other = f"it has the lengths of {alike}, with another motor or circuit"
-        reasons.append(f"not tried: {other if alike else 'its lengths lie between the steps, see vary.step_mm'}")
-    variant, body = estimate_input(spec, found.target.wish.frequency_hz), found.geometries[0].variant
-    data = _data(made, spec.name, measurement(found.target, variant))
-    if len(variant.layers) > MOST_LAYERS:
-        return {**data, "reasons": [*reasons, f"no level: {MANY_LAYERS}"]}
+        raise unknown_name("--explain", named, [*specs, *templates(), *rows])
+    own = next((one for one in proposals if _is_same_unit(spec, specs[one["name"]])), None)
+    silicones = tuple(layer.material for layer in spec.layers)
+    alike = name_from(target, _lengths(spec), silicones)
+    among = own is not None or (alike in rows and _is_same_unit(spec, found.spec(rows[alike])))
+    variant = estimate_input(spec, target.wish.frequency_hz)
+    data: dict[str, Any] = {
+        "name": spec.name,
+        "listed": own and own["rank"],
+        "nearest_other": bool(own and own["nearest_other"]),
+        "of": int(made.rows.size),
+        "among": among,
+        "measured": measurement(target, variant),
+        "probability_min": target.wish.probability_min,
+        "probability": own and own["probability"],
+        "edge": own and own["edge"],
+    }
+    reasons = [] if among else _not_tried(found, spec, alike if alike in rows else None)
     unknown = [layer for layer in variant.layers if layer.youngs_modulus.value is None]
-    if unknown:
+    if own and own["nearest_other"]:
+        why = "was measured outside the wish" if own["measured"] else "is below the probability that is asked for"
+        reasons.append(f"it is no proposal: it {why}, and stands among the nearest others as number {own['rank']}")
+    elif len(spec.layers) > MOST_LAYERS:
+        reasons.append(f"no level: {MANY_LAYERS}")
+    elif unknown:
         names = listed(dict.fromkeys(layer.material for layer in unknown))
-        return {**data, "reasons": [*reasons, f"{names}: {unknown[0].youngs_modulus.note}"]}
-    on_body = structs.replace(variant, tissue_name=body.tissue_name, tissue=body.tissue)
-    silicones, names = {layer.material: layer for layer in variant.layers}, tuple(one.material for one in spec.layers)
-    table = tabulate(found.target, [Geometry(_lengths(spec), spec, on_body)], silicones, only=names)
-    p, best = float(table.probability[0]), made.data["proposals"][0]
-    if p < best["probability"] - 0.005:
-        reasons.append(f"{best['name']} has a probability of {best['probability']:.2f}, this unit {p:.2f}")
-    reasons += [f"over a limit: {limit.shown(0)}" for limit in limits(table) if not limit.met[0]]
-    return {**data, **_level(table, 0), "rank": _place(made, p), "reasons": reasons}
-
-
-def _data(made: Inversion, name: str, measured: Mapping[str, Any] | None, **level: Any) -> dict[str, Any]:
-    least, of = made.found.target.wish.probability_min, int(made.rows.size)
-    empty = {"listed": None, "nearest_other": False, "rank": None, "probability": None, "edge": None, "among": False}
-    return {"name": name, "of": of, "measured": measured, "probability_min": least, **empty, **level}
-
-
-def _level(table: Candidates, row: int) -> dict[str, Any]:
-    edge = {name: float(end[row]) for name, end in zip(("p10", "p50", "p90"), table.range, strict=True)}
-    return {"probability": float(table.probability[row]), "edge": edge}
-
-
-def _place(made: Inversion, probability: float) -> int:
-    return int(np.sum(made.found.probability[made.rows] > probability + 1e-6)) + 1
+        reasons.append(f"{names}: {unknown[0].youngs_modulus.note}")
+    elif not own:
+        body = found.geometries[0].variant
+        on_body = structs.replace(variant, tissue_name=body.tissue_name, tissue=body.tissue)
+        known = {layer.material: layer for layer in variant.layers}
+        table = tabulate(target, [Geometry(_lengths(spec), spec, on_body)], known, only=silicones)
+        p = data["probability"] = float(table.probability[0])
+        data["edge"] = {name: float(end[0]) for name, end in zip(("p10", "p50", "p90"), table.range, strict=True)}
+        reasons += [f"over a limit: {limit.shown(0)}" for limit in limits(table) if not limit.met[0]]
+        kind = (spec.design, spec.motor.part, list(silicones))
+        best = next((one for one in proposals if (one["design"], one["motor"], one["materials"]) == kind), None)
+        last = proposals[-1]
+        if best and best["probability"] >= p - 1e-6:
+            reasons.append(f"{best['name']} is the best of its kind: it has {best['probability']:.2f}")
+        elif p <= last["probability"]:
+            others = f"{len(proposals)} kinds come before it; the last of them"
+            reasons.append(f"{others}, {last['name']}, has {last['probability']:.2f}")
+    reasons += [f"can't be cast: {fault}" for fault in castability(spec)[1]]
+    level = data["probability"]
+    place = None if level is None else int(np.sum(found.probability[made.rows] > level + 1e-6)) + 1
+    return rounded({**data, "rank": place, "reasons": reasons})
 
 
 def _lengths(spec: Spec) -> Lengths:
@@ -135,8 +104,8 @@ def _is_same_unit(one: Spec, other: Spec) -> bool:
     return unit(one) == unit(other)
 
 
-def _not_tried(found: Candidates, spec: Spec) -> list[str]:
-    """Return why the target does not try a spec."""
+def _not_tried(found: Candidates, spec: Spec, alike: str | None) -> list[str]:
+    """Return why the target does not try a spec; `alike`: the candidate of its lengths and silicones."""
     target, vary, count = found.target, found.target.asked.vary, len(spec.layers)
     names, reasons = [layer.material for layer in spec.layers], []
     if missing := [name for name in dict.fromkeys(names) if name not in target.materials]:
@@ -155,4 +124,6 @@ def _not_tried(found: Candidates, spec: Spec) -> list[str]:
         reasons.append(f"diameters from {low:g} to {high:g} mm are tried (vary.diameter_mm), not {spec.diameter_mm:g}")
     if any(a == b for a, b in itertools.pairwise(names)):
         reasons.append("neighbouring layers are of one silicone, which is tried as one layer")
-    return reasons
+    other = f"it has the lengths of {alike}, with another motor or circuit"
+    between = f"not tried: {other if alike else 'its lengths lie between the steps, see vary.step_mm'}"
+    return reasons or [between]

@@ -9,13 +9,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
 
 from unitcad.attenuation.crosstalk import RANGE as CROSSTALK_RANGE
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.predictive import Predictive, Stack, stack_of
-from unitcad.attenuation.edge.variant_units import stacked
+from unitcad.attenuation.edge.predictive import Stack, stack_of
 from unitcad.casting.figures import MOST_ERROR_PCT, mix
 from unitcad.catalogue import materials as silicones
 from unitcad.catalogue import measurements
@@ -46,10 +44,6 @@ _TRIES = 3
 """Candidates of a kind that are judged until one can be cast."""
 _FINE_STEPS = (0.1, 0.05)
 """Steps of walls and caps between those of the grid, and half those of diameters, mm: the printers' play is larger."""
-_SAME_LEVEL = 0.05
-"""Levels whose expected ratio is nearer to one are the same for a purpose: half of a reading's own noise of 10 %."""
-_OPEN, _SURE = 0.55, 0.99
-"""Below the first probability the order of two levels is open; from the second on no measurement is needed for it."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +74,6 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
         raise Refusal("at_hand.printer", target.asked.at_hand.printer, limit)
     specs = tuple(spec for spec, _ in chosen)
     proposals = [{**one, "rank": i} for i, (_, one) in enumerate(chosen, 1)]
-    decides, decision = best_two(target, specs, proposals)
     data = {
         "name": target.name,
         "wish": {key: value for key, value in _wish(target).items() if value is not None},
@@ -96,8 +89,6 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
         "left_out": found.left_out,
         "proposals": proposals,
         "not_castable": out,
-        "decides": decides,
-        "decision": decision,
     }
     return Inversion(found, rows, specs, rounded(data), measured)
 
@@ -325,56 +316,3 @@ def _scale(spec: Spec) -> list[str]:
         return []
     digit, least = number(spec.casting.scale_resolution_g, 3), number(spec.casting.minimum_mix_g, 3)
     return [f"a scale of {digit} g is off by more than {MOST_ERROR_PCT:g} % on a part of {least} g of {listed(poor)}"]
-
-
-def best_two(target: Target, specs: Sequence[Spec], data: Sequence[Mapping[str, Any]]) -> tuple[str | None, Any]:
-    """Return the sentence on the order of the first two proposals' levels, and the figures behind it.
-
-    None if there are not two. If one lab measured both, the sentence has the order by the measurements.
-    """
-    if len(specs) < 2:
-        return None, None
-    stack = stack_of(target.models, target.fit, target.asked.estimate.moduli)
-    both = [stack.predictive(stacked([estimate_input(spec)])) for spec in specs[:2]]
-    logs, below = both[0].centre[0] - both[1].centre[0], below_by_ranking(both)
-    figures = {
-        "ratios": dict(zip(stack.models, map(float, np.exp(logs)), strict=True)),
-        "weights": dict(zip(stack.models, map(float, stack.weights), strict=True)),
-        "first_below": below,
-    }
-    side, share = ("below", below) if below >= 0.5 else ("above", 1.0 - below)
-    expects = f"the ranking expects #1 {side} #2 ({'more than 99' if share > 0.995 else f'{100 * share:.0f}'} %)"
-    first, second = (one["measured"] for one in data[:2])
-    if first and second and first["by"].startswith("your lab") == second["by"].startswith("your lab"):
-        return f"{_by_measurement(first, second)}; by the models alone {expects}.", figures
-    ratio = float(np.exp(stack.weights @ logs))
-    if abs(np.log(ratio)) < _SAME_LEVEL and abs(data[0]["probability"] - data[1]["probability"]) <= ALIKE:
-        hours = " and ".join(number(one["cure_hours"], 3) for one in data[:2])
-        same = f"the ranking expects levels with a ratio of {number(ratio, 3)}"
-        return f"#1 and #2 are the same for your purpose: {same}. They are out of the mould in {hours} h.", figures
-    if share < _OPEN:
-        return f"The ranking can't tell which of #1 and #2 is lower ({100 * below:.0f} %).", figures
-    sure = ": no measurement is needed to order the two" if share >= _SURE else ""
-    return f"{expects[0].upper()}{expects[1:]}{sure}.", figures
-
-
-def _by_measurement(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
-    """Return the order of two measured units; each unit was measured once, and some levels are printed twice."""
-    one, other = ([level for level in (each["level"], each.get("also")) if level] for each in (first, second))
-    printed = [listed(f"{number(100 * level, 3)} %" for level in levels) for levels in (one, other)]
-    order = "which one is lower stays open"
-    if max(one) < min(other) or max(other) < min(one):
-        order = f"#{1 if max(one) < min(other) else 2} is the lower"
-    return f"#1 was measured at {printed[0]}, #2 at {printed[1]}: {order}"
-
-
-def below_by_ranking(both: Sequence[Predictive], points: int = 400) -> float:
-    """Return the probability that the first unit's level is the lower one, each model missing the two independently."""
-    first, second = both
-    shares = (np.arange(points) + 0.5) / points
-    each = [
-        np.mean(stdtr(df, (second.centre[0, k] - first.centre[0, k] + second.scale[0, k] * t) / first.scale[0, k]))
-        for k, df in enumerate(first.degrees_of_freedom)
-        for t in [stdtrit(df, shares)]
-    ]
-    return float(np.array(each) @ first.weights)

@@ -13,7 +13,6 @@ wall_mm = [1.0, 2.0]
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,7 +49,6 @@ Wall = Annotated[float, Meta(ge=LEAST_LAYER, le=20)]
 Step = Annotated[float, Meta(ge=0.01, le=10)]
 Name = Annotated[str, Meta(min_length=1, max_length=60)]
 _SPEC_KEYS = ("motor", "fpcb", "wires", "moulds", "casting", "output")
-_PERCENT = re.compile(r"\s*([0-9]{1,3}(?:\.[0-9]{1,6})?)\s*(?:%|per cent|percent)\s*")
 MOST_GEOMETRIES = 20_000
 """Sets of lengths that are tried; each costs about half a millisecond."""
 
@@ -222,9 +220,6 @@ def _check_percent(data: Mapping[str, Any]) -> None:
     table = data.get("target")
     for key in ("edge_max", "edge_min"):
         value = table.get(key) if isinstance(table, Mapping) else None
-        if isinstance(value, str) and (given := _PERCENT.fullmatch(value)) and 0.1 <= float(given[1]) <= 200:
-            limit = "is a fraction of the motor's amplitude: a number without a unit"
-            raise Refusal(f"target.{key}", value, limit, round(float(given[1]) / 100, 6))
         if isinstance(value, int | float) and not isinstance(value, bool) and 2 < value <= 200:
             raise Refusal(f"target.{key}", value, "is a fraction of the motor's amplitude, at most 2", value / 100)
 
