@@ -145,7 +145,9 @@ def test_a_component_is_the_piece_that_holds_the_point():
         reference = assert_breps_agree(Component(three, (3 * i, 0, 0.5)))
         assert reference.volume == pytest.approx(math.pi * (1 + i), rel=1e-9)
         assert_mesh_within_bound(Component(three, (3 * i, 0, 0.5)), 64, reference)
-    assert mesh.realise(Component(three, (1.5, 0, 0.5)), 64).is_empty()
+    for realise in (lambda shape: mesh.realise(shape, 64), lambda shape: occt.solids([shape])):
+        with pytest.raises(UnitcadError, match="no solid holds the point"):
+            realise(Component(three, (1.5, 0, 0.5)))
 
 
 @pytest.mark.parametrize("name", ["tube", "stepped"])

@@ -10,6 +10,7 @@ import manifold3d
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
+from unitcad.errors import UnitcadError
 from unitcad.geometry.components import components
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import GRID_PER_MM, Profile, points
@@ -146,13 +147,20 @@ _PROBE = 1e-4
 _SAME_LINE = 1e-9
 """Distance in plan up to which two vertices lie on one vertical line, mm."""
 
+_CRACK = 0.01
+"""Area up to which a crack between two prisms is left, mm2."""
+_UPRIGHT = 1e-6
+"""Slope against the vertical up to which a face is upright: what rounding tilts."""
+
 
 def component(solid: Manifold, at: tuple[float, float, float]) -> Manifold:
-    """Return the connected piece of `solid` that holds the point `at` (mm); nothing where none does."""
+    """Return the connected piece of `solid` that holds the point `at` (mm). Raises UnitcadError if none does."""
     probe = Manifold.cube((_PROBE, _PROBE, _PROBE), True).translate(at)
     pieces = [(float((piece ^ probe).volume()), i, piece) for i, piece in enumerate(solid.decompose())]
     shared, _, held = max(pieces, default=(0.0, 0, Manifold()))
-    return held if shared > 0 else Manifold()
+    if shared <= 0:
+        raise UnitcadError(f"manifold3d: no solid holds the point {at}")
+    return held
 
 
 def _below(solid: Manifold, bottom: float) -> Manifold:
@@ -160,9 +168,20 @@ def _below(solid: Manifold, bottom: float) -> Manifold:
     vertices, faces = arrays(solid)
     vertices = _plumb(vertices)
     corners = vertices[faces]
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    faces = faces[a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] > 1e-12]
-    return Manifold.batch_boolean([_prism(vertices, patch, bottom) for patch in _patches(faces)], manifold3d.OpType.Add)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # By slope: a sliver of a level face that was left out would part the face, and leave a crack between two prisms.
+    faces = faces[normals[:, 2] > _UPRIGHT * np.linalg.norm(normals, axis=1)]
+    patches, corners = _patches(faces), vertices[np.unique(faces), :2]
+    plain = [_prism(vertices, patch, bottom) for patch in patches]
+    split = [_prism(*_split_at_lines(vertices, patch, corners), bottom) for patch in patches]
+    # Only a crack makes so much surface: without one, the fewer triangles are kept. What is measured is not returned,
+    # since a boolean of many that is worked out in parts comes out in other triangles.
+    cracked = _joined(plain).surface_area() > _joined(split).surface_area() + _CRACK
+    return _joined(split if cracked else plain)
+
+
+def _joined(prisms: list[Manifold]) -> Manifold:
+    return Manifold.batch_boolean(prisms, manifold3d.OpType.Add)
 
 
 def _plumb(vertices: np.ndarray) -> np.ndarray:
@@ -189,16 +208,55 @@ def _patches(faces: np.ndarray) -> list[np.ndarray]:
     return [faces[labels == i] for i in range(int(labels.max(initial=-1)) + 1)]
 
 
+def _split_at_lines(vertices: np.ndarray, patch: np.ndarray, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices and a patch of faces, its border split at the vertical lines (x and y, (n, 2)) that it meets.
+
+    Else two prisms that share a wall, in which one of them has one vertex more, keep a crack between them.
+    """
+    from scipy.spatial import KDTree
+
+    tree, known = KDTree(lines), len(vertices)
+    added, split = [vertices], dict[tuple[int, int], list[int]]()
+    for i, j in _border(patch).tolist():
+        start, (x, y, rise) = vertices[i], vertices[j] - vertices[i]
+        length = math.hypot(x, y)
+        near = lines[tree.query_ball_point(start[:2] + np.array([x, y]) / 2, length / 2)] - start[:2]
+        share = near @ (x, y) / length**2
+        off = np.abs(near @ (y, -x)) / length
+        between = (off < _SAME_LINE) & (np.minimum(share, 1 - share) * length > _SAME_LINE)
+        share, first = np.unique(share[between], return_index=True)
+        if len(share):
+            added.append(start + np.column_stack([near[between][first], share * rise]))
+            split[i, j] = list(range(known, known + len(share)))
+            known += len(share)
+    parts, waiting = [], patch.tolist() if split else []
+    while waiting:
+        i, j, k = waiting.pop()
+        side = next((side for side in ((i, j), (j, k), (k, i)) if split.get(side)), None)
+        if side is None:
+            parts.append((i, j, k))
+            continue
+        i, j, k = {(i, j): (i, j, k), (j, k): (j, k, i), (k, i): (k, i, j)}[side]
+        at, *rest = split.pop(side)
+        split[at, j] = rest
+        waiting += [(i, at, k), (at, j, k)]
+    return np.vstack(added), np.array(parts) if parts else patch
+
+
+def _border(patch: np.ndarray) -> np.ndarray:
+    """Return the directed edges (n, 2) of faces that no other of them has the other way."""
+    edges = patch[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    inner = {(int(j), int(i)) for i, j in edges}
+    return np.array([edge for edge in edges.tolist() if tuple(edge) not in inner])
+
+
 def _prism(vertices: np.ndarray, patch: np.ndarray, bottom: float) -> Manifold:
     """Return the solid between upward faces and the plane z = `bottom`."""
     used, patch = np.unique(patch, return_inverse=True)
     patch, n = patch.reshape(-1, 3), len(used)
     roof = vertices[used]
     floor = np.column_stack([roof[:, :2], np.full(n, bottom)])
-    edges = patch[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    inner = {(int(j), int(i)) for i, j in edges}
-    border = np.array([edge for edge in edges.tolist() if tuple(edge) not in inner])
-    i, j = border.T
+    i, j = _border(patch).T
     walls = np.vstack([np.column_stack([j, i, i + n]), np.column_stack([j, i + n, j + n])])
     triangles = np.vstack([patch, patch[:, ::-1] + n, walls]).astype(np.uint64)
     return Manifold(manifold3d.Mesh64(np.vstack([roof, floor]), triangles))

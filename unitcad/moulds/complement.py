@@ -26,7 +26,7 @@ from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Tooling
 from unitcad.errors import UNIT_ALONE, Refusal
 from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_count
-from unitcad.kernels.sections import widest
+from unitcad.kernels.sections import gap, widest
 from unitcad.moulds.base import stand
 from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import cup_blank, groove, grooves, recess, skirt_end
@@ -39,10 +39,14 @@ from unitcad.spec import Spec
 
 SLIVER = 1e-3
 """Volume up to which a piece is what rounding leaves between two faces, mm3."""
+FILM = 0.1
+"""Area up to which films are left, mm2: they reach less far than the clearance."""
 FLAT = math.ceil(10 * math.sqrt(4 * LEAST_AREA / math.pi)) / 10
 """Diameter of a disc that is large enough to pour through, mm."""
 LEVEL = 1 / GRID_PER_MM
 """Heights nearer than this are one, mm."""
+MITRE = 3.0
+"""How many clearances a sharp corner's copy moves out, at most: as far as a corner of 39 degrees needs."""
 
 
 def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
@@ -160,7 +164,7 @@ def _standing(
     Raises Refusal for a piece that would hang in the air, and for one that a later layer takes the place of.
     """
     filled = (*cast, *there(len(cast) - 1))
-    under = Cut(Below(union(filled), 0.0), filled)
+    under = _without_films(Cut(Below(union(filled), 0.0), filled), segments)
     held = _pieces(realise(under, segments))
     for piece in held:
         if not _stands(piece):
@@ -204,13 +208,39 @@ def _stands(piece: Manifold) -> bool:
     return piece.slice(LEVEL / 2).area() > SLIVER
 
 
+def _without_films(shape: Shape, segments: int) -> Shape:
+    """Return a shape whose pieces have no films, which rounding leaves upright between two faces that lie on a plane.
+
+    A film has area and no volume, and faces nowhere upwards: none is under the upward faces.
+    """
+    pieces = _pieces(realise(shape, segments))
+    if not pieces:
+        return shape
+    whole = Manifold.compose(pieces)
+    low, area = bounds(whole)[2], whole.surface_area()
+    cleared, least = shape, area - FILM
+    for other in (Below(shape, low), Common((shape, Below(shape, low - BEYOND)))):
+        solid = realise(other, segments)
+        if solid.surface_area() < least and abs(solid.volume() - whole.volume()) < LEVEL**2 * area:
+            cleared, least = other, solid.surface_area()
+    return cleared
+
+
 def _inside(piece: Manifold) -> tuple[float, float, float]:
-    """Return a point well inside a piece."""
+    """Return a point well inside a piece: the middle of the largest disc in it that is as thick as it is wide.
+
+    A film that rounding leaves between two faces may be tall, but has no width.
+    """
     levels = sorted({float(z) for z in arrays(piece)[0][:, 2]})
-    low, high = max(pairwise(levels), key=lambda pair: pair[1] - pair[0])
-    z = (low + high) / 2
-    _, (x, y) = widest(piece.slice(z))
-    return x, y, z
+    best, point = -1.0, (0.0, 0.0, levels[0])
+    for low, high in sorted(pairwise(levels), key=lambda pair: pair[0] - pair[1]):
+        if high - low <= best:
+            break
+        z = (low + high) / 2
+        diameter, (x, y) = widest(piece.slice(z))
+        if min(diameter, high - low) > best:
+            best, point = min(diameter, high - low), (x, y, z)
+    return point
 
 
 def _slid(spec: Spec, piece: Shape, solid: Manifold, wall: Manifold, rim: float, segments: int) -> Shape:
@@ -218,23 +248,55 @@ def _slid(spec: Spec, piece: Shape, solid: Manifold, wall: Manifold, rim: float,
     leave a skin there that is too thin to print, unless the cup would fall in two.
     """
     clearance = spec.moulds.window_clearance_mm
-    top = bounds(solid)[5]
+    top, under = bounds(solid)[5], Below(piece, -2 * BEYOND)
+    hole, least = _grown(under, clearance), clearance * math.cos(math.pi / segments) - LEVEL
+    corners = _past_corners(solid, wall - realise(hole, segments), clearance, least)
+    if corners:
+        hole = _grown(under, clearance, corners)
     if rim - spec.moulds.least_wall_mm < top < rim:
-        column = _grown(Below(moved(piece, z=rim), -2 * BEYOND), clearance)
+        column = _grown(Below(moved(piece, z=rim), -2 * BEYOND), clearance, corners)
         if len(_pieces(wall - realise(column, segments))) <= len(_pieces(wall)):
             return column
-    return _grown(Below(piece, -2 * BEYOND), clearance)
+    return hole
 
 
-def _grown(piece: Shape, clearance: float) -> Shape:
-    """Return a piece and eight copies of it, moved by `clearance` along the axes and diagonally.
+def _grown(piece: Shape, clearance: float, corners: Sequence[tuple[float, float]] = ()) -> Shape:
+    """Return a piece and copies of it: eight moved by `clearance` along the axes and diagonally, one for each corner.
 
     Every upright face moves out by `clearance` or more. So does an upright edge whose faces both look into one
     quadrant, by a diagonal copy. A vertex of a circle of n sides that lies on an axis moves out by the copy along that
-    axis: `clearance` times the cosine of pi / n, as C210 allows. A sharper edge may come out nearer: C210 measures it.
+    axis: `clearance` times the cosine of pi / n, as C210 allows.
     """
     steps = (-clearance, 0.0, clearance)
-    return union((piece, *(moved(piece, x, y) for x in steps for y in steps if x or y)))
+    moves = [(x, y) for x in steps for y in steps if x or y]
+    return union((piece, *(moved(piece, x, y) for x, y in (*moves, *corners))))
+
+
+def _past_corners(solid: Manifold, wall: Manifold, clearance: float, least: float) -> list[tuple[float, float]]:
+    """Return the moves that take sharp corners out by `clearance`, mm, in the level sections of a piece from which the
+    wall round it is nearer than `least`.
+
+    A corner sharper than MITRE allows is left: C210 finds it.
+    """
+    ways = np.array([(x, y) for x in (-clearance, 0, clearance) for y in (-clearance, 0, clearance) if x or y])
+    moves: list[tuple[float, float]] = []
+    for low, high in pairwise(sorted({float(z) for z in arrays(solid)[0][:, 2]})):
+        one, other = (each.slice((low + high) / 2) for each in (solid, wall))
+        if high - low < LEVEL or one.is_empty() or other.is_empty() or gap(one, other, clearance) >= least:
+            continue
+        for loop in one.to_polygons():
+            sides = np.roll(loop, -1, axis=0) - loop
+            # Past a side that is shorter its neighbours' corner moves out.
+            sides = sides[np.hypot(*sides.T) > clearance / 2]
+            first = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.hypot(*sides.T)[:, None]
+            for here, there in zip(first, np.roll(first, -1, axis=0), strict=True):
+                sharp, cosine = here[0] * there[1] - here[1] * there[0] > 0, float(here @ there)
+                short = not ((ways @ here >= least) & (ways @ there >= least)).any()
+                if sharp and short and 1 + cosine >= 2 / MITRE**2:
+                    x, y = clearance * (here + there) / (1 + cosine)
+                    moves.append((float(x), float(y)))
+                    ways = np.vstack([ways, moves[-1]])
+    return moves
 
 
 def _place(piece: Manifold) -> str:
