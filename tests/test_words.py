@@ -1,0 +1,74 @@
+"""Words that read badly are counted, by folder: a count may fall, and then the table falls with it; it may not rise.
+
+`python tests/test_words.py` writes the table anew.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import tomllib
+from collections import defaultdict
+from pathlib import Path
+
+import tomli_w
+
+ROOT = Path(__file__).parents[1]
+TABLE = Path(__file__).with_name("words.toml")
+PATTERNS = {
+    "what": r"\bwhat\b",
+    "where": r"\bwhere\b",
+    "beside": r"\bbeside\b",
+    "stand, lie, hold": r"\b(?:stands?|lies|lie|holds?)\b",
+    "sentence that begins with Of": r"(?:^|(?<=[.!?] ))Of\b",
+}
+LONG = 25
+"""Words of a sentence, at most."""
+
+
+def _strings(source: str) -> str:
+    """Return all strings of three words or more in a module, docstrings included."""
+    nodes = ast.walk(ast.parse(source))
+    found = (node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str))
+    return "\n\n".join(text for text in found if len(text.split()) >= 3)
+
+
+def _prose(markdown: str) -> str:
+    """Return a page's text without code and tables."""
+    return re.sub(r"(?m)^\|.*$", "", re.sub(r"(?s)```.*?```", "", markdown))
+
+
+def _folders() -> dict[str, str]:
+    texts: dict[str, list[str]] = defaultdict(list)
+    for path in sorted((ROOT / "unitcad").rglob("*.py")):
+        parts = path.relative_to(ROOT / "unitcad").parts
+        texts[f"unitcad/{parts[0]}" if len(parts) > 1 else "unitcad"].append(_strings(path.read_text("utf-8")))
+    for path in sorted((ROOT / "docs").rglob("*.md")):
+        if path.parent.name != "accuracy":  # written by the studies
+            texts["docs"].append(_prose(path.read_text("utf-8")))
+    return {name: "\n\n".join(found) for name, found in texts.items()}
+
+
+def counts() -> dict[str, dict[str, int]]:
+    """Return the count of each pattern, and of long sentences, by folder."""
+    table = {}
+    for name, text in _folders().items():
+        row = {pattern: len(re.findall(regex, text)) for pattern, regex in PATTERNS.items()}
+        sentences = re.split(r"(?<=[.!?])\s+|\n\n", text)
+        table[name] = {**row, "long sentences": sum(len(sentence.split()) > LONG for sentence in sentences)}
+    return table
+
+
+def test_bad_words_do_not_increase() -> None:
+    limits = tomllib.loads(TABLE.read_text("utf-8"))
+    more = [
+        f"{folder}: {pattern}: {count}, at most {limits.get(folder, {}).get(pattern, 0)}"
+        for folder, row in counts().items()
+        for pattern, count in row.items()
+        if count > limits.get(folder, {}).get(pattern, 0)
+    ]
+    assert more == []
+
+
+if __name__ == "__main__":
+    TABLE.write_text(tomli_w.dumps(counts()), "utf-8")
