@@ -45,8 +45,8 @@ def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path: Path)
         assert (
             relative.startswith("accuracy/")
             or relative == "index.md"
-            or f"](docs/{relative})" in (ROOT / "README.md").read_text("utf-8")
-        ), f"the README's index lacks {relative}"
+            or f"]({relative})" in (ROOT / "docs" / "index.md").read_text("utf-8")
+        ), f"the index of the docs lacks {relative}"
 
 
 def test_a_lost_link_fails_the_site(tmp_path: Path) -> None:
