@@ -284,7 +284,7 @@ def compare(asked: argparse.Namespace, net: Net, parent: Node, sweep: Path, out:
         spec = wanted.spec(index)
         chosen[subject(spec).folder_name] = spec
     words = [name[-12:] for name in chosen]
-    words = [sys.executable, "-m", "unitcad", "cache", "export", *words, "--batch", str(out), "-o", str(out / "few")]
+    words = [sys.executable, "-m", "unitcad", "export", *words, "--batch", str(out), "-o", str(out / "few")]
     assert parent.start(words, "export").wait(600) == 0, (net.scratch / "logs" / "export").read_text()
     store = MemoryStore()
     for name, spec in chosen.items():

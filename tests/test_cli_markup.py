@@ -8,10 +8,10 @@ from importlib.resources import files
 
 import pytest
 
-from unitcad.cli.batch_progress import watching
 from unitcad.cli.estimate_tables import print_estimate, print_frequencies
 from unitcad.cli.output import progress
 from unitcad.estimating import estimate_spec, frequency_table_of_spec
+from unitcad.sweeps.batch_progress import watching
 from unitcad.validation import from_data, read
 
 HOSTILE = ["[/x]", "[bold", "a [red]b[/red] c", "[link=file:///x]y[/link]", ":tada:", "\\[/x]", "[@click=f()]z"]

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import ast
+import importlib.util
+import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,19 +15,19 @@ import pytest
 
 import unitcad
 from unitcad.designs import shipped
+from unitcad.rooms import commands, file_kinds
 from unitcad.validation import default_template, templates
 
 PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
-    {"accuracy"},
+    {"accuracy", "serve"},
+    {"search", "sweeps", "lab", "arrays"},
+    {"experiments"},
     {"cli"},
-    {"api", "serve"},
-    {"sweeps", "search"},
+    {"api"},
     {"report"},
     {"pipeline"},
-    {"lab", "arrays"},
     {"casting", "checks"},
-    {"experiments"},
     {"moulds", "estimating"},
     {"validation"},
     {"export"},
@@ -39,11 +42,22 @@ FLOORS = [
     {"workers"},
     {"errors"},
     {"text", "json_text", "notebook", "geometry"},
-    {"lean_import", "heap"},
+    {"lean_import", "heap", "rooms"},
 ]
+ROOMS = {
+    "accuracy": set(),
+    "arrays": set(),
+    "serve": set(),
+    "search": set(),
+    "sweeps": {"serve"},
+    "lab": set(),
+    "experiments": {"lab", "search"},
+}
+"""Each room that can be deleted, with the rooms that stand on it."""
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
+LIVE = {Path(importlib.util.find_spec(kind.page).origin or "") for kind in file_kinds() if kind.page}
 CAD = ("OCP", "build123d", "cadquery")
-NEEDLESS = ("unitcad.arrays.array_file",)
+NEEDLESS = ("unitcad.arrays",)
 """What neither a unit's build nor a check needs, and takes longer to load than a small mesh takes to check."""
 OF_OTHERS = {
     "check": (
@@ -63,7 +77,7 @@ def _edges() -> set[tuple[str, str, str]]:
     found = set()
     for file in sorted(PACKAGE.rglob("*.py")):
         room = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
-        if room in ("__init__", "__main__"):
+        if room in ("__init__", "__main__") or file in LIVE:  # only the live page loads these
             continue
         for node in ast.walk(ast.parse(file.read_text("utf-8"))):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -258,3 +272,33 @@ def test_importing_reads_no_file_of_ours() -> None:
         "print([f for f in opened if f.endswith('.toml')])"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+@pytest.mark.parametrize("gone", [*({room, *above} for room, above in ROOMS.items()), set(ROOMS)], ids=sorted)
+def test_a_room_can_be_deleted(gone: set[str], tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(PACKAGE, copy / "unitcad", ignore=lambda *_: {"__pycache__", *gone})
+    shutil.copytree(templates()["embedded"].parent, copy / "templates")
+
+    def run(*words: str) -> str:
+        done = subprocess.run(
+            [sys.executable, "-m", "unitcad", *words],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(copy)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{words}: {done.stderr}"
+        return done.stdout
+
+    named = {name: reference.split(".")[1] for name, reference in commands().items()}
+    told = re.findall(r"^  ([a-z-]+) ", run("--help").partition("Commands:")[2], re.MULTILINE)
+    assert sorted(told) == sorted(name for name, room in named.items() if room not in gone)
+    run("init", "mine", "--template", "embedded")
+    built = Path(run("build", "mine.toml", "--formats", "stl,svg", "--report").splitlines()[-1])
+    assert (tmp_path / built / "report.html").is_file()
+    run("estimate", "mine.toml")
+    run("check", str(built / "moulds"))
+    for kind in run("list").split():
+        run("list", kind)

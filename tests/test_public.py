@@ -27,6 +27,7 @@ import unitcad
 from unitcad.catalogue import entries
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec.asked import AskedSpec
+from unitcad.sweeps import batch
 
 PACKAGE = Path(unitcad.__file__).parent
 LAYERS: list[dict[str, Any]] = [
@@ -79,7 +80,7 @@ def test_every_name_resolves_and_has_a_docstring(name: str) -> None:
     assert getattr(unitcad, name) is found
 
 
-@pytest.mark.parametrize("name", ["build", "estimate", "check", "batch", "load", "materials", "motors", "printers"])
+@pytest.mark.parametrize("name", ["build", "estimate", "check", "load", "materials", "motors", "printers"])
 def test_functions_say_what_they_raise_and_in_which_units(name: str) -> None:
     found = getattr(unitcad, name)
     text = inspect.getdoc(found.__call__ if inspect.ismodule(found) else found) or ""
@@ -95,7 +96,7 @@ def test_signatures_are_those_of_a_file() -> None:
     required = [name for name, key in keys.items() if key.default is key.empty]
     assert required == ["name", "design", "diameter_mm", "layers"]
     assert list(inspect.signature(unitcad.check).parameters)[:2] == ["files", "printer"]
-    assert list(inspect.signature(unitcad.batch).parameters)[:2] == ["sweep", "out"]
+    assert list(inspect.signature(batch).parameters)[:2] == ["sweep", "out"]
 
 
 def test_the_typed_material_is_the_one_that_a_spec_takes() -> None:
@@ -280,7 +281,7 @@ def _shown(tmp_path: Path) -> dict[str, Any]:
         "estimate": unitcad.estimate(spec),
         "build": unitcad.build(spec, tmp_path / "out", only=["unit"], formats=["stl"]),
         "check": unitcad.check(good, bad, tmp_path / "missing.stl"),
-        "batch": unitcad.batch(sweep, tmp_path / "few", only=["estimate"], set={"layers.0.wall_mm": 1.3}),
+        "batch": batch(sweep, tmp_path / "few", only=["estimate"], set={"layers.0.wall_mm": 1.3}),
     }
 
 
@@ -350,11 +351,11 @@ def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
         (lambda: unitcad.build("embedded", only="units"), "^only = 'units': not known"),
         (lambda: unitcad.build("embedded", only=[3]), "^only = 3: takes a text or a list of"),  # type: ignore[list-item]
         (lambda: unitcad.estimate("embedded", models=3), "^models = 3: takes a text or"),  # type: ignore[arg-type]
-        (lambda: unitcad.batch("papr"), "^sweep = 'papr': not known"),
-        (lambda: unitcad.batch(None), "^sweep: takes a path, not NoneType$"),  # type: ignore[arg-type]
-        (lambda: unitcad.batch("paper", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
-        (lambda: unitcad.batch("paper", limit=0), "^limit = 0: must be a whole number from 1 "),
-        (lambda: unitcad.batch("paper", jobs=0, timeout=3), "^timeout = 3: only a worker process"),
+        (lambda: batch("papr"), "^sweep = 'papr': not known"),
+        (lambda: batch(None), "^sweep: takes a path, not NoneType$"),  # type: ignore[arg-type]
+        (lambda: batch("paper", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
+        (lambda: batch("paper", limit=0), "^limit = 0: must be a whole number from 1 "),
+        (lambda: batch("paper", jobs=0, timeout=3), "^timeout = 3: only a worker process"),
         (lambda: unitcad.check("a.stl", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
         (lambda: unitcad.check("a.stl", timeout=True), "^timeout = true: must be a number"),
         (lambda: unitcad.check(["a.stl"]), r'^files = \["a.stl"\]: takes a path, not list$'),  # type: ignore[arg-type]

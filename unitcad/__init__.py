@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from unitcad.api.build_call import build as build
     from unitcad.api.estimate_call import EdgeEstimate as EdgeEstimate
     from unitcad.api.estimate_call import estimate as estimate
-    from unitcad.arrays.array import Array as Array
-    from unitcad.arrays.array_file import load_array as load_array
     from unitcad.catalogue import MaterialEntry as Material
     from unitcad.catalogue import materials as materials
     from unitcad.catalogue import motors as motors
@@ -46,16 +44,12 @@ if TYPE_CHECKING:
     from unitcad.spec.asked import MouldsTable as Moulds
     from unitcad.spec.asked import OutputTable as Output
     from unitcad.spec.asked import WiresTable as Wires
-    from unitcad.sweeps.batch_call import BatchResult as BatchResult
-    from unitcad.sweeps.batch_call import batch as batch
     from unitcad.validation import load as load
     from unitcad.validation import templates as templates
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "Array",
-    "BatchResult",
     "BuildResult",
     "Casting",
     "CheckResult",
@@ -73,13 +67,11 @@ __all__ = [
     "Variant",
     "Wires",
     "attenuation",
-    "batch",
     "build",
     "catalogue",
     "check",
     "estimate",
     "load",
-    "load_array",
     "materials",
     "motors",
     "printers",
@@ -89,8 +81,6 @@ __all__ = [
 ]
 
 _PLACES = {
-    "Array": "arrays.array:Array",
-    "BatchResult": "sweeps.batch_call:BatchResult",
     "BuildResult": "api.build_call:BuildResult",
     "Casting": "spec.asked:CastingTable",
     "CheckResult": "meshcheck.check_call:CheckResult",
@@ -108,13 +98,11 @@ _PLACES = {
     "Variant": "pipeline.variant:Variant",
     "Wires": "spec.asked:WiresTable",
     "attenuation": "attenuation",
-    "batch": "sweeps:batch",
     "build": "api.build_call:build",
     "catalogue": "catalogue",
     "check": "meshcheck:check",
     "estimate": "api.estimate_call:estimate",
     "load": "validation:load",
-    "load_array": "arrays.array_file:load_array",
     "materials": "catalogue:materials",
     "motors": "catalogue:motors",
     "printers": "catalogue:printers",

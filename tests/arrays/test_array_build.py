@@ -18,6 +18,8 @@ from casting_rules import broken_rules
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_hash, load_array
+from unitcad.arrays.array_summary import array_summary
+from unitcad.arrays.arrayed import unit_folders
 from unitcad.arrays.patch import patch_bodies
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.arrays.pocket_procedure import pocket_procedure
@@ -28,13 +30,10 @@ from unitcad.casting.steps import duration, in_short
 from unitcad.casting.views import picture_path, views
 from unitcad.casting.written import files as written
 from unitcad.checks import mould_checks
-from unitcad.cli.array_summary import array_summary
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
 from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.arrays import unit_folders
-from unitcad.pipeline.write import Built
 from unitcad.pipeline.write import build as build_array
 from unitcad.report import write_report
 from unitcad.report.bench_page import write_bench
@@ -93,7 +92,7 @@ def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:
 def test_the_summary_has_the_silicone_of_units_and_sheet(folder: Path) -> None:
     array = load_array("forearm-pockets", SMALL)
     manifest = json.loads((folder / "manifest.json").read_text())
-    (line,) = [one for one in array_summary(array, Built(folder, manifest, "")) if one.startswith("to mix: ")]
+    (line,) = [one for one in array_summary(array, folder, manifest) if one.startswith("to mix: ")]
     mixed = {name: float(mass) for mass, name in re.findall(r"([0-9.]+) g of ([^ ,]+)", line)}
     with (folder / "bom.csv").open() as file:
         bought = [row for row in csv.DictReader(file) if row["unit"] == "g"]

@@ -14,14 +14,14 @@ import pytest
 import unitcad
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_names import array_templates, is_array
+from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.array_units import expanded
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.outlines import rounded
 from unitcad.arrays.tail_ways import tails
 from unitcad.errors import Refusal
-from unitcad.validation import default_template, load, templates
+from unitcad.validation import compound_kind, default_template, load, templates
 
 
 def _array(layout: dict[str, Any], **more: Any) -> Array:
@@ -38,9 +38,11 @@ def test_a_template_settles_to_data_that_give_the_same_array(name: str) -> None:
     array = load_array(name)
     assert load_array(array.asked) == array
     assert load_array(msgspec.json.decode(msgspec.json.encode(array.asked))) == array
-    assert is_array(name)
-    assert is_array(array_templates()[name])
-    assert not is_array(default_template())
+    for source in (name, array_templates()[name]):
+        kind = compound_kind(source)
+        assert kind is not None
+        assert kind.name == "array"
+    assert compound_kind(default_template()) is None
 
 
 def test_a_grid_has_rows_from_the_top_and_columns_along_x() -> None:
@@ -180,9 +182,9 @@ def test_a_back_sheet_has_no_pockets_to_hold_by() -> None:
     assert refused.value.field == "sheet.hold_mm"
 
 
-def test_python_takes_changes_as_a_dict_and_names_the_function_for_arrays() -> None:
-    array = unitcad.load_array("forearm-pockets", {"layout.pitch_mm": 25.0})
+def test_python_takes_changes_as_a_dict_and_load_refuses_arrays() -> None:
+    array = load_array("forearm-pockets", {"layout.pitch_mm": 25.0})
     assert array.places[1].x - array.places[0].x == 25
     for source in ("forearm-pockets", {"array": "pockets"}):
-        with pytest.raises(unitcad.UnitcadError, match="load_array"):
+        with pytest.raises(unitcad.UnitcadError, match="an array of units"):
             unitcad.load(source)

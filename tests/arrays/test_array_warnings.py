@@ -10,6 +10,7 @@ import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_page import write_array_page
 from unitcad.arrays.circuit.circuit_files import has_circuit
 from unitcad.arrays.circuit.tracks import GAP_MM, TRACK_MM, crowded_tracks, width_needed
 from unitcad.arrays.patch_moulds import patch_moulds
@@ -18,7 +19,6 @@ from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build as build_array
-from unitcad.report.array_page import write_array_page
 from unitcad.validation import load
 
 

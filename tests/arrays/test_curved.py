@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_view import patch_model
 from unitcad.arrays.circuit.outline import circuit_body
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
@@ -25,7 +26,6 @@ from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.removal import CAST, Removal
-from unitcad.report.array_view import patch_model
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
 from unitcad.spec import printer_of
 

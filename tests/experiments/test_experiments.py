@@ -16,9 +16,9 @@ from scipy.stats import multivariate_normal, norm
 
 from unitcad.attenuation.edge.fitted_models import path_of
 from unitcad.attenuation.edge.level import nominal
-from unitcad.cli.experiments_command import experiments
 from unitcad.errors import Refusal
 from unitcad.experiments.draws import Draws
+from unitcad.experiments.experiments_command import experiments
 from unitcad.experiments.lab_file import Lab, lab_of_data, load_lab
 from unitcad.experiments.most_telling import _about_order, decision_between, most_telling
 from unitcad.experiments.protocol import Condition, Ratio, ratios

@@ -303,6 +303,6 @@ def test_a_row_without_a_folder_says_how_to_make_it(running: Any, tmp_path: Path
     assert note.inner_text() == ""
     visit.page.click(".variants tbody a")
     visit.page.wait_for_function("() => document.querySelector('.lacking').textContent")
-    assert f"unitcad cache export 0123456789ab --batch {word} && unitcad report {word}" in note.inner_text()
+    assert f"unitcad export 0123456789ab --batch {word} && unitcad report {word}" in note.inner_text()
     assert visit.errors == []
     visit.close()

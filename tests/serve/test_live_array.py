@@ -19,6 +19,7 @@ from running import Server, serving
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_view import patch_glb
 from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
 from unitcad.arrays.crosstalk_matrix import crosstalk
 from unitcad.arrays.patch import patch_parts
@@ -29,7 +30,6 @@ from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measured_files import charts_of
 from unitcad.lab.measuring import measure
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.plan import patch_glb
 from unitcad.serve.server import serve
 from unitcad.validation import templates
 

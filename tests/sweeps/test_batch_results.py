@@ -193,8 +193,8 @@ def test_the_bar_on_a_terminal_shows_rate_reused_failed(monkeypatch: pytest.Monk
     import io
     import sys
 
-    from unitcad.cli.batch_progress import watching
     from unitcad.sweeps import Summary
+    from unitcad.sweeps.batch_progress import watching
 
     class Terminal(io.StringIO):
         def isatty(self) -> bool:

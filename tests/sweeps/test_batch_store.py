@@ -14,12 +14,11 @@ from batching import bytes_of, calls, ring_sweep, rows
 from batching import unitcad as run_unitcad
 from object_store import BUCKET, Faulty, s3_server
 
-import unitcad
 from unitcad.cache import MissingContent, SharedStore, digest, shared_store
 from unitcad.cache.shared_store import TRIES
 from unitcad.errors import UnitcadError
 from unitcad.spec import custom_code
-from unitcad.sweeps import BatchOptions, Summary, load_sweep, record_packs, run
+from unitcad.sweeps import BatchOptions, Summary, batch, load_sweep, record_packs, run
 from unitcad.sweeps.batch_call import make
 from unitcad.sweeps.executors import SerialExecutor, Workers
 from unitcad.sweeps.sweep import from_file
@@ -273,7 +272,7 @@ def test_a_batch_whose_store_is_refused_leaves_nothing(tmp_path: Path) -> None:
 )
 def test_a_store_that_keeps_nothing_is_refused(store: str, jobs: int, more: Any, limit: str, tmp_path: Path) -> None:
     with pytest.raises(UnitcadError, match=limit):
-        unitcad.batch(ring_sweep(tmp_path), tmp_path / "out", only="unit", jobs=jobs, store=store, **more)
+        batch(ring_sweep(tmp_path), tmp_path / "out", only="unit", jobs=jobs, store=store, **more)
     assert not (tmp_path / "out").exists()
 
 
@@ -289,10 +288,10 @@ def test_a_cluster_without_a_store_makes_folders_and_no_wish_for_none_is_ignored
 def test_a_page_needs_no_folders(tmp_path: Path) -> None:
     """--report used to make them against --no-folders, and was refused for estimates alone, which have none."""
     sweep = ring_sweep(tmp_path, heights=[2.0, 3.0])
-    made = unitcad.batch(sweep, tmp_path / "stored", only="unit", jobs=0, report=True, folders=False)
+    made = batch(sweep, tmp_path / "stored", only="unit", jobs=0, report=True, folders=False)
     assert (made.folder / "report.html").is_file()
     assert not list(made.folder.glob("ring-*"))
-    made = unitcad.batch("thickness", tmp_path / "levels", only="estimate", limit=2, report=True)
+    made = batch("thickness", tmp_path / "levels", only="estimate", limit=2, report=True)
     assert (made.folder / "report.html").is_file()
     refused = run_unitcad("batch", "thickness", "--only", "estimate", "--folders", "-o", tmp_path / "none")
     assert (refused.returncode, refused.stderr) == (

@@ -4,34 +4,40 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from unitcad import notebook
 from unitcad.arguments import path, texts
-from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import load_array, with_formats
-from unitcad.arrays.array_names import is_array
 from unitcad.pipeline import Variant
 from unitcad.pipeline.plan import OUTPUTS
+from unitcad.pipeline.subjects import load_subject
 from unitcad.pipeline.write import PAGE, Built, held
 from unitcad.pipeline.write import build as build_whole
 from unitcad.spec import Spec
 from unitcad.spec.asked import Format
-from unitcad.validation import Changes, Source, load
+from unitcad.validation import Changes, Source
+
+
+class Buildable(Protocol):
+    """An object that a room loaded, such as an array of units."""
+
+    @property
+    def subject(self) -> str:
+        """The class by which the pipeline builds it, as "module:name"."""
+        ...
 
 
 @dataclass(frozen=True, repr=False)
 class BuildResult(Built):
-    """A built variant or array: its folder, its manifest and its spec.
+    """A built variant, or several units together: its folder, its manifest and the unit's spec.
 
-    `manifest` is manifest.json as data: parts, mould checks, mesh checks, what was left out; mm, mm2 and mm3. Of an
-    array `spec` is its unit's, and `array` the whole; of a single unit `array` is None.
+    `manifest` is manifest.json as data: parts, mould checks, mesh checks, what was left out; mm, mm2 and mm3.
     """
 
     spec: Spec
-    array: Array | None = None
 
     @property
     def volumes(self) -> dict[str, float]:
@@ -51,8 +57,7 @@ class BuildResult(Built):
             if not finding["ok"]
         ]
         checks = notebook.table(("mould check", "place", "value", "limit"), broken, "broken") if broken else ""
-        of = f"the unit of {self.array.name}" if self.array else self.spec.name
-        drawn = notebook.drawing(Variant(self.spec).section(), f"section of {of}")
+        drawn = notebook.drawing(Variant(self.spec).section(), f"section of {self.spec.name}")
         return drawn + bodies + checks + notebook.table((), self._counts)
 
     @property
@@ -68,7 +73,7 @@ class BuildResult(Built):
 
 
 def build(
-    source: Source | Array,
+    source: Source | Buildable,
     out: str | os.PathLike[str] = "out",
     *,
     set: Changes = (),
@@ -80,8 +85,8 @@ def build(
 ) -> BuildResult:
     """Build a unit and its moulds, or an array of units, into a folder below `out`, and return what was built.
 
-    `source` and `set` are as for `unitcad.load`, or as for `unitcad.load_array` where `source` is an array: its
-    template's name, its file, data with the key `array`, or an `Array`. `formats` ("stl", "3mf", "step", "svg", "png",
+    `source` and `set` are as for `unitcad.load`; `source` may also be the name, file or data of an array, or an array
+    that `unitcad.arrays.load_array` returned. `formats` ("stl", "3mf", "step", "svg", "png",
     "glb") and `only` ("unit", "moulds", "estimate", "casting") choose what is made. Without `check` mould checks and
     mesh checks are left out. `report` writes report.html, one offline page. `progress` is called with the name of each
     step.
@@ -89,25 +94,16 @@ def build(
     Raises Refusal or UnitcadError before anything is written.
     """
     into, say = Path(path("out", out)), progress or _silent
-    named = isinstance(source, str | os.PathLike | Mapping | Array)
-    array = load_array(source, set) if named and is_array(source) else None
-    if array:
-        if formats is not None:
-            array = with_formats(array, texts("formats", formats))
-        spec = array.unit
-        built = build_whole(array, into, only=texts("only", only), check=check, say=say)
-    else:
-        assert not isinstance(source, Array)
-        spec = load(source, set)
-        if formats is not None:
-            spec = load(spec, {"output.formats": texts("formats", formats)})
-        built = build_whole(spec, into, only=texts("only", only), check=check, say=say)
+    wanted = load_subject(source, set)
+    if formats is not None:
+        wanted = load_subject(wanted.of, {"output.formats": texts("formats", formats)})
+    built = build_whole(wanted.of, into, only=texts("only", only), check=check, say=say)
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
         from unitcad.report import write_report
 
         with held(built.folder):
             write_report(built.folder)
-    return BuildResult(built.folder, built.manifest, built.sha256, spec, array)
+    return BuildResult(built.folder, built.manifest, built.sha256, wanted.unit)
 
 
 def _silent(step: str) -> None:

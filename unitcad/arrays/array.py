@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 from unitcad.arrays.array_tables import Cast, CircuitTable, Construction
 from unitcad.spec import Spec
@@ -72,6 +72,8 @@ class Array:
     sheet: Sheet
     circuit: CircuitTable | None
     asked: dict[str, Any]
+    subject: ClassVar[str] = "unitcad.arrays.arrayed:Arrayed"
+    """The class by which the pipeline builds it."""
 
     @cached_property
     def units(self) -> tuple[Spec, ...]:

@@ -6,11 +6,13 @@ from typing import Any
 
 import msgspec
 
+from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.layouts import layouts
 
 
-def with_kinds(document: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of `AskedArray` whose layout is one of the kinds, each with its own keys."""
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of `AskedArray`; its layout is one of the kinds, each with its own keys."""
+    document = msgspec.json.schema(AskedArray)
     kinds = [kind.table for kind in layouts().values()]
     tables, definitions = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
     for table in definitions.values():

@@ -23,9 +23,9 @@ def __getattr__(name: str) -> Any:
     """Return `app`, the whole command line. Raises AttributeError for any other name."""
     if name != "app":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from unitcad.cli.command_line import COMMANDS, application
+    from unitcad.cli.command_line import application
 
-    globals()[name] = application(*COMMANDS)
+    globals()[name] = application()
     return globals()[name]
 
 

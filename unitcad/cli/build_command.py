@@ -28,13 +28,9 @@ from unitcad.cli.shared_options import (
 )
 
 if TYPE_CHECKING:
-    from unitcad.arrays.array import Array
+    from unitcad.pipeline.make import Subject
     from unitcad.pipeline.manifest import Manifest
     from unitcad.pipeline.write import Built
-    from unitcad.spec import Spec
-    from unitcad.validation import Changes
-
-    Made = Spec | Array
 
 
 def build(
@@ -103,12 +99,13 @@ def _built(
     outputs_asked = {"unit", "moulds"} if only is None else set(listed(only))
     if outputs_asked & {"unit", "moulds"} and (formats is None or "step" in listed(formats)):
         step_helper.start()  # first: it loads its modules while this process loads its own
-    from unitcad.arrays.array_names import confirm_known
     from unitcad.cli.output import print_json, progress
     from unitcad.heap import keep_freed_memory
     from unitcad.pipeline.slicing import check_slicing, slice_tools
-    from unitcad.pipeline.write import PAGE, build, held, subject
+    from unitcad.pipeline.subjects import load_subject
+    from unitcad.pipeline.write import PAGE, build, held
     from unitcad.report import write_report
+    from unitcad.validation import confirm_known
 
     keep_freed_memory()
     paged = only is None if page is None else page
@@ -117,17 +114,17 @@ def _built(
     # Every spec is validated before the first one is built.
     for spec in specs:
         confirm_known(spec)
-    wanted = [_loaded(spec, changes) for spec in specs]
+    wanted = [load_subject(spec, changes) for spec in specs]
     for spec in wanted if slicing else ():
-        check_slicing(subject(spec).unit, chosen)
+        check_slicing(spec.unit, chosen)
     results: list[Built] = []
     printing: list[str] = []
     for spec in wanted:
         with progress(spec.name) as say:
-            result = build(spec, out, only=chosen, check=not no_check, say=say)
+            result = build(spec.of, out, only=chosen, check=not no_check, say=say)
             if slicing:
                 say("slicing")
-                printing.append(slice_tools(subject(spec).unit, result.folder, result.manifest, say))
+                printing.append(slice_tools(spec.unit, result.folder, result.manifest, say))
             if paged or (result.folder / PAGE).is_file():
                 say("page")
                 with held(result.folder):
@@ -146,29 +143,12 @@ def _built(
     return all(result.ok for result in results)
 
 
-def _loaded(source: str, changes: Changes) -> Made:
-    """Load a spec or an array. What belongs to arrays alone takes long to import, and is for these only."""
-    from unitcad.arrays.array_names import is_array
-    from unitcad.validation import load
+def _summary(of: Subject, built: Built) -> Iterator[str]:
+    """Return the lines of a result."""
+    from unitcad.cli.build_summary import summary
+    from unitcad.pipeline.subjects import Compound
 
-    if not is_array(source):
-        return load(source, changes)
-    from unitcad.arrays.array_file import load_array
-
-    return load_array(source, changes)
-
-
-def _summary(of: Made, built: Built) -> Iterator[str]:
-    """Return the lines of a spec's or an array's result."""
-    from unitcad.spec import Spec
-
-    if isinstance(of, Spec):
-        from unitcad.cli.build_summary import summary
-
-        return summary(of, built)
-    from unitcad.cli.array_summary import array_summary
-
-    return array_summary(of, built)
+    return of.summary(built.folder, built.manifest) if isinstance(of, Compound) else summary(of.unit, built)
 
 
 def _print_faults(manifest: Manifest) -> None:

@@ -40,36 +40,6 @@ def gc(
     _print_usage(text, root, vars(gone), as_json)
 
 
-@cache.command("export")
-def export(
-    hashes: Annotated[
-        list[str],
-        typer.Argument(metavar="HASH...", help="The hash at the end of a variant's folder, or how it begins."),
-    ],
-    batch: Annotated[Path, typer.Option("--batch", help="The batch's folder.")] = Path(),
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Where the folders go; else to the batch.")] = None,
-    store: Annotated[str | None, typer.Option(metavar="ADDRESS", help="The store; else the batch's.")] = None,
-    where: Where = None,
-    as_json: AsJson = False,
-) -> None:
-    """Make the folders of some variants of a batch, from its store. Each is a line printed."""
-    from unitcad.cache import DiskStore, default_root
-    from unitcad.cli.output import print_json
-    from unitcad.sweeps.result_folders import export_variants
-
-    kept = DiskStore(where or default_root())
-    try:
-        made = []
-        for folder in export_variants(batch, hashes, out or batch, kept, store):
-            made.append(str(folder))
-            if not as_json:
-                typer.echo(made[-1])
-    finally:
-        kept.close()
-    if as_json:
-        print_json({"folders": made})
-
-
 def _print_usage(text: str, root: Path, data: dict, as_json: bool) -> None:
     from unitcad.cli.output import print_json
 

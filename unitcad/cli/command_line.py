@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.util import find_spec
 from typing import Annotated, Any, cast
 
 import typer
@@ -11,28 +9,8 @@ import typer
 from unitcad import __version__
 from unitcad.cli.output import Form, form_of, say_error
 from unitcad.errors import UnitcadError
+from unitcad.rooms import commands, load
 
-COMMANDS = {
-    "build": "build",
-    "batch": "batch",
-    "check": "check",
-    "design": "design",
-    "estimate": "estimate",
-    "experiments": "experiments",
-    "accuracy": "accuracy",
-    "coupon": "coupon",
-    "fit": "fit",
-    "init": "init",
-    "list": "list_",
-    "material": "material",
-    "measure": "measure",
-    "phantom": "phantom",
-    "report": "report",
-    "schema": "schema",
-    "serve": "serve",
-    "cache": "cache",
-}
-"""The commands in the order of --help, and what each is called in its module, in `cli` or in the command's own room."""
 WrongArguments = cast(type[typer.BadParameter], typer.BadParameter.__mro__[2])
 """Typer's error of the command line itself, such as an unknown option: ClickException, its own or click's."""
 
@@ -43,8 +21,8 @@ def _version(wanted: bool) -> None:
         raise typer.Exit()
 
 
-def application(*commands: str) -> typer.Typer:
-    """Return the command line with these commands alone: reading the arguments of one does not load the others."""
+def application(*names: str) -> typer.Typer:
+    """Return the command line with these commands, or with all: reading one does not load the others."""
     app = typer.Typer(
         name="unitcad",
         help="Haptic units, their casting moulds and an attenuation estimate, from a short TOML spec.",
@@ -54,9 +32,9 @@ def application(*commands: str) -> typer.Typer:
         rich_markup_mode=None,  # boxes cut long option names, and markup swallows square brackets
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    for name in commands:
-        place = "unitcad.cli" if find_spec(f"unitcad.cli.{name}_command") else f"unitcad.{name}"
-        command = getattr(import_module(f"{place}.{name}_command"), COMMANDS[name])
+    known = commands()
+    for name in names or known:
+        command = load(known[name])
         if isinstance(command, typer.Typer):
             app.add_typer(command, name=name)
         else:
@@ -76,8 +54,7 @@ def _root(
 def run(words: list[str]) -> int:
     """Run the command of the program's arguments; return its exit code. Says itself what is wrong with them."""
     try:
-        named = [word for word in words[:1] if word in COMMANDS]
-        return application(*(named or COMMANDS))(standalone_mode=False) or 0
+        return application(*(word for word in words[:1] if word in commands()))(standalone_mode=False) or 0
     except WrongArguments as error:
         _refuse(error, form_of(words))
         return error.exit_code

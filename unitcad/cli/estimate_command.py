@@ -49,10 +49,10 @@ def estimate(
     several arrays each is compared with the first.
     """
     postpone_tools()
-    from unitcad.arrays.array_names import confirm_known, is_array
     from unitcad.attenuation.edge.fitted_models import MODELS
     from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec, neighbours_of_specs
-    from unitcad.validation import load
+    from unitcad.rooms import load as load_named
+    from unitcad.validation import compound_kind, confirm_known, load
 
     if model not in ("", "all", *MODELS, MECHANICS):
         raise Refusal("--model", model, f"is none of {', '.join((*MODELS, MECHANICS, 'all'))}", MODELS[0])
@@ -62,14 +62,13 @@ def estimate(
     hertz = frequencies(frequency) if frequency else []
     for name in specs:
         confirm_known(name)
-    if any(is_array(name) for name in specs):
+    kinds = [kind for kind in map(compound_kind, specs) if kind]
+    if kinds:
         if pitch is not None:
             raise Refusal("--pitch", pitch, "an array has its own pitch: --set layout.pitch_mm=...")
         if model:
             raise Refusal("--model", model, "an array's crosstalk is a range over the models")
-        from unitcad.cli.estimate_arrays import estimate_arrays
-
-        return estimate_arrays(specs, with_fit(sets, fit), hertz, masses, details, as_json)
+        return load_named(kinds[0].subject).estimate(specs, with_fit(sets, fit), hertz, masses, details, as_json)
     if masses:
         raise Refusal("--masses", None, "is for arrays; units in a row, with their masses: --pitch")
     loaded = [load(name, with_fit(sets, fit)) for name in specs]

@@ -2,32 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from msgspec import to_builtins
 
+from unitcad import catalogue
+from unitcad.cli.output import print_json
 from unitcad.cli.shared_options import AsJson
-
-KINDS = (
-    "templates", "arrays", "designs", "materials", "motors", "printers", "experiments", "phantoms", "sweeps", "targets",
-    "rules",
-)  # fmt: skip
+from unitcad.designs import shipped as designs
+from unitcad.errors import unknown_name
+from unitcad.meshcheck.rules.registry import rules
+from unitcad.rooms import file_kinds
+from unitcad.validation.shipped_files import shipped_of
 
 
 def list_(
-    kind: Annotated[str, typer.Argument(help=f"{', '.join(KINDS)}; none: these.", metavar="[KIND]")] = "",
+    kind: Annotated[str, typer.Argument(help="Kind to list; default: list the kinds.", metavar="[KIND]")] = "",
     as_json: AsJson = False,
 ) -> None:
     """List what is shipped, each value with its source and status."""
-    from unitcad.cli.output import print_json
-    from unitcad.errors import unknown_name
-
+    kinds = _kinds()
     if not kind:
-        print_json({"kinds": KINDS}) if as_json else typer.echo("\n".join(KINDS))
+        print_json({"kinds": list(kinds)}) if as_json else typer.echo("\n".join(kinds))
         return
-    if kind not in KINDS:
-        raise unknown_name("list", kind, KINDS)
-    entries = _entries(kind)
+    if kind not in kinds:
+        raise unknown_name("list", kind, kinds)
+    entries = kinds[kind]()
     if as_json:
         print_json({kind: entries})
         return
@@ -42,50 +45,25 @@ def list_(
             typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}{how}")
 
 
-def _entries(kind: str) -> dict[str, Any]:
-    import msgspec
-
-    from unitcad import catalogue
-    from unitcad.designs import shipped
-    from unitcad.validation import custom_templates, templates
-
-    if kind == "templates":
-        return {
-            name: _first_comment(path.read_text("utf-8")) for name, path in (templates() | custom_templates()).items()
-        }
-    if kind == "arrays":
-        from unitcad.arrays.array_names import array_templates
-
-        return {name: _first_comment(path.read_text("utf-8")) for name, path in array_templates().items()}
-    if kind == "designs":
-        return {name: design.about for name, design in shipped().items()}
-    if kind == "experiments":
-        from unitcad.experiments.lab_file import shipped as labs
-
-        return {name: _first_comment(path.read_text("utf-8")) for name, path in labs().items()}
-    if kind == "phantoms":
-        from unitcad.lab.phantom.recipe import phantoms
-
-        return {name: _first_comment(path.read_text("utf-8")) for name, path in phantoms().items()}
-    if kind == "sweeps":
-        from unitcad.sweeps.sweep import shipped as sweeps
-
-        return {name: _first_comment(path.read_text("utf-8")) for name, path in sweeps().items()}
-    if kind == "targets":
-        from unitcad.search.target_file import shipped as targets
-
-        return {name: _first_comment(path.read_text("utf-8")) for name, path in targets().items()}
-    if kind == "rules":
-        from unitcad.meshcheck.rules.registry import rules
-
-        return {code: rule.title for code, rule in rules().items()}
-    entries = {"materials": catalogue.materials, "motors": catalogue.motors, "printers": catalogue.printers}[kind]()
+def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
+    """Return the kinds in the order of the list, each with the function that returns its entries by name."""
     return {
-        name: {key: value for key, value in msgspec.to_builtins(entry).items() if isinstance(value, dict)}
+        **{kind.plural: lambda kind=kind: _first_comments(shipped_of(kind)) for kind in file_kinds() if kind.plural},
+        "designs": lambda: {name: design.about for name, design in designs().items()},
+        "materials": lambda: _values(catalogue.materials()),
+        "motors": lambda: _values(catalogue.motors()),
+        "printers": lambda: _values(catalogue.printers()),
+        "rules": lambda: {code: rule.title for code, rule in rules().items()},
+    }
+
+
+def _values(entries: dict[str, Any]) -> dict[str, Any]:
+    return {
+        name: {key: value for key, value in to_builtins(entry).items() if isinstance(value, dict)}
         for name, entry in entries.items()
     }
 
 
-def _first_comment(text: str) -> str:
-    line = text.partition("\n")[0]
-    return line.lstrip("# ") if line.startswith("#") else ""
+def _first_comments(shipped: dict[str, Path]) -> dict[str, str]:
+    lines = {name: path.read_text("utf-8").partition("\n")[0] for name, path in shipped.items()}
+    return {name: line.lstrip("# ") if line.startswith("#") else "" for name, line in lines.items()}

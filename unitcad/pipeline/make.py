@@ -104,7 +104,7 @@ class Product:
 
 
 class Subject:
-    """A spec, as a result is made of it. `arrays.Arrayed` is the same for an array."""
+    """A spec, as a result is made of it; `subjects.Compound` is the same for what is built of several units."""
 
     kind, file = "spec", "spec.toml"
 
@@ -118,6 +118,11 @@ class Subject:
         """Return <slug>-<hash12>, at most 63 characters; the hash covers neither name nor formats."""
         slug = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-")[:50].rstrip("-") or "unit"
         return f"{slug}-{self.hash[:12]}"
+
+    @property
+    def moulds(self) -> MouldSet:
+        """Return the bodies and tools that are made of it."""
+        return MouldSet(self.of)
 
     @property
     def text(self) -> str:

@@ -135,15 +135,6 @@ class Manifest(TypedDict):
     files: dict[str, FileRecord]
 
 
-class ArrayManifest(Manifest):
-    """An array's manifest: `laws`, `check` and `parts` are those of its tools and sheet and of its units.
-
-    `array` has construction, layout, sheet, and the places with the folder of their unit's own result.
-    """
-
-    array: dict[str, Any]
-
-
 def failed_codes(manifest: Manifest) -> list[str]:
     """Return the codes of the mould checks and mesh rules that a variant fails, each once, the mould checks first."""
     moulds = {finding["code"] for finding in manifest["laws"] if not finding["ok"]}

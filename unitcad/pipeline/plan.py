@@ -13,7 +13,7 @@ from functools import cache, lru_cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -36,9 +36,6 @@ from unitcad.shape import Shape, content_hash
 from unitcad.shape.body import Body, copies, part_names
 from unitcad.spec import Spec
 from unitcad.spec.asked import Format
-
-if TYPE_CHECKING:
-    from unitcad.arrays.patch import PatchPart
 
 Output = Literal["unit", "moulds", "estimate", "casting"]
 OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
@@ -250,24 +247,11 @@ def threemf_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
 
 def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
     """Return the GLB of several bodies as assembled; what is cut or bought is in it too."""
-    return glb.content([_glb_part(moulds, body) for body in bodies])
+    return glb.content([glb_part(moulds, body) for body in bodies])
 
 
-def patch_glb(moulds: MouldSet, parts: Sequence[PatchPart]) -> bytes:
-    """Return the GLB of an array's whole patch: the mesh of each distinct body once, a node at each of its places."""
-    return glb.content(
-        [
-            replace(
-                _glb_part(moulds, part.body),
-                name=part.name,
-                places=[glb.Standing(f"{p.name}-{part.body.name}", p.x, p.y, p.angle_deg) for p in part.places],
-            )
-            for part in parts
-        ]
-    )
-
-
-def _glb_part(moulds: MouldSet, body: Body) -> glb.GlbPart:
+def glb_part(moulds: MouldSet, body: Body) -> glb.GlbPart:
+    """Return a body as a part of a GLB file."""
     extras = {"role": body.role, "made": body.made, "step": body.step}
     return glb.GlbPart(body.name, body.colour, *arrays(moulds.mesh(body)), extras)
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import shutil
 import stat
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,9 +21,9 @@ from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product, Progress, Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
 from unitcad.pipeline.plan import FORMATS, OUTPUTS, checked_outputs, code_version
-from unitcad.spec import Spec, from_json, read_toml
+from unitcad.pipeline.subjects import subject
+from unitcad.spec import read_toml
 from unitcad.spec.asked import Format
-from unitcad.validation import from_data
 
 LOCK = re.compile(r"\.[a-z0-9-]+-[0-9a-f]{12}\.lock")
 PAGE = "report.html"
@@ -35,33 +34,8 @@ ADDRESS = "store.json"
 """File of a batch that names its store, if that is not its own."""
 STORE = "store"
 """Folder of a batch's own store."""
-ARRAY = "array.toml"
 TRIES = 5
 """How often a result is made when content that it shares vanishes from the cache meanwhile."""
-
-
-def subject(of: Any) -> Subject:
-    """Return a spec or an array as the subject of a result."""
-    if isinstance(of, Spec):
-        return Subject(of)
-    from unitcad.pipeline.arrays import Arrayed  # what belongs to arrays alone takes long to import
-
-    return Arrayed(of)
-
-
-def subject_of_data(data: Mapping[str, Any]) -> Subject:
-    """Return the spec or the array of plain data. Raises Refusal."""
-    if "array" not in data:
-        return Subject(from_data(dict(data), Path()))
-    from unitcad.arrays.array_file import array_of
-
-    return subject(array_of(data))
-
-
-def subject_of_text(text: str) -> Subject:
-    """Return the subject of `Subject.text`."""
-    data = json.loads(text)
-    return subject_of_data(data) if "array" in data else Subject(from_json(text))
 
 
 @dataclass(frozen=True)
@@ -91,7 +65,7 @@ def build(
     say: Callable[[str], object] = lambda stage: None,
     store: Store | None = None,
 ) -> Built:
-    """Build a spec or an array into `out`/<slug>-<hash12>.
+    """Build a spec, or the loaded object of a room, into `out`/<slug>-<hash12>.
 
     `only` is a choice of OUTPUTS; without `check` mould checks and mesh checks are left out. Formats and outputs that
     the folder has from before are made again. `say` gets the name of each stage.

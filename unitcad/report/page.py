@@ -20,6 +20,7 @@ from unitcad.report.html_page import asset, html_page
 from unitcad.report.pool import Pool
 from unitcad.report.records import VariantRecord
 from unitcad.report.viewer_models import Modelled, model
+from unitcad.rooms import load
 from unitcad.spec import Spec
 
 VENDORED = ("three.min.js", "uplot.min.js")
@@ -42,14 +43,12 @@ def write_report(
     `warn` gets lines that say which results are damaged, and why; `modelled` gives the models of a unit's geometry.
     Raises UnitcadError where the folder holds none.
     """
-    if read_results.is_array_folder(folder):
-        from unitcad.report.array_page import write_array_page
-
+    if kind := read_results.compound_in(folder):
         for unit in sorted((folder / "units").glob("*")):
             if unit.is_dir() and not unit.is_symlink() and read_results.is_variant(unit):
                 write_report(unit, warn)
         _write_bench(folder, warn)
-        return write_array_page(folder, warn)
+        return load(kind.subject).write_page(folder, warn)
     if folder.is_dir() and read_results.is_variant(folder):
         _write_bench(folder, warn)
     data, title, damage = page_data(folder, modelled)

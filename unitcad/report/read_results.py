@@ -20,10 +20,11 @@ from unitcad.casting.cast_record import ENDING, read_cast_record
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import TEMPORARY
 from unitcad.pipeline.manifest import Manifest
-from unitcad.pipeline.write import ADDRESS, ARRAY, PAGE, STORE
+from unitcad.pipeline.write import ADDRESS, PAGE, STORE
 from unitcad.report.records import ResultsTable, VariantRecord, expect
 from unitcad.report.step_pictures import step_pictures
 from unitcad.report.viewer_models import model_key, spec_in
+from unitcad.rooms import FileKind, file_kinds
 from unitcad.spec import Spec, to_data
 
 MANIFEST = "manifest.json"
@@ -49,9 +50,11 @@ def is_variant(folder: Path) -> bool:
     return os.path.lexists(folder / MANIFEST)
 
 
-def is_array_folder(folder: Path) -> bool:
-    """Tell whether a folder is the result of an array."""
-    return (folder / ARRAY).is_file() and not (folder / ARRAY).is_symlink()
+def compound_in(folder: Path) -> FileKind | None:
+    """Return the kind of compound, such as an array, that a folder is the result of; None for a unit's."""
+    kinds = [kind for kind in file_kinds() if kind.subject]
+    named = {kind: folder / f"{kind.name}.toml" for kind in kinds}
+    return next((kind for kind, path in named.items() if path.is_file() and not path.is_symlink()), None)
 
 
 def variant_folders(folder: Path) -> list[Path]:

@@ -7,17 +7,19 @@ and code is run, only where the spec that the server was started with names the 
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import msgspec
 
-from unitcad.arrays.array_names import is_array
 from unitcad.errors import NEAREST, UNIT_ALONE, Refusal, UnitcadError, UnknownKey
-from unitcad.serve import array_answers, unit_answers
+from unitcad.serve import unit_answers
 from unitcad.serve.edits import edited
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted
 from unitcad.serve.remedies import remedied
 from unitcad.spec import parse_toml
+from unitcad.validation import compound_kind
 
 
 def respond(message: bytes, trusted: bytes) -> bytes:
@@ -48,7 +50,7 @@ def _answered(ask: Ask, trusted: Trusted) -> Answer:
     except UnitcadError as error:
         return Answer(text=text, faults=[Fault(str(error), line=_line_of(str(error)))])
     answer = Answer(text=text, layers=len(data["layers"]) if isinstance(data.get("layers"), list) else 0)
-    kind = array_answers if is_array(data) else unit_answers
+    kind = answers_about(data)
     subject: Any = None
     whole: dict[str, Any] | None = None
     try:
@@ -70,6 +72,12 @@ def _answered(ask: Ask, trusted: Trusted) -> Answer:
     return answer
 
 
+def answers_about(data: Mapping[str, Any]) -> Any:
+    """Return the module that answers about plain data: the unit's, or that of the room whose file it is."""
+    kind = compound_kind(data)
+    return import_module(kind.page) if kind else unit_answers
+
+
 def effective(text: bytes, trusted: bytes) -> bytes:
     """Return {"text": the effective spec as TOML, "asked", "code"} of a text, or {"refused": why}.
 
@@ -78,7 +86,7 @@ def effective(text: bytes, trusted: bytes) -> bytes:
     """
     try:
         data = parse_toml(text.decode(), "the text")
-        kind = array_answers if is_array(data) else unit_answers
+        kind = answers_about(data)
         known = msgspec.json.decode(trusted, type=Trusted)
         subject: Any = kind.settled(data, known)
         asked, code = kind.asked_toml(text.decode(), data, subject, known), kind.holds_code(subject)

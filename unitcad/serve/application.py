@@ -8,6 +8,7 @@ import hashlib
 import os
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import IO, Any, TypeVar
 
@@ -20,7 +21,6 @@ from starlette.routing import Route
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.report.page import page_data
-from unitcad.serve.campaign_page import refused
 from unitcad.serve.gate import Gate, Limits
 from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
 from unitcad.serve.keys import Keys
@@ -50,7 +50,7 @@ class Setting:
     """What a server works on: the first text and its file's name, where files go, what texts may name and start from.
 
     `folder`: where specs are saved; `out`: where results go, whose files are served. `batch`: a folder of variants that
-    the page lists. `campaign`: a file of recordings, whose page is shown instead.
+    the page lists. `campaign`: a file that a room shows as a page of its own, and the module of that page.
     """
 
     text: str
@@ -63,7 +63,7 @@ class Setting:
     hosts: frozenset[str]
     port: int
     batch: Path | None = None
-    campaign: Path | None = None
+    campaign: tuple[Path, str] | None = None
 
 
 def application(live: Live, limits: Limits = Limits()) -> Gate:  # noqa: B008  # frozen
@@ -116,7 +116,7 @@ class Live:
             # Its page has no script that takes the token out of the address.
             return self._keeping(RedirectResponse("/", 303))
         if setting.campaign:
-            return await self._campaign(setting.campaign)
+            return await self._campaign(*setting.campaign)
         batch = None
         if setting.batch:
             try:
@@ -135,20 +135,20 @@ class Live:
         response.set_cookie(self.cookie, self.keys.cookie, httponly=True, samesite="strict")
         return response
 
-    async def _campaign(self, path: Path) -> Response:
+    async def _campaign(self, path: Path, module: str) -> Response:
         """Answer with the page of a campaign, measured anew; a change of its file is seen by loading it again."""
         status = 422
         async with self.questions.turns["estimate"]:
             try:
                 content = await self.questions.call(
-                    "estimate", "unitcad.serve.campaign_page:measured", str(path).encode(), seconds=CAMPAIGN_S
+                    "estimate", f"{module}:measured", str(path).encode(), seconds=CAMPAIGN_S
                 )
                 given = msgspec.json.decode(content)
             except (WorkerEnded, NoWorker) as error:
                 given, status = {"refused": str(error)}, 500
         if "page" in given:
             return self._html(given["page"])
-        return self._html(refused(path, given["refused"]), status)
+        return self._html(import_module(module).refused(path, given["refused"]), status)
 
     async def ask(self, request: Request) -> Response:
         """Answer a question about a text by the worker for it."""

@@ -6,25 +6,24 @@ import asyncio
 import contextlib
 import secrets
 import socket
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from unitcad.arrays.array_names import array_templates, is_array
-from unitcad.arrays.array_units import expanded
 from unitcad.errors import Refusal, UnitcadError, WrongArgument, missing_extra
 from unitcad.files import read_text
-from unitcad.pipeline.write import ARRAY, clear_leftovers
+from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
-from unitcad.report.read_results import is_array_folder, is_variant
+from unitcad.report.read_results import compound_in, is_variant
+from unitcad.rooms import FileKind, file_kinds
 from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown
-from unitcad.serve.array_answers import array_files
+from unitcad.serve.answers import answers_about
 from unitcad.serve.jobs import RESULTS
 from unitcad.serve.messages import Source, Trusted
 from unitcad.spec import parse_toml, read_toml
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
 from unitcad.text import listed
-from unitcad.validation import custom_templates, default_template, templates
+from unitcad.validation import compound_kind, custom_templates, default_template, every_template
 from unitcad.validation.shipped_files import is_path, named_file
 
 DEFAULT_OUT = Path("out")
@@ -59,14 +58,14 @@ def serve(
     for folder in (out, *out.glob(f"sweep-*/{RESULTS}")):
         with contextlib.suppress(OSError):  # it is not there, or not to be changed
             clear_leftovers(folder)
-    known = templates() | custom_templates() | array_templates()
-    path = named_file(source or default_template(), known, "spec", WrongArgument)
+    path = named_file(source or default_template(), every_template(), "spec", WrongArgument)
     text = read_text(path)
     data = parse_toml(text, str(path))  # a file that is no TOML is refused at once
     folder = path.parent.resolve() if is_own(source) else Path.cwd()
-    campaign = path.resolve() if {"sensor", "unit"} <= set(data) else None
+    kind = _page_kind(data)
+    campaign = (path.resolve(), kind.page) if kind else None
     trusted = [_trusted(data, path, code)]
-    plain = templates() | array_templates()
+    plain = {name: each for name, each in every_template().items() if name not in custom_templates()}
     starts: dict[str, str | None] = {name: read_text(each) for name, each in plain.items()}
     for name, each in custom_templates().items():
         try:
@@ -111,11 +110,12 @@ async def _told(
 
 def _source(source: str | None) -> tuple[str | None, Path | None]:
     """Return the first spec and the folder of a batch. Raises UnitcadError for a folder that holds no result."""
-    if source is None or source in templates() | array_templates() or not Path(source).is_dir():
+    if source is None or source in every_template() or not Path(source).is_dir():
         return source, None
     folder = Path(source)
     if is_variant(folder):
-        return str(folder / (ARRAY if is_array_folder(folder) else "spec.toml")), None
+        kind = compound_in(folder)
+        return str(folder / f"{kind.name if kind else 'spec'}.toml"), None
     try:
         page_data(folder, modelled=None)
     except UnitcadError as error:
@@ -134,7 +134,13 @@ def _is_spec(path: Path) -> bool:
         data = read_toml(path)
     except UnitcadError:
         return False
-    return is_array(data) or {"sensor", "unit"} <= set(data) or {"name", "layers"} <= set(data)
+    return bool(compound_kind(data) or _page_kind(data)) or {"name", "layers"} <= set(data)
+
+
+def _page_kind(data: Mapping[str, Any]) -> FileKind | None:
+    """Return the kind of a file that a room shows as a page of its own, such as a campaign."""
+    kinds = [kind for kind in file_kinds() if kind.page and not kind.subject]
+    return next((kind for kind in kinds if all(key in data for key in kind.keys)), None)
 
 
 def is_own(source: str | None) -> bool:
@@ -167,24 +173,10 @@ def _listening(host: str, port: int) -> socket.socket:
 
 def _trusted(data: Mapping[str, Any], path: Path, code: bool) -> Source:
     """Return a spec's files, which a page's texts may name. Raises Refusal for a design that is code, unless `code`."""
-    named = array_files(data) if is_array(data) else files_named(data)
-    for field, unit in _units(data, path.parent):
+    answers = answers_about(data)
+    named = answers.named_files(data)
+    for field, unit in answers.units(data, path.parent):
         design = files_named(unit).get("design")
         if design and is_custom(design) and not is_body_file(design) and not code:
             raise Refusal(field, design, "is code; it runs in the live page with --allow-code alone: read it first")
     return Source(str(path.parent.resolve()), named)
-
-
-def _units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the plain data of each unit, with the field of its design. Raises Refusal for a unit that is not found."""
-    if not is_array(data):
-        yield "design", data
-        return
-    whole = expanded(data, folder)
-    units = {"unit": whole.get("unit")} | {f"place.{i}.unit": one.get("unit") for i, one in enumerate(_places(whole))}
-    yield from ((f"{field}.design", unit) for field, unit in units.items() if isinstance(unit, dict))
-
-
-def _places(data: Mapping[str, Any]) -> list[dict[str, Any]]:
-    places = data.get("place")
-    return [place if isinstance(place, dict) else {} for place in places] if isinstance(places, list) else []

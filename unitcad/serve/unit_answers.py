@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,6 +57,16 @@ def asked_toml(text: str, data: Mapping[str, Any], spec: Spec, trusted: Trusted)
     import tomlkit
 
     return tomlkit.dumps(with_files(data, trusted)) if files_named(data) else text
+
+
+def named_files(data: Mapping[str, Any]) -> dict[str, str]:
+    """Return the values of a spec's plain data that name files, by their fields."""
+    return files_named(data)
+
+
+def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the unit's plain data, with the field of its design."""
+    yield "design", data
 
 
 def holds_code(spec: Spec) -> bool:

@@ -1,4 +1,4 @@
-"""`unitcad.batch` as a function, and what it returns."""
+"""`batch` as a function, and its result."""
 
 # pyright: strict
 from __future__ import annotations
@@ -84,7 +84,7 @@ def make(
     if options.folders is False and workers.scheduler is not None and options.store is None and not options.shard:
         why = "results of a cluster go to folders here, or with --store to a store: name one, or leave it out"
         raise WrongArgument("folders", False, why)
-    if options.folders and options.only == ("estimate",) and not sweep.of_arrays:
+    if options.folders and options.only == ("estimate",) and not sweep.of_compounds:
         raise WrongArgument("folders", True, "estimates alone are one table: leave it out")
     if options.shard:
         if options.only == ("estimate",):
@@ -93,7 +93,7 @@ def make(
         variants = counted(sweep, options.limit)
         store = store_of(folder, options.shard, whole.batch, variants, options.store)
         folder, options = folder / options.shard.folder, replace(options, store=store)
-    if options.only == ("estimate",) and not sweep.of_arrays:
+    if options.only == ("estimate",) and not sweep.of_compounds:
         return write_estimates(sweep, folder, options)
     with workers.executor(options.timeout) as (executor, number):
         remote = workers.scheduler is not None
@@ -123,7 +123,7 @@ def batch(
 ) -> BatchResult:
     """Make every variant of a sweep in the folder `out` (out/<name> by default), each distinct part once.
 
-    `sweep` is a file, the name of a shipped sweep, or a `unitcad.batch.Sweep`. `set` changes values of every variant,
+    `sweep` is a file, the name of a shipped sweep, or a `unitcad.sweeps.Sweep`. `set` changes values of every variant,
     `formats` and `only` choose what is made, as for `unitcad.build`. `jobs` is the number of worker processes, one a
     core by default, with 0 this process. `limit` makes the first variants only; `timeout` is in seconds a variant.
     `store` is a folder or an address (s3://bucket/path) that workers put content into; `folders` says whether each

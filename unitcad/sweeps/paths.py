@@ -7,11 +7,12 @@ import typing
 from collections.abc import Iterator
 from typing import Any
 
-from unitcad.arrays.array_tables import AskedArray
 from unitcad.errors import Refusal
+from unitcad.rooms import load
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
 from unitcad.text import listed
+from unitcad.validation import compound_kind
 
 
 def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
@@ -56,7 +57,8 @@ def known_paths(base: dict[str, Any]) -> list[str]:
 
 
 def _kind(base: dict[str, Any]) -> Any:
-    return AskedArray if "array" in base else AskedSpec
+    kind = compound_kind(base)
+    return load(kind.model) if kind else AskedSpec
 
 
 def _walk(kind: Any, prefix: str, node: Any) -> Iterator[str]:

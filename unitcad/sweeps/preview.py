@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import zlib
 
-from unitcad.arrays.array import Array
-from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.cache import MemoryStore
 from unitcad.errors import UnitcadError
-from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.make import Progress
+from unitcad.pipeline.make import Progress, Subject
 from unitcad.pipeline.plan import body_key, checked_outputs, groups
-from unitcad.pipeline.write import subject
-from unitcad.spec import Spec
+from unitcad.pipeline.subjects import subject
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import Preview, RefusedVariant
 from unitcad.sweeps.result_folders import folders_wanted
@@ -42,17 +38,17 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     indices = options.shard.indices(whole) if options.shard else range(whole)
     count = len(indices)
     looked = min(count, LOOKED_AT)
-    geometries: dict[str, Spec | Array] = {}
+    geometries: dict[str, Subject] = {}
     refused: list[RefusedVariant] = []
     accepted = 0
     for index in indices[:looked]:
         try:
-            spec = sweep.spec(index)
+            variant = subject(sweep.spec(index))
         except UnitcadError as error:
             refused.append(RefusedVariant(index, sweep.faults(index, error)))
             continue
         accepted += 1
-        geometries.setdefault(subject(spec).key(only, options.check), spec)
+        geometries.setdefault(variant.key(only, options.check), variant)
     if refused and not accepted:
         raise UnitcadError(f"every variant is refused, the first: {refused[0].reason}")
     share = count / max(looked, 1)
@@ -61,10 +57,10 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     drawn = spread[:: max(1, len(spread) // DRAWN)][:DRAWN]
     per_drawn = _distinct_parts(drawn, only)
     number, variants = len(geometries) * share, accepted * share
-    if only == ("estimate",) and not sweep.of_arrays:
+    if only == ("estimate",) and not sweep.of_compounds:
         files, stored, linked = 0.0, 0.0, 0.0
     else:
-        weighed = [_weight(spec, only) for spec in drawn[:: max(1, len(drawn) // BUILT)][:BUILT]]
+        weighed = [_weight(variant, only) for variant in drawn[:: max(1, len(drawn) // BUILT)][:BUILT]]
         shared, own, packed, contents, each = (sum(w[i] for w in weighed) / max(1, len(weighed)) for i in range(5))
         linked = (shared + own) * variants
         if folders_wanted(options, count):
@@ -86,20 +82,20 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     )
 
 
-def _distinct_parts(specs: list[Spec | Array], only: tuple[str, ...]) -> int:
-    """Count the different bodies of these specs."""
+def _distinct_parts(variants: list[Subject], only: tuple[str, ...]) -> int:
+    """Count the different bodies of these variants."""
     keys = set()
-    for spec in specs:
-        moulds = patch_moulds(spec) if isinstance(spec, Array) else MouldSet(spec)
-        for group in groups(moulds, subject(spec).outputs(only)):
+    for variant in variants:
+        moulds = variant.moulds
+        for group in groups(moulds, variant.outputs(only)):
             keys |= {body_key(moulds, body, "record") for body in group.bodies}
     return len(keys)
 
 
-def _weight(spec: Spec | Array, only: tuple[str, ...]) -> tuple[int, int, int, int, int]:
+def _weight(variant: Subject, only: tuple[str, ...]) -> tuple[int, int, int, int, int]:
     """Return (bytes shared, its own, its own deflated, contents, files) of a variant made in memory, without checks."""
     store = MemoryStore()
-    product = subject(spec).make(only, False, store, Progress())
+    product = variant.make(only, False, store, Progress())
     shared = {sha: len(store.content(sha)) for sha in product.shared.values()}
     own = sum(map(len, product.own.values()))
     packed = len(zlib.compress(b"".join(product.own.values())))

@@ -22,7 +22,8 @@ from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.plan import code_version
-from unitcad.pipeline.write import replacing, subject_of_data, sync
+from unitcad.pipeline.subjects import subject_of_data
+from unitcad.pipeline.write import replacing, sync
 from unitcad.sweeps.batch_records import RecordPlace
 from unitcad.validation import default_template, read
 

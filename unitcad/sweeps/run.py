@@ -18,7 +18,8 @@ from unitcad import __version__
 from unitcad.cache import DiskStore, absolute, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.pipeline.plan import checked_outputs, code_version, kernel_versions
-from unitcad.pipeline.write import clear_leftovers, subject
+from unitcad.pipeline.subjects import subject
+from unitcad.pipeline.write import clear_leftovers
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import BatchHead, Failure, JournalEntry, Summary

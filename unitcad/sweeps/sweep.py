@@ -23,18 +23,15 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from msgspec import Meta, Struct, field, structs
 
-from unitcad.arrays.array_file import makeable_array
-from unitcad.arrays.array_names import array_templates, confirm_known, is_array
-from unitcad.arrays.array_units import expanded
-from unitcad.arrays.offers import offered
 from unitcad.cache import digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import names_device, read_text
-from unitcad.pipeline.write import subject_of_data
+from unitcad.pipeline.subjects import subject_of_data
+from unitcad.rooms import load
 from unitcad.spec import check_plain, convert, read_toml
 from unitcad.spec.fields import fields_of
 from unitcad.sweeps.paths import check_path
-from unitcad.validation import override, put, read
+from unitcad.validation import compound_kind, confirm_known, every_template, override, put, read
 from unitcad.validation.load import all_faults
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files
 
@@ -181,8 +178,9 @@ class Sweep:
 
     def faults(self, index: int, first: UnitcadError) -> str:
         """Return what is wrong with a refused variant in one line, `first` being what it was refused for."""
-        if isinstance(first, Refusal) and self.of_arrays:
-            told = offered(first, self._data(index), makeable_array) if index < EXPLAINED else _unoffered(first)
+        kind = compound_kind(self._data(index))
+        if isinstance(first, Refusal) and kind:
+            told = load(kind.subject).offered(first, self._data(index)) if index < EXPLAINED else _unoffered(first)
             return str(told)
         if index >= EXPLAINED or not isinstance(first, Refusal):
             return str(first)
@@ -196,9 +194,9 @@ class Sweep:
         return "; and ".join(fault.located for fault in every)
 
     @property
-    def of_arrays(self) -> bool:
-        """Whether any base is an array."""
-        return any("array" in data for _, data in self.bases)
+    def of_compounds(self) -> bool:
+        """Whether any base is built of several units, such as an array."""
+        return any(compound_kind(data) for _, data in self.bases)
 
     def _data(self, index: int) -> dict[str, Any]:
         base, values = self.values(index)
@@ -220,7 +218,7 @@ class Sweep:
 
 
 def _unoffered(refusal: Refusal) -> Refusal:
-    """Return an array's refusal without its value to offer, which nobody tried."""
+    """Return a refusal without its value to offer, which nobody tried."""
     return Refusal(refusal.field, refusal.value, refusal.limit)
 
 
@@ -275,11 +273,8 @@ def _parted(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[st
 def _read_base(base: str, folder: Path) -> dict[str, Any]:
     place = folder / base if is_path(base) else base
     confirm_known(base, "base", Refusal)
-    if is_array(place):
-        path = array_templates().get(base) or Path(place)
-        data = expanded(read_toml(path), path.parent)
-    else:
-        data = read(place)
+    kind = compound_kind(place)
+    data = load(kind.subject).read(every_template().get(base) or Path(place)) if kind else read(place)
     check_plain(data)
     return data
 

@@ -17,10 +17,11 @@ from unitcad import files
 from unitcad.cache import Bundle, DiskStore, MemoryStore, MissingContent, SharedStore, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import write as folders
-from unitcad.pipeline.make import Product, Progress
+from unitcad.pipeline.make import Product, Progress, Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes, row
 from unitcad.pipeline.plan import code_version
-from unitcad.pipeline.write import TRIES, Subject, subject_of_text
+from unitcad.pipeline.subjects import subject_of_text
+from unitcad.pipeline.write import TRIES
 from unitcad.spec import custom_code
 from unitcad.sweeps import record_packs
 from unitcad.sweeps.batch_records import RecordPlace, Values

@@ -56,7 +56,7 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
     A key is changed alone, from several variants, through several of its values, since a rule by name would have to
     know every model. A key that can't be changed alone, or whose levels are not known, is taken for read.
     """
-    if sweep.of_arrays:
+    if sweep.of_compounds:
         return None
     starts = [(index, spec) for index in _spread(count, _STARTS) if (spec := _spec(sweep, index))]
     if not starts:

@@ -3,8 +3,11 @@
 from unitcad.validation.advice import warnings
 from unitcad.validation.dotted import put
 from unitcad.validation.load import (
+    compound_kind,
+    confirm_known,
     custom_templates,
     default_template,
+    every_template,
     from_data,
     from_tables,
     load,
@@ -17,8 +20,11 @@ from unitcad.validation.tables import Changes, Source
 __all__ = [
     "Changes",
     "Source",
+    "compound_kind",
+    "confirm_known",
     "custom_templates",
     "default_template",
+    "every_template",
     "from_data",
     "from_tables",
     "load",

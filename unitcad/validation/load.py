@@ -12,13 +12,14 @@ from typing import Any
 from unitcad.designs import default_design
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
 from unitcad.files import read_text
+from unitcad.rooms import FileKind, file_kinds
 from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
 from unitcad.validation.defaults import effective
 from unitcad.validation.dotted import ABSENT, at, put
 from unitcad.validation.faults import every_fault, line_of, settled
-from unitcad.validation.shipped_files import is_path, named_file, shipped_files
+from unitcad.validation.shipped_files import is_path, named_file, shipped_files, shipped_of
 from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
 
 
@@ -30,6 +31,38 @@ def templates() -> dict[str, Path]:
 def custom_templates() -> dict[str, Path]:
     """Return the shipped specs of custom designs by name, such as custom/strap-lugs."""
     return {f"custom/{name}": file for name, file in shipped_files("custom").items()}
+
+
+def every_template() -> dict[str, Path]:
+    """Return the shipped files of everything that can be built, by name; a unit's name wins."""
+    compounds = {name: path for kind in _compounds() for name, path in shipped_of(kind).items()}
+    return compounds | custom_templates() | templates()
+
+
+def _compounds() -> list[FileKind]:
+    return [kind for kind in file_kinds() if kind.subject]
+
+
+def compound_kind(source: object) -> FileKind | None:
+    """Return the kind of compound that a name, a file or plain data means; None for a unit or an unreadable file."""
+    if isinstance(source, Mapping):
+        return next((kind for kind in _compounds() if all(key in source for key in kind.keys)), None)
+    if not isinstance(source, str | os.PathLike):
+        return None
+    text = os.fspath(source)
+    if text in templates():
+        return None
+    if not is_path(text):
+        return next((kind for kind in _compounds() if text in shipped_of(kind)), None)
+    try:
+        return compound_kind(read_toml(Path(text)))
+    except (UnitcadError, OSError):
+        return None
+
+
+def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArgument) -> None:
+    """Raise `kind`, of that field, for a name of no template and no file's path."""
+    named_file(name, every_template(), field, kind)
 
 
 def default_template() -> str:
@@ -48,9 +81,9 @@ def load(source: Source, set: Changes = ()) -> Spec:
     field, for an invalid value; the refusal's `others` are the spec's further faults, each with `file` and `line`.
     """
     changes = list(changes_of(set))
+    if kind := compound_kind(source):
+        raise _is_compound(kind, source)
     if isinstance(source, str | os.PathLike):
-        if os.fspath(source) in shipped_files("arrays"):
-            raise _is_array(source)
         data = read(source)
     elif isinstance(source, Mapping):
         data = plain(source)
@@ -62,8 +95,6 @@ def load(source: Source, set: Changes = ()) -> Spec:
         if not changes:
             return spec
         data = asked_of(spec, from_data)
-    if "array" in data:
-        raise _is_array(source)
     data = changed(data, changes)
     try:
         return from_data(data, Path())
@@ -83,10 +114,10 @@ def changed(data: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]) -
     return result
 
 
-def _is_array(source: object) -> UnitcadError:
-    """Return the error for an array where a single unit's spec is asked for."""
+def _is_compound(kind: FileKind, source: object) -> UnitcadError:
+    """Return the error for a compound in place of a single unit's spec."""
     named = f"{os.fspath(source)} is" if isinstance(source, str | os.PathLike) else "this is"
-    return UnitcadError(f"{named} an array of units: unitcad.load_array reads it, and unitcad.build makes it")
+    return UnitcadError(f"{named} an {kind.name} of units, not the spec of one: unitcad.build makes it")
 
 
 def from_tables(keys: Mapping[str, object]) -> Spec:

@@ -8,6 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from unitcad.errors import Refusal, unknown_name
+from unitcad.rooms import FileKind, load
 
 
 def shipped_files(kind: str = "") -> dict[str, Path]:
@@ -15,6 +16,11 @@ def shipped_files(kind: str = "") -> dict[str, Path]:
     package = Path(str(files("unitcad")))
     folder = next((f for f in (package / "templates", package.parent / "templates") if f.is_dir()), package)
     return {file.stem: file for file in sorted((folder / kind).glob("*.toml"))}
+
+
+def shipped_of(kind: FileKind) -> dict[str, Path]:
+    """Return the shipped files of a kind by name."""
+    return load(kind.shipped)() if kind.shipped else shipped_files(kind.plural)
 
 
 def is_path(text: str) -> bool:

@@ -10,26 +10,14 @@ from typing import Any
 from msgspec import NODEFAULT, Struct
 from msgspec.structs import FieldInfo
 
-from unitcad.errors import UnitcadError
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import entry_in, fields_of, meaning, table_in
 from unitcad.spec.toml import read_toml
-from unitcad.validation.load import default_template, templates
 
-SCHEMA = "unitcad.schema.json"
-"""The file beside the spec that its first line names: taplo, and with it most editors, read `#:schema`."""
 _NOT_OFFERED = ("design_source", "fit_source")
-
-
-def starter(name: str, template: str | None = None) -> str:
-    """Return the text of a spec file named `name`, from `default_template()` where none is given.
-
-    Raises UnitcadError for an unknown template.
-    """
-    known, template = templates(), template or default_template()
-    if template not in known:
-        raise UnitcadError(f"--template {template}: not known; one of {', '.join(known)}")
-    return commented(known[template], name, AskedSpec, SCHEMA)
+_ABOUT_TABLES = (
+    "# The tables below show the defaults; ... stands for a value from the catalogue.",
+    "# To change a value, remove the # from its line and from its table's header.",
+)
 
 
 def commented(template: Path, name: str, model: type[Struct], schema: str) -> str:
@@ -42,7 +30,8 @@ def commented(template: Path, name: str, model: type[Struct], schema: str) -> st
     text = re.sub(r"^name = .*$", named, template.read_text("utf-8"), count=1, flags=re.MULTILINE)
     sections = re.split(r"\n(?=\[)", text)
     tables = [section.rstrip() + "\n" + _further_keys(section, there, model) for section in sections]
-    return "\n".join([f"#:schema ./{schema}", *tables, _further_tables(there, model)])
+    told = {*there, *re.findall(r"^# \[+(\w+)", text, re.MULTILINE)}
+    return "\n".join([f"#:schema ./{schema}", *tables, _further_tables(told, model)])
 
 
 def _further_keys(section: str, there: dict[str, Any], model: type[Struct]) -> str:
@@ -50,22 +39,24 @@ def _further_keys(section: str, there: dict[str, Any], model: type[Struct]) -> s
     header = re.match(r"\[(\w+)\]", section)
     field = fields_of(model).get(header[1]) if header else None
     table = table_in(field.type) if field else None
-    return "".join(f"{line}\n" for line in _keys(table, set(there[field.name]))) if field and table else ""
+    if not field or not table:
+        return ""
+    told = {*there[field.name], *re.findall(r"^# (\w+) =", section, re.MULTILINE)}
+    return "".join(f"{line}\n" for line in _keys(table, told))
 
 
-def _further_tables(there: dict[str, Any], model: type[Struct]) -> str:
-    lines = [
-        "# The tables below show the defaults; ... stands for a value from the catalogue.",
-        "# To change a value, remove the # from its line and from its table's header.",
-    ]
+def _further_tables(told: set[str], model: type[Struct]) -> str:
+    lines: list[str] = []
     for name, field in fields_of(model).items():
-        if name in there or name in _NOT_OFFERED:
+        if name in told or name in _NOT_OFFERED:
             continue
         table = table_in(field.type) or table_in(entry_in(field.type))
         about = f"  # {(table.__doc__ or '').partition(chr(10))[0]}" if table else _note(field)
         head = f"[[{name}]]" if table_in(entry_in(field.type)) else f"[{name}]"
         lines += ["", f"# {head}{about}", *(_keys(table, set()) if table else ())]
-    return "\n".join(lines) + "\n"
+    if not lines:
+        return ""
+    return "\n".join([*_ABOUT_TABLES, *lines]) + "\n"
 
 
 def _keys(table: type[Struct], given: set[str]) -> list[str]:

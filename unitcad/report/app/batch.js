@@ -112,7 +112,7 @@
     const ask = (folder) => {
       const there = folder && table.rows.some((row) => row[0] === folder);
       clear(lacking, there && [`${folder} has no folder here. To make it, and then this page again, run in the folder that holds ${data.stored_in}: `,
-        el("code", {}, `unitcad cache export ${folder.split("-").pop()} --batch ${quoted(data.stored_in)} && unitcad report ${quoted(data.stored_in)}`)]);
+        el("code", {}, `unitcad export ${folder.split("-").pop()} --batch ${quoted(data.stored_in)} && unitcad report ${quoted(data.stored_in)}`)]);
     };
     const sections = [section("variants", "Variants", lacking, made.node), pins.node, section("plot", "Two columns against each other", controls, notRead, plotHost)];
     if (data.damaged.length) sections.push(section("damaged", "Damaged", U.table(["Result", "Why"], data.damaged, { label: "Damaged results" })));

@@ -10,8 +10,10 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.patch import PatchPart, patch_parts
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.arrays.patch_pictures import laid_elsewhere, taken_apart
+from unitcad.export import glb
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.pipeline.plan import glb_content, patch_glb
+from unitcad.pipeline.plan import glb_content, glb_part
 from unitcad.report.html_page import compressed
 from unitcad.shape import union
 from unitcad.shape.body import Body
@@ -54,6 +56,20 @@ def _by_kind(parts: Sequence[PatchPart]) -> list[PatchPart]:
     kept = [part for part in parts if part.body.made == "cast" or part.places]
     whole = (replace(bodies[0], name=kind, shape=union(b.shape for b in bodies)) for kind, bodies in put_in.items())
     return [*kept, *(PatchPart(body.name, body) for body in whole)]
+
+
+def patch_glb(moulds: MouldSet, parts: Sequence[PatchPart]) -> bytes:
+    """Return the GLB of an array's whole patch: the mesh of each distinct body once, a node at each of its places."""
+    return glb.content(
+        [
+            replace(
+                glb_part(moulds, part.body),
+                name=part.name,
+                places=[glb.Standing(f"{p.name}-{part.body.name}", p.x, p.y, p.angle_deg) for p in part.places],
+            )
+            for part in parts
+        ]
+    )
 
 
 def tools_model(array: Array) -> dict[str, Any]:

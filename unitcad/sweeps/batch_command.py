@@ -101,11 +101,11 @@ def batch(
     """Make every variant of a sweep, each distinct part once. The last line printed is the folder."""
     from msgspec import to_builtins
 
-    from unitcad.cli.batch_progress import watching
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal
     from unitcad.sweeps import BatchOptions, load_sweep
     from unitcad.sweeps.batch_call import checked_tables, folders_for, make
+    from unitcad.sweeps.batch_progress import watching
     from unitcad.sweeps.cluster import Certificates
     from unitcad.sweeps.executors import Workers
     from unitcad.sweeps.preview import preview

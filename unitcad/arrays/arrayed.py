@@ -12,21 +12,36 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 from unitcad import __version__
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_extras import extras
-from unitcad.arrays.array_file import array_hash, array_of, to_toml, with_formats
+from unitcad.arrays.array_file import (
+    ArraySource,
+    array_hash,
+    array_of,
+    load_array,
+    makeable_array,
+    to_toml,
+    with_formats,
+)
+from unitcad.arrays.array_page import ARRAY_FILE, ArrayManifest, write_array_page
 from unitcad.arrays.array_procedure import array_procedure
+from unitcad.arrays.array_summary import array_summary
+from unitcad.arrays.array_units import expanded
+from unitcad.arrays.array_view import patch_glb
 from unitcad.arrays.bending import bending_record
 from unitcad.arrays.circuit.circuit_files import has_circuit
 from unitcad.arrays.circuit.tracks import crowded_tracks
 from unitcad.arrays.construction import construction_of
+from unitcad.arrays.estimate_arrays import estimate_arrays
 from unitcad.arrays.hidden_tails import hidden_tails, hidden_tails_warning
+from unitcad.arrays.offers import offered
 from unitcad.arrays.patch import patch_bodies, patch_parts
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.arrays.patch_pictures import picture_names, pictures
@@ -40,6 +55,7 @@ from unitcad.casting.written import files as written
 from unitcad.casting.written import step_section
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
+from unitcad.errors import Refusal
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.make import Product, Progress, Subject, finished, geometry, mould_findings, record
@@ -47,10 +63,10 @@ from unitcad.pipeline.manifest import (
     CASTING,
     NO_KERNEL,
     UNCHECKED,
-    ArrayManifest,
     BodyFile,
     Geometry,
     LeftOut,
+    Manifest,
     MeshFinding,
     PartRecord,
     counted,
@@ -66,22 +82,62 @@ from unitcad.pipeline.plan import (
     geometry_key,
     joint_key,
     kernel_versions,
-    patch_glb,
     step_file,
     stl_content,
 )
-from unitcad.spec import Spec
+from unitcad.pipeline.subjects import Compound
+from unitcad.spec import Spec, read_toml
 from unitcad.spec.asked import Format
+from unitcad.validation import Changes
 
 
-class Arrayed(Subject):
+class Arrayed(Compound):
     """An array, as a result is made of it."""
 
-    kind, file = "array", "array.toml"
+    kind, file = "array", ARRAY_FILE
 
     def __init__(self, array: Array) -> None:
         self.of, self.unit, self.name, self.hash = array, array.unit, array.name, array_hash(array)
         self.formats = array.unit.output.formats
+
+    @classmethod
+    def load(cls, source: ArraySource, changes: Changes = ()) -> Arrayed:
+        return cls(load_array(source, changes))
+
+    @classmethod
+    def of_data(cls, data: Mapping[str, Any]) -> Arrayed:
+        return cls(array_of(data))
+
+    @classmethod
+    def read(cls, path: Path) -> dict[str, Any]:
+        return expanded(read_toml(path), path.parent)
+
+    @classmethod
+    def offered(cls, refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
+        return offered(refusal, data, makeable_array)
+
+    @classmethod
+    def write_page(cls, folder: Path, warn: Callable[[str], None]) -> Path:
+        return write_array_page(folder, warn)
+
+    @classmethod
+    def estimate(
+        cls,
+        names: Sequence[str],
+        sets: Sequence[str],
+        hertz: Sequence[float],
+        masses: bool,
+        details: bool,
+        as_json: bool,
+    ) -> None:
+        estimate_arrays(names, sets, hertz, masses, details, as_json)
+
+    def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
+        return array_summary(self.of, folder, manifest)
+
+    @property
+    def moulds(self) -> PatchMoulds:
+        return patch_moulds(self.of)
 
     @property
     def text(self) -> str:
@@ -93,15 +149,15 @@ class Arrayed(Subject):
     def outputs(self, only: Sequence[str]) -> tuple[str, ...]:
         return tuple(only)
 
-    def with_formats(self, formats: Sequence[Format]) -> Subject:
+    def with_formats(self, formats: Sequence[Format]) -> Arrayed:
         return Arrayed(with_formats(self.of, tuple(formats)))
 
-    def same_file(self, data: dict[str, Any]) -> Subject:
+    def same_file(self, data: dict[str, Any]) -> Arrayed:
         return Arrayed(array_of(data))
 
     def make(self, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
         array: Array = self.of
-        moulds = patch_moulds(array)
+        moulds = self.moulds
         moulds.plan  # noqa: B018  # refuses before the long work begins
         units = {
             folder: _unit(array, unit, only, check, store, progress) for folder, unit in unit_folders(array).items()

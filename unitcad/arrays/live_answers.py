@@ -6,18 +6,29 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec.structs import replace
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_of, makeable_array, to_toml
 from unitcad.arrays.array_names import array_templates
+from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.array_tables import AskedArray, BodyTable, CircuitTable, SheetTable
 from unitcad.arrays.array_units import expanded
+from unitcad.arrays.array_view import patch_model, tools_model
+from unitcad.arrays.arrayed import unit_folders
+from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
+from unitcad.arrays.crosstalk_matrix import crosstalk
+from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.arrays.layouts import layouts
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.casting.procedure import Procedure
+from unitcad.casting.steps import in_short
 from unitcad.catalogue import materials
+from unitcad.checks import check_moulds, check_unit
 from unitcad.errors import Refusal
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
 from unitcad.serve.messages import Answer, Field, Group, Trusted
 from unitcad.serve.unit_answers import holds_code as unit_holds_code
@@ -27,9 +38,6 @@ from unitcad.spec.toml import from_json, read_toml, to_json
 from unitcad.validation import templates
 from unitcad.validation.dotted import at
 from unitcad.validation.faults import every_fault, line_of
-
-if TYPE_CHECKING:
-    from unitcad.casting.procedure import Procedure
 
 as_toml = to_toml
 
@@ -46,7 +54,7 @@ def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
 
 def asked_toml(text: str, data: Mapping[str, Any], array: Array, trusted: Trusted) -> str:
     """Return what a text asks for as TOML that names no file: the text itself where it names none."""
-    return to_toml(array) if array_files(data) else text
+    return to_toml(array) if named_files(data) else text
 
 
 def settled(data: Mapping[str, Any], trusted: Trusted) -> Array:
@@ -56,7 +64,7 @@ def settled(data: Mapping[str, Any], trusted: Trusted) -> Array:
 
 def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
     """Return plain data with the whole spec of each unit in it. Raises Refusal for a file that may not be named."""
-    named = array_files(data)
+    named = named_files(data)
     values = set(named.values())
     folders = [Path(source.folder) for source in trusted.sources if values <= set(source.named.values())]
     if named and not folders:
@@ -80,7 +88,7 @@ def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
     return next((one for one in alike if one["array"] == data.get("array")), alike[0])
 
 
-def array_files(data: Mapping[str, Any]) -> dict[str, str]:
+def named_files(data: Mapping[str, Any]) -> dict[str, str]:
     """Return the values of an array's plain data that name files, by their paths; a shipped unit's name is none."""
     found = files_named({key: value for key, value in data.items() if key != "design"})
     places = data.get("place")
@@ -94,6 +102,16 @@ def array_files(data: Mapping[str, Any]) -> dict[str, str]:
             found[f"{field}.like" if own else field] = like
         found |= {f"{field}.{key}": value for key, value in files_named(own).items()}
     return found
+
+
+def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield each unit's plain data, with the field of its design. Raises Refusal for a unit that is not found."""
+    whole = expanded(data, folder)
+    places = whole.get("place")
+    found = {"unit": whole.get("unit")}
+    for i, place in enumerate(places if isinstance(places, list) else ()):
+        found[f"place.{i}.unit"] = place.get("unit") if isinstance(place, dict) else None
+    yield from ((f"{field}.design", unit) for field, unit in found.items() if isinstance(unit, dict))
 
 
 def holds_code(array: Array) -> bool:
@@ -141,8 +159,6 @@ def _with_kinds(rows: Iterator[Field], choices: Mapping[str, list[tuple[str, str
 
 
 def _patch(array: Array, answer: Answer) -> None:
-    from unitcad.report.array_view import patch_model
-
     answer.model = patch_model(array)
     x0, y0, x1, y1 = array.sheet.outline
     answer.figures = [("units", float(len(array.places)), ""), ("sheet along x", x1 - x0, "mm")]
@@ -150,13 +166,6 @@ def _patch(array: Array, answer: Answer) -> None:
 
 
 def _tools(array: Array, answer: Answer) -> None:
-    from unitcad.arrays.array_procedure import array_procedure
-    from unitcad.arrays.patch_moulds import patch_moulds
-    from unitcad.casting.steps import in_short
-    from unitcad.checks import check_moulds
-    from unitcad.pipeline.arrays import unit_folders
-    from unitcad.report.array_view import tools_model
-
     moulds = patch_moulds(array)
     answer.model = tools_model(array)
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
@@ -174,25 +183,16 @@ def _tools(array: Array, answer: Answer) -> None:
 @lru_cache(maxsize=8)
 def _checked(unit: str, apart: bool) -> list[dict[str, Any]]:
     """Return what the mould checks find on a unit, given as JSON: with its moulds where it is cast `apart`."""
-    from unitcad.checks import check_moulds, check_unit
-    from unitcad.moulds.mould_set import MouldSet
-
     return [dict(finding.as_dict()) for finding in (check_moulds if apart else check_unit)(MouldSet(from_json(unit)))]
 
 
 @lru_cache(maxsize=8)
 def _cast(unit: str) -> Procedure:
     """Return the procedure of a unit, given as JSON: it stays while the sheet changes."""
-    from unitcad.moulds.mould_set import MouldSet
-
     return unit_procedure(MouldSet(from_json(unit)))
 
 
 def _crosstalk(array: Array, answer: Answer) -> None:
-    from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
-    from unitcad.arrays.crosstalk_matrix import crosstalk
-    from unitcad.arrays.crosstalk_words import crosstalk_lines
-
     data = crosstalk(array)
     answer.lines = crosstalk_lines(data)
     answer.drawings = [

@@ -6,6 +6,7 @@ import json
 import shlex
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_extras import CROSSTALK
@@ -13,29 +14,30 @@ from unitcad.arrays.construction import construction_of
 from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.casting.steps import in_short
 from unitcad.meshcheck.findings import counted
-from unitcad.pipeline.write import PAGE, Built
+from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.write import PAGE
 from unitcad.text import number
 
 
-def array_summary(array: Array, built: Built) -> Iterator[str]:
+def array_summary(array: Array, folder: Path, manifest: Manifest) -> Iterator[str]:
     """Yield a line each: units and size, casting, checks, crosstalk, the page."""
-    manifest, box = built.manifest, array.sheet.outline
+    box = array.sheet.outline
     size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
     yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {number(array.sheet.thickness_mm, 3)} mm thick"
     if manifest["casting"]:
         told = {f"warning: {line}" for line in manifest["warnings"]}
-        lines = in_short(json.loads((built.folder / "casting.json").read_bytes()))
+        lines = in_short(json.loads((folder / "casting.json").read_bytes()))
         yield from (line for line in lines if line not in told)
         yield from _more_cavities(array)
     if checks := manifest["laws"]:
         check, passed = manifest["check"], sum(entry["ok"] for entry in checks)
         files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
-    crosstalk = built.folder / CROSSTALK
+    crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
         yield from crosstalk_lines(json.loads(crosstalk.read_bytes()))[:2]
-    if (built.folder / PAGE).is_file():
-        yield f"open {shlex.quote(str(built.folder / PAGE))}"
+    if (folder / PAGE).is_file():
+        yield f"open {shlex.quote(str(folder / PAGE))}"
 
 
 def _more_cavities(array: Array) -> Iterator[str]:

@@ -11,15 +11,15 @@ from typing import Any
 
 from unitcad import files
 from unitcad.arrays.array_file import array_of
+from unitcad.arrays.array_view import array_model
 from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.arrays.layouts import layouts
 from unitcad.casting.steps import duration
 from unitcad.checks import mould_checks
 from unitcad.errors import UnitcadError
 from unitcad.meshcheck.findings import counted
-from unitcad.pipeline.manifest import ArrayManifest
-from unitcad.pipeline.write import ARRAY, BENCH, PAGE
-from unitcad.report.array_view import array_model
+from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.write import BENCH, PAGE
 from unitcad.report.plain_page import VIEW, drawing, picture, plain_page
 from unitcad.report.records import expect
 from unitcad.spec import read_toml
@@ -44,6 +44,16 @@ WORDS = {
     "crosstalk-edge.svg": "The same, at the nearest edge of the other unit",
     "circuit.svg": "Outline of the circuit, pads and rows",
 }
+ARRAY_FILE = "array.toml"
+
+
+class ArrayManifest(Manifest):
+    """An array's manifest: `laws`, `check` and `parts` are those of its tools and sheet and of its units.
+
+    `array` has construction, layout, sheet, and the places with the folder of their unit's own result.
+    """
+
+    array: dict[str, Any]
 
 
 def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
@@ -83,7 +93,7 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
 def _model(folder: Path, warn: Callable[[str], None]) -> dict[str, Any] | None:
     """Return what the 3D view shows; None, and a warning, where it can't be made, as of a unit that runs code."""
     try:
-        return array_model(array_of(read_toml(folder / ARRAY, links=False)))
+        return array_model(array_of(read_toml(folder / ARRAY_FILE, links=False)))
     except UnitcadError as error:
         warn(f"warning: no 3D view: {error}")
         return None

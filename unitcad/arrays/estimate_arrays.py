@@ -9,10 +9,14 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.crosstalk_matrix import BAND_HZ, crosstalk
+from unitcad.arrays.crosstalk_words import ratio_line, ratios
 from unitcad.cli.output import console, print_json, progress
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.text import number
+from unitcad.validation import compound_kind
 
 _MOST_PLACES, _MOST_PAIRS = 64, 16
 """Units up to which each has a row, and each pair a cell, on the screen; the JSON has all."""
@@ -23,13 +27,8 @@ def estimate_arrays(
     names: Sequence[str], sets: Sequence[str], hertz: Sequence[float], masses: bool, details: bool, as_json: bool
 ) -> None:
     """Print the crosstalk of arrays and, of several, each over the first. `hertz`: one frequency, or a band."""
-    from unitcad.arrays.array_file import load_array
-    from unitcad.arrays.array_names import is_array
-    from unitcad.arrays.crosstalk_matrix import BAND_HZ, crosstalk
-    from unitcad.arrays.crosstalk_words import ratio_line, ratios
-
     for name in names:
-        if not is_array(name):
+        if not compound_kind(name):
             raise Refusal("SPEC", name, "is a unit, and the others are arrays: estimate them apart")
     own = [f"estimate.frequency_hz={hertz[0]!r}"] if len(hertz) == 1 else []
     arrays = [load_array(name, [*sets, *own], lay_tails=False) for name in names]

@@ -1,0 +1,69 @@
+"""The rooms: packages of unitcad that the core works without.
+
+The core names no room. A room states its additions in its `room.toml`: the functions of its commands as "module:name",
+and the kinds of TOML files that it knows.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct, field
+
+_CORE = "cli"
+"""The package whose additions come first."""
+
+
+class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
+    """A kind of TOML file: `unitcad list PLURAL`, `unitcad schema NAME`, and a start for `unitcad init`."""
+
+    name: str
+    plural: str = ""
+    """The name in `unitcad list`, and the folder of templates; empty if none is shipped."""
+    shipped: str = ""
+    """"module:name" of the function that returns the shipped files by name; default: those of the folder."""
+    model: str = ""
+    """"module:name" of the msgspec Struct of the file; empty for a kind without a schema."""
+    schema: str = ""
+    """"module:name" of the function that returns the JSON Schema; default: the schema of `model`."""
+    command: str = ""
+    """The command that takes the file; empty if `unitcad init` does not write one."""
+    keys: tuple[str, ...] = ()
+    """The top-level keys by which a file is known to be of this kind."""
+    subject: str = ""
+    """"module:name" of the `pipeline.subjects.Compound` that the file describes, if it describes one."""
+    page: str = ""
+    """The module with the file's part of the live page, if it has one."""
+
+
+class _Room(Struct, frozen=True, forbid_unknown_fields=True):
+    commands: dict[str, str] = {}  # msgspec copies it
+    files: tuple[FileKind, ...] = field(default=())
+
+
+@cache
+def _rooms() -> list[_Room]:
+    """Return the additions of the core, then those of the rooms by name."""
+    paths = sorted(Path(__file__).parent.glob("*/room.toml"), key=lambda path: (path.parent.name != _CORE, path))
+    return [msgspec.convert(tomllib.loads(path.read_text("utf-8")), _Room) for path in paths]
+
+
+def load(reference: str) -> Any:
+    """Return the object that "module:name" refers to."""
+    module, _, name = reference.partition(":")
+    return getattr(import_module(module), name)
+
+
+def commands() -> dict[str, str]:
+    """Return the function of each command of the command line, as "module:name"."""
+    return {name: reference for room in _rooms() for name, reference in room.commands.items()}
+
+
+def file_kinds() -> tuple[FileKind, ...]:
+    """Return the kinds of TOML files."""
+    return tuple(kind for room in _rooms() for kind in room.files)

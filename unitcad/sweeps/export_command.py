@@ -1,0 +1,39 @@
+"""unitcad export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from unitcad.cli.shared_options import AsJson
+
+
+def export(
+    hashes: Annotated[
+        list[str],
+        typer.Argument(metavar="HASH...", help="The hash at the end of a variant's folder, or how it begins."),
+    ],
+    batch: Annotated[Path, typer.Option("--batch", help="The batch's folder.")] = Path(),
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Where the folders go; else to the batch.")] = None,
+    store: Annotated[str | None, typer.Option(metavar="ADDRESS", help="The store; else the batch's.")] = None,
+    where: Annotated[Path | None, typer.Option("--cache", help="The cache's folder; else the user's.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make the folders of some variants of a batch, from its store. Each is a line printed."""
+    from unitcad.cache import DiskStore, default_root
+    from unitcad.cli.output import print_json
+    from unitcad.sweeps.result_folders import export_variants
+
+    kept = DiskStore(where or default_root())
+    try:
+        made = []
+        for folder in export_variants(batch, hashes, out or batch, kept, store):
+            made.append(str(folder))
+            if not as_json:
+                typer.echo(made[-1])
+    finally:
+        kept.close()
+    if as_json:
+        print_json({"folders": made})
