@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import copyreg
+import json
 import math
 import re
+import shlex
+import sys
 from collections.abc import Iterable
+from difflib import SequenceMatcher, get_close_matches
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 from unitcad.text import toml
 
@@ -40,13 +48,6 @@ def missing_extra(extra: str, need: str) -> Missing:
 
 def install_command(extras: str) -> str:
     """Return the command that adds extras to this installation, from the folder or address that it came from."""
-    import json
-    import shlex
-    import sys
-    from importlib.metadata import PackageNotFoundError, distribution
-    from pathlib import Path
-    from urllib.parse import urlsplit
-    from urllib.request import url2pathname
 
     try:
         source = json.loads(distribution("unitcad").read_text("direct_url.json") or "{}")
@@ -121,7 +122,6 @@ class UnknownKey(Refusal):
 
 def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusal] = Refusal) -> Refusal:
     """Return a refusal, of class `kind`, of a name that is not in `known`, with the closest names that are."""
-    from difflib import get_close_matches  # which takes a millisecond to load, for a mistake alone
 
     known = sorted(known)
     close = get_close_matches(value, known, n=3, cutoff=0.6)
@@ -136,7 +136,6 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
 
     The limit names the most similar keys first, and the command `lists`, which prints all, where it leaves any out.
     """
-    from difflib import SequenceMatcher, get_close_matches
 
     table, _, key = field.rpartition(".")
     known = list(known)

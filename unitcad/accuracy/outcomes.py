@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.errors import Refusal, UnitcadError
+from unitcad.moulds.plan import plan
+from unitcad.pipeline.write import build
+from unitcad.validation import from_data, put
 
 BUILT, REFUSED = "built", "refused"
 MOULD_CHECK, MESH_CHECK, ERROR, CRASH, HANG, CIRCLE = "mould check", "mesh check", "error", "crash", "hang", "circle"
@@ -39,8 +42,6 @@ class Outcome:
 
 def build_outcome(data: dict[str, Any]) -> Outcome:
     """Build unit and moulds of a spec's data, with all checks, into a folder that is removed afterwards."""
-    from unitcad.pipeline.write import build
-    from unitcad.validation import from_data
 
     start = time.perf_counter()
     try:
@@ -94,8 +95,6 @@ def outcome(data: dict[str, Any]) -> Outcome:
 
 def refusal_of(data: dict[str, Any]) -> Refusal | None:
     """Return the refusal that a spec's data meets in validation or in its moulds' plan; None if it passes both."""
-    from unitcad.moulds.plan import plan
-    from unitcad.validation import from_data
 
     try:
         plan(from_data(data))
@@ -106,7 +105,6 @@ def refusal_of(data: dict[str, Any]) -> Refusal | None:
 
 def put_in(data: dict[str, Any], where: str, value: object) -> dict[str, Any]:
     """Return `data` with `value` at the dotted path of a refusal."""
-    from unitcad.validation import put
 
     changed = copy.deepcopy(data)
     put(changed, where, value)

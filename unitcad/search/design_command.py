@@ -11,6 +11,10 @@ import typer
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
 from unitcad.files import seen_from
+from unitcad.search import design_files, design_text
+from unitcad.search.explanation import explain as explained
+from unitcad.search.proposals import invert
+from unitcad.search.target_file import load_target
 
 
 def design(
@@ -30,10 +34,6 @@ def design(
     Each proposal has its probability of meeting the level at the edge, with a range, and what no measurement covers.
     The last line printed is the folder: the page design.html, ranking.csv, and specs to build.
     """
-    from unitcad.search import design_files, design_text
-    from unitcad.search.explanation import explain as explained
-    from unitcad.search.proposals import invert
-    from unitcad.search.target_file import load_target
 
     wish = load_target(target)
     if explain is None:
