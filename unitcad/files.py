@@ -20,8 +20,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
-from filelock import FileLock
-
 from unitcad.errors import UnitcadError
 
 LARGEST = 16_000_000
@@ -82,7 +80,6 @@ def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bo
 
 def sha256(path: str | os.PathLike[str]) -> str:
     """Return the SHA-256 of a file of any size, read in pieces. Raises UnitcadError where it can't be read."""
-
     found = hashlib.sha256()
     try:
         with open(path, "rb", opener=regular()) as file:
@@ -223,6 +220,7 @@ def scratch(parent: Path, name: str = "") -> Iterator[Path]:
 
     `name` is what in `parent` the work is for; `leftovers` yields it with the folder of a killed process.
     """
+    from filelock import FileLock
 
     token = secrets.token_hex(8)
     folder = parent / f"{TEMPORARY}{token}"
@@ -260,6 +258,7 @@ def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
     Only real folders with our mark and their own token inside are yielded, and those that hold an empty lock alone:
     their process ended before it wrote the mark, or after it had removed it.
     """
+    from filelock import FileLock
 
     for folder in sorted(parent.glob(f"{TEMPORARY}*")):
         name = _marked(folder)
