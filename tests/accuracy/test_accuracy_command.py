@@ -85,7 +85,12 @@ def test_an_extreme_design_is_named_with_its_place() -> None:
     found = {row["what"]: row for row in extremes(SPEC, changed_struct(VARIANT, tissue=tuple(thin)))}
     named = {what for what, row in found.items() if row["extreme"]}
     assert named == {"body: thinnest layer / its shear wavelength", "body: least 1 - 2 nu"}
-    assert found["body: thinnest layer / its shear wavelength"]["at"] == VARIANT.tissue[0].name
+    film = found["body: thinnest layer / its shear wavelength"]
+    skin = thin[0]
+    speed = abs((skin.shear_modulus.middle * (1 + 1j * skin.damping.middle) / skin.density) ** 0.5)
+    assert skin.damping_law == "loss_factor"
+    assert film["at"] == skin.name
+    assert film["value"] == pytest.approx(1e-5 * VARIANT.frequency.middle / speed)
 
 
 def test_a_cylinder_is_as_far_off_as_its_area_true_polygon() -> None:
