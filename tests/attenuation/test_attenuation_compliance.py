@@ -11,7 +11,7 @@ from scipy import optimize
 
 from unitcad.accuracy import thomson_haskell
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import Refusal
 
 CASES = json.loads((files("unitcad.accuracy") / "references" / "compliance.json").read_text("utf-8"))

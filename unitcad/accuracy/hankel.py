@@ -15,9 +15,7 @@ from unitcad.accuracy import hankel_peers as peers
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved, machine
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import LossFactor
+from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.estimating import estimate_input
 from unitcad.validation import default_template, load
 

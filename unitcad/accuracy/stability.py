@@ -16,9 +16,16 @@ from unitcad.accuracy import extreme_responses, thomson_haskell
 from unitcad.accuracy.random_media import CLASSES
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.timing import machine
-from unitcad.attenuation.layered.loads import Point, UniformDisc
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered import (
+    Damping,
+    HalfSpace,
+    KelvinVoigt,
+    Layer,
+    LayeredMedium,
+    LossFactor,
+    Point,
+    UniformDisc,
+)
 
 LIMIT = 1e-13
 """The promised error of the compliance, normwise over the problem's condition number."""

@@ -118,7 +118,7 @@ def tensile_chart(name: str, result: TensileResult) -> str:
 
 def dynamic_chart(name: str, result: DynamicResult, factor: float) -> str:
     """Draw storage and loss with the law, on to the motor's frequency; `factor` makes shear moduli Young's."""
-    from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
+    from unitcad.attenuation.layered import FractionalKelvinVoigt
 
     curve, law = result.curve, FractionalKelvinVoigt(result.tau, result.n)
     ends = min(curve.frequency[0], result.frequency_hz), max(curve.frequency[-1], result.frequency_hz)
