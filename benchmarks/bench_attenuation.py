@@ -21,7 +21,7 @@ from unitcad.attenuation.crosstalk import decay
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels
 from unitcad.attenuation.inputs import EstimateInput, TissueLayer, body
-from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.layered import UniformDisc
 from unitcad.estimating import estimate_input
 from unitcad.validation import load
 

@@ -35,8 +35,7 @@ from unitcad.attenuation.edge.fitted_models import (
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.edge.scores import assess, left_out_errors
 from unitcad.attenuation.inputs import Drive, body
-from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
-from unitcad.attenuation.layered.statics import Direction
+from unitcad.attenuation.layered import Direction, Load, Point, UniformDisc
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.validation import load

@@ -14,7 +14,7 @@ from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_tabl
 from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.attenuation.edge.variant_units import merged
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
-from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
+from unitcad.attenuation.layered import FractionalKelvinVoigt
 from unitcad.attenuation.receivers import neighbours_block
 from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials, motors, tissue
 from unitcad.designs import design_of, dimensions, no_estimate

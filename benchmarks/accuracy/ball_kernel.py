@@ -12,9 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered import (
+    FractionalKelvinVoigt,
+    HalfSpace,
+    KelvinVoigt,
+    Layer,
+    LayeredMedium,
+    Load,
+    LossFactor,
+)
 from unitcad.errors import missing_extra
 
 BITS = 128

@@ -17,9 +17,7 @@ import numpy as np
 from scipy import special
 
 from benchmarks.accuracy.ball_kernel import Kernel, TooHard
-from unitcad.attenuation.layered.loads import Load, Point
-from unitcad.attenuation.layered.medium import LayeredMedium
-from unitcad.attenuation.layered.rheology import LossFactor
+from unitcad.attenuation.layered import LayeredMedium, Load, LossFactor, Point
 
 _DEGREE = 24
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_DEGREE)

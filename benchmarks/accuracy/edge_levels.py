@@ -20,7 +20,7 @@ from unitcad.attenuation.edge.fitted_models import MODELS, assessments, compared
 from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable, measured_table
 from unitcad.attenuation.edge.scores import Assessment, Fit, assess
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.layered import UniformDisc
 from unitcad.attenuation.mechanics.motor_level import Setting, amplitude, motion, pressed_skin
 from unitcad.catalogue import measurements
 from unitcad.estimating import estimate_input

@@ -17,8 +17,7 @@ from benchmarks.accuracy.journal import journalled
 from benchmarks.accuracy.result import Cell, Plot, Promise, Table, shown
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.accuracy.worker_jobs import in_order
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered import Damping, HalfSpace, KelvinVoigt, Layer, LayeredMedium, LossFactor
 from unitcad.errors import UnitcadError
 
 TOLERANCES = (0.1, 1e-3, 1e-5, 1e-7, 1e-9)

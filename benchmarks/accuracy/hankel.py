@@ -16,9 +16,7 @@ from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import LossFactor
+from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.estimating import estimate_input
 from unitcad.validation import default_template, load
 

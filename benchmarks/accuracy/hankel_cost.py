@@ -16,10 +16,7 @@ import numpy as np
 from benchmarks.accuracy import ball_reference
 from benchmarks.accuracy.result import Cell, Plot, Promise, Say, Table, shown
 from unitcad.accuracy.timing import PROCESSOR, Timing, interleaved
-from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
-from unitcad.attenuation.layered.medium import LayeredMedium
-from unitcad.attenuation.layered.response import Response
-from unitcad.attenuation.layered.statics import Direction
+from unitcad.attenuation.layered import Direction, LayeredMedium, Load, Point, Response, UniformDisc
 
 LOADS: dict[str, Load] = {
     f"{name}, {direction}": load

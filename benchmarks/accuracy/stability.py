@@ -15,9 +15,16 @@ from benchmarks.accuracy import extreme_responses, thomson_haskell
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.random_media import CLASSES
-from unitcad.attenuation.layered.loads import Point, UniformDisc
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered import (
+    Damping,
+    HalfSpace,
+    KelvinVoigt,
+    Layer,
+    LayeredMedium,
+    LossFactor,
+    Point,
+    UniformDisc,
+)
 
 COMPLIANCE = Path(__file__).parent / "references" / "compliance.json"
 LIMIT = 1e-13

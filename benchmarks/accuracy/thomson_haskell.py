@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import complex_shear_modulus, compressibility
+from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, complex_shear_modulus, compressibility
 
 
 def _columns(body: Layer | HalfSpace, k: complex, omega: float) -> tuple[np.ndarray, np.ndarray]:

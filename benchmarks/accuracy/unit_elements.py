@@ -12,7 +12,7 @@ from benchmarks.accuracy.mechanics_search import DRIVES, READINGS, drawn_levels,
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, interleaved
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.layered import UniformDisc
 from unitcad.attenuation.mechanics.motor_level import Drive, Setting, amplitude, motion, pressed_skin
 from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 from unitcad.catalogue import measurements

@@ -8,8 +8,7 @@ import pytest
 from benchmarks.accuracy.ball_reference import Kernel, TooHard, response
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
-from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
+from unitcad.attenuation.layered import KelvinVoigt, Load, LossFactor, Point, UniformDisc
 
 pytest.importorskip("flint")
 

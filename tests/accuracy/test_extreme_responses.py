@@ -12,7 +12,7 @@ from benchmarks.accuracy.extreme_responses import TOLERANCES, Row, cases, plot, 
 from benchmarks.accuracy.hankel import DISC, RADII
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.loads import Point, UniformDisc
+from unitcad.attenuation.layered import Point, UniformDisc
 from unitcad.errors import UnitcadError
 
 pytest.importorskip("flint")

@@ -9,9 +9,8 @@ from benchmarks.accuracy.extreme_responses import LEAST_GAIN
 from benchmarks.accuracy.hankel import DISC, RADII, cases
 from unitcad.accuracy.random_media import trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.loads import Point, UniformDisc
+from unitcad.attenuation.layered import KelvinVoigt, LossFactor, Point, UniformDisc
 from unitcad.attenuation.layered.quadrature import products
-from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
 
 R = np.array([0.5e-3, 30e-3])
 

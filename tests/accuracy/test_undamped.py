@@ -8,11 +8,9 @@ import pytest
 
 from unitcad.accuracy.random_media import trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered import waves as w
-from unitcad.attenuation.layered.detours import around, poles
-from unitcad.attenuation.layered.loads import Point, UniformDisc
-from unitcad.attenuation.layered.path import from_origin, wavenumbers
-from unitcad.attenuation.layered.rheology import LossFactor
+from unitcad.attenuation.layered import LossFactor, Point, UniformDisc
+from unitcad.attenuation.layered.propagation import Material
+from unitcad.attenuation.layered.quadrature import around, from_origin, poles, wavenumbers
 
 REFERENCES = json.loads((Path(__file__).parents[1] / "attenuation" / "references" / "undamped.json").read_text())
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
@@ -84,8 +82,8 @@ def test_branch_points_of_a_half_space_take_few_wavenumbers(nu):
 
 
 def test_panels_next_to_a_branch_point_cover_the_axis_once():
-    soft = w.Material(1e4 + 0j, 0.2, 4e4 + 0j)
-    panels = from_origin(300.0, 2000.0, 0.05, (w.Material(1e4 + 100j, 0.2, 3e4 - 300j), soft))
+    soft = Material(1e4 + 0j, 0.2, 4e4 + 0j)
+    panels = from_origin(300.0, 2000.0, 0.05, (Material(1e4 + 100j, 0.2, 3e4 - 300j), soft))
     ends, _ = wavenumbers(panels, panels[:, :2])
     assert np.all(ends.imag == 0)
     ordered = ends.real[np.argsort(ends.real[:, 0])]

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered import FractionalKelvinVoigt, KelvinVoigt, LossFactor, Point, Response, UniformDisc
 from unitcad.attenuation.layered.integral import Problem
-from unitcad.attenuation.layered.loads import Point, UniformDisc
-from unitcad.attenuation.layered.response import Response
-from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.validation import load

@@ -11,7 +11,7 @@ from scipy import optimize
 
 from benchmarks.accuracy import thomson_haskell
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import Refusal
 
 COMPLIANCE = Path(thomson_haskell.__file__).parent / "references" / "compliance.json"

@@ -9,8 +9,7 @@ import pytest
 from scipy import optimize
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.loads import Point, UniformDisc
-from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
+from unitcad.attenuation.layered import KelvinVoigt, LossFactor, Point, UniformDisc
 from unitcad.errors import Refusal
 
 REFERENCES = Path(__file__).parent / "references"

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.layered import kept as module
-from unitcad.attenuation.layered.kept import kept
-from unitcad.attenuation.layered.loads import Point, UniformDisc
+from unitcad.attenuation.layered import Point, UniformDisc
+from unitcad.attenuation.layered import loads as module
+from unitcad.attenuation.layered.loads import kept
 from unitcad.estimating import estimate_input
 from unitcad.validation import load as load_spec
 

@@ -4,8 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from unitcad.attenuation.layered.series import exponential
-from unitcad.attenuation.layered.waves import Material
+from unitcad.attenuation.layered.propagation import Material, exponential
 
 
 def _exponential(material: Material, k: float, h: float) -> np.ndarray:

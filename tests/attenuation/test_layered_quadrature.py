@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 from scipy import special
 
-from unitcad.attenuation.layered import waves as w
-from unitcad.attenuation.layered.detours import poles
-from unitcad.attenuation.layered.integral import Body, Problem
-from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.path import from_origin, halved_towards
-from unitcad.attenuation.layered.quadrature import evaluate
-from unitcad.attenuation.layered.rheology import LossFactor
-from unitcad.attenuation.layered.tail import grid
-from unitcad.attenuation.layered.weights import nodes
+from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, Load, LossFactor, Point, UniformDisc
+from unitcad.attenuation.layered.integral import Body, Problem, grid
+from unitcad.attenuation.layered.propagation import Material
+from unitcad.attenuation.layered.quadrature import evaluate, from_origin, halved_towards, nodes, poles
 
 PHASE = 8.0 * np.pi
 
@@ -109,7 +103,7 @@ def test_a_tail_is_sampled_at_the_last_wavenumber_that_can_be_afforded():
 
 def test_panels_near_0_grow_fourfold_beyond_the_least_wave():
     """The half-space's wave ends at 0.1 /m: the first panel is shorter, its pole lies in panels of a factor of two."""
-    soft, hard = w.Material(1e4 + 1e3j, 0.01, 400.0**2 + 0j), w.Material(1e9 + 1e7j, 1.0, 0.1**2 - 1e-4j)
+    soft, hard = Material(1e4 + 1e3j, 0.01, 400.0**2 + 0j), Material(1e9 + 1e7j, 1.0, 0.1**2 - 1e-4j)
     panels = from_origin(1200.0, 1500.0, 1e-3, (soft, hard))[:, :2].real
     near = panels[panels[:, 1] <= 100.0]
     assert near[0, 1] < 0.1 <= 2.0 * near[0, 1] * 2.0
@@ -136,7 +130,7 @@ def test_the_kernel_is_the_same_in_chunks(monkeypatch, chunk):
 
 def test_panels_are_longer_beyond_the_waves():
     """Waves end at 100 /m, the last pole may lie at 240: panels of 20, then of 80, and as long as they are far."""
-    soft, hard = w.Material(1e4 + 1e3j, 0.01, 100.0**2 + 0j), w.Material(1e9 + 1e7j, 0.3, 144.0 - 1j)
+    soft, hard = Material(1e4 + 1e3j, 0.01, 100.0**2 + 0j), Material(1e9 + 1e7j, 0.3, 144.0 - 1j)
     panels = from_origin(240.0, 500.0, 1e-3, (soft, hard))[:, :2].real
     ends = [0, 20, 40, 60, 80, 100, 120, 160, 240, 480, 500]
     assert panels[panels[:, 1] >= 20, 1] == pytest.approx(ends[1:])

@@ -10,7 +10,7 @@ pytest.importorskip("skfem")
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.layered import UniformDisc
 from unitcad.attenuation.mechanics import harmonic_mesh as hm
 from unitcad.attenuation.mechanics.harmonic_elements import element_matrices
 from unitcad.attenuation.mechanics.harmonic_response import disc_response, motor_response

@@ -6,8 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.medium import HalfSpace, LayeredMedium
+from unitcad.attenuation.layered import HalfSpace, LayeredMedium, UniformDisc
 
 NORMAL, RADIAL = UniformDisc(1e-3), UniformDisc(1e-3, "radial")
 

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
-from unitcad.attenuation.layered.rheology import LossFactor
-from unitcad.attenuation.layered.statics import disc_integrals
+from unitcad.attenuation.layered import Load, LossFactor, Point, UniformDisc
+from unitcad.attenuation.layered.loads import disc_integrals
 
 
 def _order(order: int, s: mp.mpf) -> mp.mpf:

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.loads import Point, UniformDisc
-from unitcad.attenuation.layered.response import responses
-from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
-from unitcad.attenuation.layered.stack import Stack
+from unitcad.attenuation.layered import KelvinVoigt, LossFactor, Point, UniformDisc, responses
+from unitcad.attenuation.layered.medium import Stack
 from unitcad.errors import Refusal
 
 R = np.array([[0.5e-3, 7e-3], [20e-3, 37e-3]])

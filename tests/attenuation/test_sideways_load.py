@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from scipy import special
 
 from unitcad.attenuation import HalfSpace, KelvinVoigt, Layer, LayeredMedium, LossFactor, Point, UniformDisc
-from unitcad.attenuation.layered.bessel import bessel_bounds, bessels
-from unitcad.attenuation.layered.statics import disc_integrals
+from unitcad.attenuation.layered.loads import bessel_bounds, bessels, disc_integrals
 
 NU, E = 0.3, 3e4
 MU = E / (2 * (1 + NU))

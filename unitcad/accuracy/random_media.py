@@ -8,9 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import Damping, FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered import (
+    Damping,
+    FractionalKelvinVoigt,
+    HalfSpace,
+    KelvinVoigt,
+    Layer,
+    LayeredMedium,
+    Load,
+    LossFactor,
+    Point,
+    UniformDisc,
+)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.many_radii import components
+from unitcad.attenuation.layered.response import components
 
 RANGE = (
     "moduli, damping and thicknesses of the body and the frequency to either end of their ranges, one kind at a time"

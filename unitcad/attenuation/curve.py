@@ -12,9 +12,8 @@ from scipy import special
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.inputs_seen import inputs_seen
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
-from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.layered.loads import Direction, UniformDisc
 from unitcad.attenuation.layered.response import Response, responses
-from unitcad.attenuation.layered.statics import Direction
 
 EDGE_TO_MM = 30
 DEPTHS_MM = (1.0, 3.0)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
+from unitcad.attenuation.layered import FractionalKelvinVoigt
 from unitcad.catalogue import MaterialEntry, materials
 from unitcad.export.chart import Series, chart
 from unitcad.lab.dynamic import DynamicResult

@@ -1,33 +1,315 @@
-"""A layered half-space and its displacement under a load."""
+"""Viscoelastic laws: how a shear modulus becomes complex at an angular frequency. SI, time factor e^{+i omega t}.
+
+Poisson's ratio stays real, so every modulus of a material carries the same phase. With this time factor a passive
+material has a positive imaginary part.
+
+A layered half-space: its surface compliance per wavenumber, exact from statics to k h = 1e12.
+
+The state below an interface is the plane of all (u, t) that the stack can carry there. It is kept as a pair of 2x2
+blocks (U, T), u = U c, t = T c. It is carried upwards through a thick layer by reflection, R -> E R E, with decaying
+exponentials only, and through one that is thin for a wave by the series of exp(-A h) - 1; before the next such step one
+of the blocks is made the identity: the impedance T U^-1 or the compliance U T^-1, whichever is better conditioned, so
+that neither a clamped nor a free resonance of the lower layers costs digits. The Thomson-Haskell propagator, which
+multiplies growing exponentials, loses all digits where k h is large or omega small.
+
+Time factor e^{+i omega t}; z into the body; u_z with J0(kr), u_r with J1(kr), both k dk; SI throughout.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from numbers import Complex, Real
 from typing import Any
 
-from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.response import Response, respond
-from unitcad.attenuation.layered.stack import HalfSpace, Layer, Stack
+import numpy as np
 
-__all__ = ["HalfSpace", "Layer", "LayeredMedium"]
+from unitcad.attenuation.layered.propagation import (
+    Array,
+    Material,
+    Plane,
+    adjugate,
+    det,
+    parameter,
+    product,
+    raised,
+    shear_compliance,
+    underside,
+)
+from unitcad.errors import Refusal
+
+LEAST, MOST = 1e-60, 1e60
+"""Magnitudes of a quantity in SI units: products of a few of them stay finite."""
 
 
-class LayeredMedium(Stack):
-    """Layers, top first, on a half-space: `LayeredMedium(layers, half_space)`.
+def finite(field: str, value: object, least: float | None = 0.0, above: bool = False) -> float:
+    """Return `value` as a float that is finite and at least (or `above`) `least`. Raises `Refusal` otherwise.
 
-    >>> from unitcad.attenuation import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
-    >>> skin = Layer(thickness=1.5e-3, density=1100, youngs_modulus=130e3, poisson_ratio=0.49, damping=LossFactor(0.14))
-    >>> medium = LayeredMedium([skin], HalfSpace(density=1050, youngs_modulus=12e3, poisson_ratio=0.495))
-    >>> response = medium.response(UniformDisc(3.5e-3), omega=785.0, r=[7e-3, 20e-3], rtol=1e-6)
-    >>> response.u_z.shape
-    (2,)
-    >>> bool(response.error < 1e-6 * abs(response.u_z).max())
-    True
+    With a `least` its magnitude is 0 or from LEAST to MOST.
+    """
+    if isinstance(value, Complex) and not isinstance(value, Real):
+        raise Refusal(field, str(value), "must be a real number")
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise Refusal(field, value, "must be a number") from None
+    if not math.isfinite(number):
+        raise Refusal(field, value, "must be a finite number")
+    if least is not None and (number < least or (above and number == least)):
+        raise Refusal(field, value, f"must be {'above' if above else 'at least'} {least:g}")
+    if least is not None and number != 0.0 and not LEAST <= abs(number) <= MOST:
+        raise out_of_range(field, number)
+    return number
+
+
+def out_of_range(field: str, number: float) -> Refusal:
+    """Return the refusal of a magnitude with which numbers would overflow on the way."""
+    nearest = math.copysign(MOST if abs(number) > 1.0 else LEAST, number)
+    return Refusal(field, number, f"its magnitude must be from {LEAST:g} to {MOST:g}", nearest)
+
+
+@dataclass(frozen=True)
+class KelvinVoigt:
+    """mu + i omega eta, with the shear viscosity eta in Pa s."""
+
+    viscosity: float
+
+    def __post_init__(self) -> None:
+        finite("damping.viscosity", self.viscosity)
+
+    def complex_shear(self, shear_modulus: float, omega: float) -> complex:
+        return complex(shear_modulus, omega * self.viscosity)
+
+
+@dataclass(frozen=True)
+class LossFactor:
+    """mu (1 + i tan delta), the same at every frequency, 0 included."""
+
+    tan_delta: float
+
+    def __post_init__(self) -> None:
+        finite("damping.tan_delta", self.tan_delta)
+
+    def complex_shear(self, shear_modulus: float, omega: float) -> complex:
+        return complex(shear_modulus, shear_modulus * self.tan_delta)
+
+
+@dataclass(frozen=True)
+class FractionalKelvinVoigt:
+    """mu (1 + (i omega tau)^n), tau in seconds, 0 <= n <= 1; n = 1 is Kelvin-Voigt with eta = mu tau."""
+
+    tau: float
+    n: float
+
+    def __post_init__(self) -> None:
+        finite("damping.tau", self.tau)
+        if finite("damping.n", self.n) > 1.0:
+            raise Refusal("damping.n", self.n, "must be at most 1", 1.0)
+
+    def complex_shear(self, shear_modulus: float, omega: float) -> complex:
+        if omega == 0.0:
+            return complex(shear_modulus)
+        return shear_modulus * (1.0 + (1j * omega * self.tau) ** self.n)
+
+
+Damping = KelvinVoigt | LossFactor | FractionalKelvinVoigt | None
+
+
+def complex_shear_modulus(youngs_modulus: float, poisson_ratio: float, damping: Damping, omega: float) -> complex:
+    """Return mu* in Pa from E in Pa, nu and the damping at omega in rad/s: mu = E / (2 (1 + nu))."""
+    shear = youngs_modulus / (2.0 * (1.0 + poisson_ratio))
+    return complex(shear) if damping is None else damping.complex_shear(shear, omega)
+
+
+def compressibility(poisson_ratio: float) -> float:
+    """Return eps = mu / (lambda + 2 mu) = (v_s / v_p)^2 = (1 - 2 nu) / (2 (1 - nu)): 0 where incompressible."""
+    return (1.0 - 2.0 * poisson_ratio) / (2.0 * (1.0 - poisson_ratio))
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A layer: thickness (m), density (kg/m3), Young's modulus (Pa), Poisson's ratio in (-1, 1/2], damping law."""
+
+    thickness: float
+    density: float
+    youngs_modulus: float
+    poisson_ratio: float
+    damping: Damping = None
+
+    def __post_init__(self) -> None:
+        finite("layer.thickness", self.thickness)
+        _check_material("layer", self, above=True)
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """The body under all layers; units as `Layer`. A Young's modulus of 0 means a free underside."""
+
+    density: float
+    youngs_modulus: float
+    poisson_ratio: float
+    damping: Damping = None
+
+    def __post_init__(self) -> None:
+        _check_material("half_space", self, above=False)
+
+
+def _check_material(what: str, body: Layer | HalfSpace, above: bool) -> None:
+    finite(f"{what}.density", body.density)
+    finite(f"{what}.youngs_modulus", body.youngs_modulus, 0.0, above)
+    nu = finite(f"{what}.poisson_ratio", body.poisson_ratio, None)
+    if nu > 0.5:
+        raise Refusal(f"{what}.poisson_ratio", nu, "must be at most 0.5", 0.5)
+    finite(f"{what}.poisson_ratio", nu, -1.0, above=True)
+    if not isinstance(body.damping, Damping):
+        raise Refusal(
+            f"{what}.damping", str(body.damping), "must be a LossFactor, KelvinVoigt, FractionalKelvinVoigt or None"
+        )
+
+
+class Stack:
+    """Layers, top first, on a half-space: its compliance and its transfer to a depth, per wavenumber.
+
+    Raises `Refusal` for what is no `Layer` or no `HalfSpace`.
     """
 
-    def response(self, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
-        """Return the displacement at radii r (m, any shape) and depth z (m) under `load` at omega (rad/s).
+    def __init__(self, layers: Iterable[Layer], half_space: HalfSpace, least_loss: float = 0.0) -> None:
+        entries: list[Any] = list(layers) if isinstance(layers, Iterable) else [layers]
+        for i, layer in enumerate(entries):
+            if not isinstance(layer, Layer):
+                raise Refusal(f"layers.{i}", layer, "must be a Layer")
+        if not isinstance(half_space, HalfSpace):
+            raise Refusal("half_space", str(half_space), "must be a HalfSpace")
+        self.layers: tuple[Layer, ...] = tuple(entries)
+        self.half_space = half_space
+        self.least_loss = least_loss
+        self._last: tuple[float, tuple[Material, ...]] | None = None
+        self._pole: tuple[float, float] | None = None
 
-        In metres per pascal under a `UniformDisc`, per newton under a `Point`; rtol is the wanted error over the
-        largest |u| of all radii. Raises `Refusal` and `UnitcadError` as `unitcad.attenuation.layered.response.respond`.
+    def __repr__(self) -> str:
+        count, thickness = len(self.layers), sum(layer.thickness for layer in self.layers)
+        layers = f"{count} {'layer' if count == 1 else 'layers'}, {1000 * thickness:g} mm, on a " if count else ""
+        return f"{type(self).__name__}({layers}half-space)"
+
+    def compliance(self, k: Any, omega: float) -> Array:
+        """Return surface displacement (u_r, u_z) per surface traction (t_r, t_z), in m/Pa, shape k.shape + (2, 2).
+
+        k: wavenumbers (1/m) with positive real part, real or complex, any shape; omega >= 0 (rad/s). The traction acts
+        on the body in +r and +z, so a positive pressure pushes into it and counts as t_z. Symmetric. Raises `Refusal`
+        for k, for omega and for a body that nothing holds at omega = 0.
         """
-        return respond(self, load, omega, r, z, rtol)
+        k = np.asarray(k, dtype=np.complex128)
+        wrong = k[~((np.abs(k) <= MOST) & (k.real > 0))]
+        if wrong.size:
+            raise Refusal(
+                "k", str(wrong[0]), f"wavenumbers must be finite, at most {MOST:g}, with a positive real part"
+            )
+        top = self.planes(k.ravel(), omega)[0]
+        with np.errstate(divide="ignore", invalid="ignore"):  # infinite at an undamped mode
+            block = product(top.u, adjugate(top.t)) / det(top.t)
+        return np.moveaxis(block, -1, 0).reshape(*k.shape, 2, 2)
+
+    def without_empty_layers(self) -> Stack:
+        """Return the same stack without layers of no thickness, which change nothing."""
+        if all(layer.thickness > 0 for layer in self.layers):
+            return self  # and what it knows of its materials
+        return Stack([layer for layer in self.layers if layer.thickness > 0], self.half_space, self.least_loss)
+
+    def with_loss(self, tan_delta: float) -> Stack:
+        """Return the same stack with at least that loss factor in every body."""
+        return Stack(self.layers, self.half_space, tan_delta)
+
+    def materials(self, omega: float) -> tuple[Material, ...]:
+        """Return the layers' and the half-space's complex moduli at omega. Raises `Refusal` for a static free body."""
+        if self._last is None or self._last[0] != omega:
+            omega = finite("omega", omega)
+            if self.half_space.youngs_modulus == 0.0 and omega == 0.0:
+                raise Refusal("omega", omega, "nothing holds this body: static loads would carry it away")
+            bodies = (*self.layers, self.half_space)
+            self._last = omega, tuple(_material(body, omega, self.least_loss) for body in bodies)
+        return self._last[1]
+
+    def last_pole(self, omega: float) -> float:
+        """Return a wavenumber (1/m) above every pole and branch point: slow surface waves, bending of layers as plates.
+
+        The softest layer bends with what it lies on, not as a plate. Raises as `materials`.
+        """
+        if self._pole is None or self._pole[0] != omega:
+            self._pole = omega, _last_pole(self.layers, self.materials(omega), omega)
+        return self._pole[1]
+
+    def planes(self, k: Array, omega: float, depth: float = 0.0) -> list[Plane]:
+        """Return the stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).
+
+        The cut (in a layer or in the half-space) changes no result.
+        """
+        materials = self.materials(omega)
+        planes = [underside(materials[-1], k)]
+        for kind, h, above in reversed(_cut([layer.thickness for layer in self.layers], depth)):
+            planes.append(raised(materials[kind], h, k, planes[-1], with_bottom=above))
+        return planes[::-1]
+
+    def transfer(self, ways: Sequence[int], k: Array, omega: float, depth: float) -> Array:
+        """Return (u_r, u_z) at `depth` per unit surface traction along r (0) or z (1) of `ways`, shape (2, ways, n)."""
+        planes = self.planes(k, omega, depth)
+        top = planes[0]
+        c = adjugate(top.t)[:, ways] / det(top.t)
+        if depth == 0.0:
+            return product(top.u, c)
+        states = product(top.states, c)
+        materials = self.materials(omega)
+        pieces = _cut([layer.thickness for layer in self.layers], depth)
+        for (plane, below), (kind, _, _) in zip(pairwise(planes), pieces, strict=True):
+            if plane.bottom is None:
+                break
+            states = product(plane.bottom, c)
+            material = materials[kind]
+            stiffness = abs(material.shear) * np.maximum(np.abs(k), abs(material.ks2) ** 0.5)
+            c = parameter(below, states[:2], states[2:], stiffness)
+        return states[:2]
+
+    def shear_transfer(self, k: Array, omega: float, depth: float) -> Array:
+        """Return u_theta at `depth` per surface traction of horizontally polarised shear (m/Pa), shape (n,)."""
+        *layers, base = self.materials(omega)
+        pieces = [
+            ([*layers, base][kind], h, above)
+            for kind, h, above in _cut([layer.thickness for layer in self.layers], depth)
+        ]
+        return shear_compliance(base, pieces, k)
+
+
+def _last_pole(layers: tuple[Layer, ...], materials: tuple[Material, ...], omega: float) -> float:
+    shear = max(abs(m.ks2) ** 0.5 for m in materials)
+    softest = min(abs(m.shear) for m in materials)
+    mass = sum(layer.thickness * layer.density for layer in layers)
+    bending = [
+        (6.0 * mass * omega**2 / ((1.0 + layer.poisson_ratio) * abs(material.shear) * layer.thickness**3)) ** 0.25
+        for layer, material in zip(layers, materials, strict=False)
+        if abs(material.shear) > softest
+    ]
+    floor = min(max(bending, default=0.0), 20.0 * shear)
+    return 1.5 * max(1.5 * shear, floor)
+
+
+def _material(body: Layer | HalfSpace, omega: float, least_loss: float) -> Material:
+    shear = complex_shear_modulus(body.youngs_modulus, body.poisson_ratio, body.damping, omega)
+    shear = complex(shear.real, max(shear.imag, least_loss * shear.real))
+    ks2 = body.density * omega * omega / shear if shear != 0 else 0.0
+    return Material(shear, compressibility(body.poisson_ratio), complex(ks2))
+
+
+def _cut(thicknesses: list[float], depth: float) -> list[tuple[int, float, bool]]:
+    """Cut the stack into pieces, top first: (index of the material, thickness, lies above `depth`)."""
+    pieces: list[tuple[int, float, bool]] = []
+    top = 0.0
+    for i, h in enumerate(thicknesses):
+        if top < depth < top + h:
+            pieces += [(i, depth - top, True), (i, top + h - depth, False)]
+        else:
+            pieces.append((i, h, top + h <= depth))
+        top += h
+    if depth > top:
+        pieces.append((len(thicknesses), depth - top, True))
+    return pieces

@@ -1,4 +1,22 @@
-"""Gauss and Legendre over the panels of a Hankel integral, with a bound of the error of each.
+"""The path of a Hankel integral in panels: rows of (a, b, base, turn), complex.
+
+A panel runs from s = a to b, straight in s. The wavenumber is s itself, or, next to a branch point on the axis,
+base + turn s^2, in which the kernel has no root any more.
+
+Gauss's rule over panels, times all that a kernel meets there: the load's transform and the Bessel functions.
+
+Nothing of it is the medium's: it is kept for the next medium, frequency or tolerance whose path has the same panels.
+
+Detours of the path around single poles that lie on the real axis or next to it.
+
+Where nothing is damped, or only a body that a wave hardly reaches, poles lie on the axis or closer to it than any
+panel. Between two wavenumbers with one such pole the path leaves the axis, over two legs on the pole's other side.
+
+A pole is where the kernel times (t - t_pole) is a polynomial of the panel's t, from -1 to 1, though the kernel is not:
+the last Legendre coefficients of the two agree up to that factor. The side on which it belongs is that of its imaginary
+part, or, where that is lost in rounding, that to which a little more loss moves it.
+
+Gauss and Legendre over the panels of a Hankel integral, with a bound of the error of each.
 
 A panel's kernel is known at a few nodes. Where the Bessel functions swing faster than they can be seen there, the panel
 is cut into pieces, and the kernel's Legendre series is read off at the nodes of each: the kernel, which costs most, is
@@ -7,18 +25,395 @@ sampled as it varies, not as the waves do. What the waves of all pieces come to 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from scipy.special import factorial2
 
-from unitcad.attenuation.layered import waves as w
-from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, poles
-from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.path import NODES
-from unitcad.attenuation.layered.weights import Turns, Weights, closeness, rule, spread, turns, weights
+from unitcad.attenuation.layered.loads import Load, bessel_bounds, bessels, kept
+from unitcad.attenuation.layered.propagation import Array, Material
+
+PHASE = 8.0 * np.pi
+"""Of the fastest Bessel product over one panel."""
+MAX_PANELS = 40_000
+MOST_PIECES = 16
+"""Of a panel beyond all poles, each with waves of that phase."""
+_LEAST_PANELS = 12  # up to the last pole: with fewer, most are cut later, which takes longer
+_BEYOND = 1.2
+"""Of the shortest wave's wavenumber: beyond it there is mostly room for poles, not a pole.
+
+Panels there are as long as a third of the path to the last pole: of 200 random media none takes another round of cuts
+for it at rtol 1e-3, and two at 1e-6.
+"""
+_MAX_HALVINGS = 40
+NODES = 16
+"""Of a panel, but for the first ones of a damped medium."""
+_FEWER = ((0.05, 8), (5e-3, 10))
+"""From which rtol on so many do for those."""
+_DAMPED = 0.1
+"""Loss factor from which on a layer's poles are seen from afar."""
+_STIFF = 100.0
+"""Over the stiffest layer: a half-space whose poles lie next to 0, where panels are short."""
+_ALIKE = 12.0
+"""The last pole over the least wavenumber of a layer: up to that, no panel is longer than what is to be seen on it."""
+_NEAR = 4.0 * PHASE
+"""Up to the last pole: farther out, waves turn so much over a panel that few nodes save no time."""
+_CLOSE = 4
+"""Halvings between the first panel and those beyond the least wavenumber's pole, each a panel."""
+
+
+def wavenumbers(panels: Array, s: Array) -> tuple[Array, Array]:
+    """Return the wavenumbers (1/m) at s, a row a panel, and their slopes over s."""
+    base, turn = panels[:, 2, None], panels[:, 3, None]
+    if not np.any(turn):
+        return s, np.ones_like(s)
+    return np.where(turn == 0, s, base + turn * s * s), np.where(turn == 0, 1.0, 2.0 * turn * s)
+
+
+def first_nodes(rtol: float, end: float, span: float, layers: Sequence[Material], half_space: Material) -> int:
+    """Return how many nodes each panel has at first; end, span: the last pole (1/m), phase per unit wavenumber (m).
+
+    Where all layers are damped, and their waves not too different, the kernel is smooth over each panel, and few nodes
+    show it to a loose rtol.
+    """
+    stiffest = max((abs(m.shear) for m in layers), default=np.inf)
+    bodies = layers if abs(half_space.shear) > _STIFF * stiffest else (*layers, half_space)
+    damped = all(m.shear.imag >= _DAMPED * m.shear.real for m in bodies)
+    if not damped or end * span > _NEAR or end > _ALIKE * min(abs(m.ks2) ** 0.5 for m in bodies):
+        return NODES
+    return next((count for least, count in _FEWER if rtol >= least), NODES)
+
+
+def from_origin(end: float, stop: float, span: float, materials: tuple[Material, ...]) -> Array:
+    """Return the panels from 0 to `stop`, beyond `end` and the first panel; span: phase per unit wavenumber (m).
+
+    They are of one length up to `end`, but longer beyond the waves of all materials. The one at k = 0 is halved towards
+    0 until it is shorter than the least wavenumber of a material: a stiff half-space's branch points and pole lie
+    there, too small a feature for a long panel's last coefficients. Beyond them two of these halves are one panel. No
+    tolerance is in it: panels of a tighter one are to be pieces of those of a looser one.
+    """
+    longest = PHASE / span
+    line = np.linspace(0.0, end, max(_LEAST_PANELS, int(np.ceil(end / longest))) + 1)
+    line = _thinned(line, _BEYOND * max(abs(m.ks2) ** 0.5 for m in materials))
+    line = _continued(line if end > 0 else np.array([0.0, longest / 8.0]), stop, longest)
+    shortest = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
+    if 0.0 < shortest < line[1]:
+        halvings = min(int(np.ceil(np.log2(line[1] / shortest))) + 1, _MAX_HALVINGS)
+        close = np.arange(halvings, max(halvings - _CLOSE, 0), -1)
+        times = np.concatenate([close, np.arange(close[-1] - 2, 0, -2), [0]])
+        line = np.concatenate([[0.0], line[1] * 0.5**times, line[2:]])
+    return _turned(line, _branch_points(materials[-1]), 1.0 / span)
+
+
+def onwards(start: float, stop: float, span: float) -> Array:
+    """Return the panels beyond all poles, from `start` to `stop`."""
+    return _plain(_continued(np.array([start]), stop, PHASE / span))
+
+
+def _thinned(line: np.ndarray, start: float) -> np.ndarray:
+    """Leave out corners from `start` on, so that panels are as long as a third of the line, or the most pieces."""
+    first = int(np.searchsorted(line, start))
+    kept = np.arange(len(line) - 1, first, -min((len(line) - 1) // 3, MOST_PIECES))
+    return np.concatenate([line[: first + 1], line[kept[::-1]]])
+
+
+def _continued(line: np.ndarray, stop: float, longest: float) -> np.ndarray:
+    """Continue the corners to `stop`, each panel as long as its distance from 0, if that is no more than it may be.
+
+    There the kernel varies as slowly as that: what swings faster are the waves alone.
+    """
+    corners = list(line)
+    while corners[-1] < stop and len(corners) < MAX_PANELS:
+        corners.append(min(stop, corners[-1] + min(corners[-1], MOST_PIECES * longest)))
+    return np.array(corners)
+
+
+def _branch_points(half_space: Material) -> list[float]:
+    """Return the branch points on the axis: those of a half-space without damping."""
+    if half_space.shear == 0 or half_space.ks2.imag != 0 or half_space.ks2 == 0:
+        return []
+    ks = half_space.ks2.real**0.5
+    return sorted({k for k in (half_space.eps**0.5 * ks, ks) if k > 0})
+
+
+def _plain(line: np.ndarray) -> Array:
+    panels = np.zeros((len(line) - 1, 4), dtype=np.complex128)
+    panels[:, 0], panels[:, 1] = line[:-1], line[1:]
+    return panels
+
+
+def _turned(line: np.ndarray, branch_points: list[float], longest: float) -> Array:
+    """Return the panels between the corners, those on both sides of each branch point in the square root there."""
+    inside = [k for k in branch_points if k < line[-1]]
+    if not inside:
+        return _plain(line)
+    others = [k for k in line if all(abs(k - one) > 1e-6 * one for one in inside)]
+    line = np.unique([*others, *inside])
+    panels = []
+    for k in inside:
+        i = int(np.searchsorted(line, k))
+        # Half of what lies between two corners is each one's: the next may be a branch point too.
+        low, high = max(k - longest, (line[i - 1] + k) / 2.0), min(k + longest, (k + line[i + 1]) / 2.0)
+        panels += [[(k - low) ** 0.5, 0.0, k, -1.0], [0.0, (high - k) ** 0.5, k, 1.0]]
+        line = np.concatenate([line[:i], [low, k, high], line[i + 1 :]])
+    plain = _plain(line)
+    at = np.isin(plain[:, 0].real, inside) | np.isin(plain[:, 1].real, inside)
+    return np.concatenate([plain[~at], np.array(panels, dtype=np.complex128).reshape(-1, 4)])
+
+
+def halved_towards(panels: Array, at: Array, times: np.ndarray) -> tuple[Array, np.ndarray]:
+    """Cut each panel in two equal ones, and of these the one next to `at` again, so many times in all.
+
+    at: in the panel's t, from -1 to 1, or beyond. Return the pieces, and which panel each is from.
+    """
+    of = np.arange(len(panels))
+    pieces, origin = [panels[:0]], [of[:0]]
+    while len(panels):
+        right = (at.real > 0).astype(int)
+        both = pieced(panels, np.stack([panels[:, 0], panels[:, :2].mean(axis=1), panels[:, 1]], axis=1))
+        near, other = (both[2 * np.arange(len(panels)) + side] for side in (right, 1 - right))
+        again = times > 1
+        pieces += [other, near[~again]]
+        origin += [of, of[~again]]
+        panels, of, times = near[again], of[again], times[again] - 1
+        at = 2.0 * at[again] - np.where(right[again], 1.0, -1.0)
+    return np.concatenate(pieces), np.concatenate(origin)
+
+
+def pieced(panels: Array, corners: Array) -> Array:
+    """Return the pieces of each panel between its corners, shape (panels, pieces + 1)."""
+    pieces = corners.shape[1] - 1
+    ends = np.stack([corners[:, :-1].ravel(), corners[:, 1:].ravel()], axis=1)
+    return np.concatenate([ends, np.repeat(panels[:, 2:], pieces, axis=0)], axis=1)
+
+
+class Rule(NamedTuple):
+    """Gauss's rule of n nodes from -1 to 1.
+
+    to_legendre (n, n): from values at the nodes to coefficients of degrees 0 to n - 1; degrees (n,): of the waves, the
+    least that meets an error of the rule beside each coefficient; odd_factorials: (2m - 1)!! of these.
+    """
+
+    nodes: np.ndarray
+    weights: np.ndarray
+    to_legendre: np.ndarray
+    degrees: np.ndarray
+    odd_factorials: np.ndarray
+
+
+@cache
+def rule(count: int) -> Rule:
+    """Return the rule of `count` nodes."""
+    at, weighing = np.polynomial.legendre.leggauss(count)
+    to_legendre = np.linalg.inv(np.polynomial.legendre.legvander(at, count - 1))
+    degrees = np.arange(2 * count, count, -1)
+    return Rule(at, weighing, to_legendre, degrees, np.array([float(factorial2(2 * m - 1)) for m in degrees]))
+
+
+class Turns(NamedTuple):
+    """How panels lie to the waves, shape (panels,).
+
+    closeness: the wavenumber over half of what a panel covers of it; off_axis: whether it leaves the real axis; pieces:
+    into how many it has to be cut, that the waves turn little enough over each; level: whether none leaves the axis;
+    total: pieces of all.
+    """
+
+    closeness: np.ndarray
+    off_axis: np.ndarray
+    pieces: np.ndarray
+    level: bool
+    total: int
+
+
+class Weights(NamedTuple):
+    """What the kernel at each node is multiplied by, a row an order, shape (orders, panels, nodes, radii).
+
+    values: of each panel's nodes, or of those of each piece; covered (orders, panels, radii): the integral of the
+    absolute waves; swing (panels, degrees) and most (orders, panels, radii): a bound of the rule's error is the sum of
+    the kernel's coefficients times `swing`, times `most`.
+    """
+
+    values: Array
+    covered: np.ndarray
+    swing: np.ndarray
+    most: np.ndarray
+
+
+def nodes(panels: Array, count: int) -> tuple[Array, Array]:
+    """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, count)."""
+    half = (panels[:, 1] - panels[:, 0]) / 2.0
+    return wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * rule(count).nodes)
+
+
+def closeness(panels: Array) -> np.ndarray:
+    """Return the wavenumber over half of what a panel covers of it, shape (panels,)."""
+    ends = wavenumbers(panels, panels[:, :2])[0]
+    return np.abs(ends).max(axis=1) / (np.abs(ends[:, 1] - ends[:, 0]) / 2.0)
+
+
+def _span(load: Load, r: np.ndarray) -> float:
+    return float(r.max()) + load.reach
+
+
+@kept
+def turns(load: Load, r: np.ndarray, panels: Array, phase: float) -> Turns:
+    """Return how panels lie to the waves at radii r (m), shape (n,), which may turn by `phase` over a piece."""
+    slope = wavenumbers(panels, panels[:, :2])[1]
+    turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(load, r)
+    pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
+    off_axis = np.any(panels[:, :2].imag, axis=1)
+    return Turns(closeness(panels), off_axis, pieces, not off_axis.any(), int(pieces.sum()))
+
+
+@kept
+def weights(
+    load: Load,
+    orders: tuple[int, ...],
+    r: np.ndarray,
+    panels: Array,
+    pieces: np.ndarray,
+    count: int,
+    folded: bool,
+) -> Weights:
+    """Return the weights of panels of `count` nodes, all on the axis or all off it, each cut into so many `pieces`.
+
+    At the nodes of a piece the kernel is what its panel's Legendre series says. folded: whether the weights are summed
+    to those of the panel's nodes, which pays where they are kept.
+    """
+    if pieces.sum() == len(panels):
+        return _of_pieces(load, orders, r, panels, count)
+    first = np.cumsum(pieces) - pieces
+    of = np.repeat(np.arange(len(panels)), pieces)
+    place = np.arange(len(of)) - first[of]
+    cut = panels[of]
+    for side in (0, 1):
+        share = (place + side) / pieces[of]
+        cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
+    found = _of_pieces(load, orders, r, cut, count)
+    values = np.empty((len(orders), len(panels), count, r.size)) if folded else found.values
+    swing = np.empty((len(panels), count))
+    for number in np.unique(pieces):
+        at, here = pieces == number, pieces[of] == number
+        onto, restricted = spread(int(number), count)
+        if folded:
+            values[:, at] = onto @ found.values[:, here].reshape(len(orders), -1, number * count, r.size)
+        by_piece = found.swing[here].reshape(-1, number, 1, count)
+        swing[at] = (by_piece @ restricted).max(axis=1)[:, 0]
+    covered, most = (np.add.reduceat(one, first, axis=1) for one in (found.covered, found.most))
+    return Weights(values, covered, swing, most)
+
+
+@lru_cache(maxsize=128)
+def spread(number: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return what leads from a panel of `count` nodes to its equal pieces.
+
+    The matrix from the nodes' values (one more row) to those at the nodes of the pieces, and of each piece one that
+    bounds the coefficients of the kernel there by those of the panel, shape (pieces, count, count).
+    """
+    middles = (2.0 * np.arange(number) + 1.0) / number - 1.0
+    at = (middles[:, None] + rule(count).nodes / number).ravel()
+    degrees = np.polynomial.legendre.legvander(at, count - 1)
+    to_legendre = rule(count).to_legendre
+    return (degrees @ to_legendre).T, np.abs(to_legendre @ degrees.reshape(number, count, count))
+
+
+def _of_pieces(load: Load, orders: tuple[int, ...], r: np.ndarray, panels: Array, count: int) -> Weights:
+    """Return the weights of panels over which the waves turn little.
+
+    The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `load.weight`: their coefficient of degree m is
+    at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
+    meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
+    six halves: there their envelope takes the place of the weight. Off the axis both grow by e^{|Im k| span}.
+    """
+    span = _span(load, r)
+    half = (panels[:, 1] - panels[:, 0]) / 2.0
+    gauss = rule(count)
+    k = nodes(panels, count)[0]
+    if not np.any(panels[:, :2].imag):
+        k, half = k.real, half.real  # Bessel functions of real numbers are cheaper
+    scale = load.transform(k) * (half[:, None] * gauss.weights)
+    values = bessels(orders, k[..., None] * r) * scale[..., None]
+    ends, slope = wavenumbers(panels, panels[:, :2])
+    half = np.abs(half)
+    phi = half * np.abs(slope).max(axis=1) * span
+    swing = phi[:, None] ** gauss.degrees / gauss.odd_factorials
+    swing = swing * (3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span))[:, None]
+    least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
+    at = np.maximum(least, covers) / 2.0
+    envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None]
+    most = np.minimum(envelope * bessel_bounds(orders, at[:, None] * r), load.weight)
+    return Weights(values, np.abs(values).sum(axis=-2), swing, most)
+
+
+_LAST = 4  # coefficients in which a pole is looked for
+_NEXT = 0.05  # imaginary part of t up to which a pole is next to the axis
+_INNER = 0.9  # real part of t up to which a pole is inside the panel
+_HEIGHT = 0.35  # of the legs' corner, over the distance from pole to foot
+HIDDEN = 500.0
+"""The most that another pole under the legs adds to a panel's integral, over the last coefficients and the waves.
+
+Under legs of height 0.35 its part in the last coefficients is at least its residue over 1.36^16 = 142; it adds 2 pi
+residues, and the waves over the panel weigh 2.
+"""
+_SURE = 10.0  # times its uncertainty that an imaginary part must be to count
+_PROBE = 1e-3  # of the panel's half over its wavenumber: the loss that shows where a pole belongs
+LOST = 4e-15
+"""Of a wavenumber: its rounding in the kernel's pole."""
+
+
+class Poles(NamedTuple):
+    """The pole of each panel in its t, shape (n,), how far off it may be, and what of the last coefficients is left.
+
+    rest (rows, n): of the kernel times (t - t_pole).
+    """
+
+    at: Array
+    uncertainty: np.ndarray
+    rest: np.ndarray
+
+
+def poles(kernel: Array, nodes: np.ndarray, to_legendre: np.ndarray, k: np.ndarray) -> Poles:
+    """Return the pole that each panel's kernel, shape (rows, panels, nodes), would have; k: wavenumber over half."""
+    last = to_legendre[-_LAST:].T
+    plain, turned = kernel @ last, (kernel * nodes) @ last
+    size = np.sum(np.abs(plain) ** 2, axis=(0, 2))
+    safe = np.where(size > 0, size, 1.0)
+    at = np.sum(np.conj(plain) * turned, axis=(0, 2)) / safe
+    left = np.abs(turned - at[:, None] * plain)
+    uncertainty = np.sqrt(np.sum(left**2, axis=(0, 2)) / safe) + LOST * k
+    return Poles(np.where(size > 0, at, np.inf), uncertainty, left.sum(axis=-1))
+
+
+def around(
+    panels: Array, found: Poles, longest: float, lossier: Callable[[Array, float], Poles]
+) -> tuple[np.ndarray, Array]:
+    """Return which panels, all on the axis, have a detour, and the five corners of each, shape (m, 5).
+
+    longest: distance from the pole to the legs' feet at most (1/m); lossier(panel, loss) finds the pole of a medium
+    with at least that loss factor in every body.
+    """
+    at = found.at
+    inside = (np.abs(at.real) < _INNER) & (np.abs(at.imag) < _NEXT) & (found.uncertainty < _NEXT)
+    which, corners = np.zeros(len(panels), dtype=bool), []
+    for i in np.flatnonzero(inside):
+        a, b = panels[i, :2].real
+        half, (ends, slope) = (b - a) / 2.0, wavenumbers(panels[i : i + 1], panels[i : i + 1, :2])
+        height = at[i].imag
+        if abs(height) <= _SURE * found.uncertainty[i]:
+            moved = lossier(panels[i], _PROBE * float(np.abs(ends[0, 1] - ends[0, 0]) / np.abs(ends).max()))
+            height = moved.at[0].imag - at[i].imag
+            if not abs(height) > _SURE * max(moved.uncertainty[0], found.uncertainty[i]):
+                continue
+        x = (a + b) / 2.0 + half * at[i].real
+        foot = min(_INNER * abs(half) * (1.0 - abs(at[i].real)), longest / float(np.abs(slope).max()))
+        ahead = np.copysign(foot, half)
+        corners.append([a, x - ahead, x - 1j * np.sign(height) * _HEIGHT * ahead, x + ahead, b])
+        which[i] = True
+    return which, np.array(corners, dtype=np.complex128).reshape(-1, 5)
+
 
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
@@ -48,7 +443,7 @@ class Seen(Protocol):
     def r(self) -> np.ndarray: ...
 
     @property
-    def taken_out(self) -> w.Array:
+    def taken_out(self) -> Array:
         """Return what each row of the kernel is less by, shape (rows,)."""
         ...
 
@@ -59,7 +454,7 @@ class Each(NamedTuple):
     Shape (panels, rows, radii).
     """
 
-    parts: w.Array
+    parts: Array
     covered: np.ndarray
     swing: np.ndarray
 
@@ -82,10 +477,10 @@ class Evaluated:
     what was taken out of each row. What is of each panel is worked out when asked: where no panel is bad, nobody does.
     """
 
-    total: w.Array
+    total: Array
     error: np.ndarray
     size: np.ndarray
-    kernel: w.Array
+    kernel: Array
     closeness: np.ndarray
     peak: np.ndarray
     rest: np.ndarray
@@ -130,17 +525,17 @@ class Evaluated:
         return self.poles.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * self.closeness)
 
 
-def panel_poles(panels: w.Array, kernel: w.Array) -> Poles:
+def panel_poles(panels: Array, kernel: Array) -> Poles:
     """Return the pole that each panel's kernel (with dk/ds), shape (rows, panels, nodes), would have."""
     return _poles(kernel, closeness(panels))
 
 
-def _poles(kernel: w.Array, close: np.ndarray) -> Poles:
+def _poles(kernel: Array, close: np.ndarray) -> Poles:
     gauss = rule(kernel.shape[-1])
     return poles(kernel, gauss.nodes, gauss.to_legendre, close)
 
 
-def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Evaluated:
+def evaluate(seen: Seen, panels: Array, kernel: Array, phase: float) -> Evaluated:
     """Integrate over each panel, on the axis or off it, its kernel (with dk/ds) of shape (rows, panels, nodes).
 
     The rows are those of the first body, of the second one, and so on.
@@ -182,8 +577,8 @@ def _rounding(peak: np.ndarray, close: np.ndarray) -> np.ndarray:
 
 
 def _together(
-    met: Weights, kernel: w.Array, series: np.ndarray, rest_and_peak: np.ndarray
-) -> tuple[w.Array, np.ndarray, np.ndarray]:
+    met: Weights, kernel: Array, series: np.ndarray, rest_and_peak: np.ndarray
+) -> tuple[Array, np.ndarray, np.ndarray]:
     """Return the integral over all panels, a bound of its error and its size if nothing cancelled, (rows, radii).
 
     series (rows, panels, degrees): the kernel's coefficients, absolute; rest_and_peak (2, rows, panels): what they
@@ -197,7 +592,7 @@ def _together(
     return total.reshape(-1, radii), error.reshape(-1, radii), size.reshape(-1, radii)
 
 
-def _integrated(met: Weights, kernel: w.Array, series: np.ndarray, pieces: np.ndarray) -> Each:
+def _integrated(met: Weights, kernel: Array, series: np.ndarray, pieces: np.ndarray) -> Each:
     """Return the integrals over each panel, all on the axis or all off it.
 
     series: coefficients, absolute; pieces (panels,): of each panel, if the weights are not of panels but of pieces.
@@ -213,7 +608,7 @@ def _integrated(met: Weights, kernel: w.Array, series: np.ndarray, pieces: np.nd
     return Each(*(one.reshape(*kernel.shape[:2], -1).swapaxes(0, 1) for one in quantities))
 
 
-def _at_pieces(kernel: w.Array, pieces: np.ndarray) -> w.Array:
+def _at_pieces(kernel: Array, pieces: np.ndarray) -> Array:
     """Return the kernel at the nodes of each panel's pieces, shape (rows, pieces, nodes)."""
     count = kernel.shape[-1]
     values, numbers = np.repeat(kernel, pieces, axis=1), np.repeat(pieces, pieces)
@@ -223,7 +618,7 @@ def _at_pieces(kernel: w.Array, pieces: np.ndarray) -> w.Array:
     return values
 
 
-def _in_chunks(seen: Seen, panels: w.Array, lie: Turns, kernel: w.Array, series: np.ndarray) -> Each:
+def _in_chunks(seen: Seen, panels: Array, lie: Turns, kernel: Array, series: np.ndarray) -> Each:
     """Return the integrals over each panel, some of them at once that are all on the axis or all off it."""
     count = kernel.shape[-1]
     shape = (len(panels), len(kernel), seen.r.size)
@@ -240,7 +635,7 @@ def _in_chunks(seen: Seen, panels: w.Array, lie: Turns, kernel: w.Array, series:
     return sums
 
 
-def products(kernel: w.Array, waves: w.Array) -> w.Array:
+def products(kernel: Array, waves: Array) -> Array:
     """Sum kernel (.., rows, panels, nodes) times waves (rows, panels, nodes, radii); (.., rows, panels, radii).
 
     By products of real matrices with two columns. A matrix by a complex vector starts BLAS's threads for each of them

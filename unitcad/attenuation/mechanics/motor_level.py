@@ -18,7 +18,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from unitcad.attenuation.inputs import EstimateInput, Quantity, body
-from unitcad.attenuation.layered.medium import LayeredMedium
+from unitcad.attenuation.layered.response import LayeredMedium
 from unitcad.attenuation.mechanics.harmonic_mesh import harmonic_mesh
 from unitcad.attenuation.mechanics.harmonic_response import Fields, disc_response, motor_response
 from unitcad.attenuation.mechanics.unit_blocks import medium_blocks, unit_blocks

@@ -11,9 +11,7 @@ import numpy as np
 
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.inputs import TissueLayer, body
-from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered.rheology import LossFactor
+from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.catalogue import Printer, choose, printers, tissue
 from unitcad.errors import Refusal
 from unitcad.estimating import tissue_layer

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 from msgspec import Meta, Struct
 
-from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
+from unitcad.attenuation.layered import FractionalKelvinVoigt
 from unitcad.catalogue import Material, materials
 from unitcad.catalogue import entries as kinds
 from unitcad.errors import Refusal, WrongArgument, unknown_name
