@@ -180,8 +180,8 @@ def test_options_of_the_survey_are_refused_for_a_spec(words: list[str], field: s
 @pytest.mark.parametrize("form", [[], ["--json"]], ids=["text", "json"])
 def test_the_command_shows_every_part(form: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     mesh_row = {"tolerance_mm": 0.1, "distance_mm": None, "triangles": 12, "within_bounds": False}
-    monkeypatch.setattr("unitcad.accuracy.meshes.mesh_rows", lambda *_: [mesh_row])
-    monkeypatch.setattr("unitcad.accuracy.left_out.left_out_rows", lambda spec: [])
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.mesh_rows", lambda *_: [mesh_row])
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.left_out_rows", lambda spec: [])
     done = CliRunner().invoke(app, ["accuracy", "single-embedded", *form])
     assert done.exit_code == 1, done.stderr
     assert "an error exceeds its bound" in done.stderr

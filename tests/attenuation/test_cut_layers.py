@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 import tomli_w
-from unitcad.experiments.lab_file import lab_of_data
 
 from unitcad.attenuation.edge.level import model_block
 from unitcad.attenuation.edge.predictive import predictive_of
@@ -167,6 +166,3 @@ def test_a_search_and_a_fit_refuse_three_layers(tmp_path: Path) -> None:
     (tmp_path / "lab.toml").write_text(tomli_w.dumps(own))
     with pytest.raises(Refusal, match=r"unit\.0 = 'three': can't be fitted: no measured unit"):
         fit_lab(load_fit_lab(str(tmp_path / "lab.toml")))
-    lab = {"units": {"three": {"base": "three-layer"}}, "frequencies_hz": [125.0], "bodies": ["forearm"]}
-    with pytest.raises(Refusal, match=r"units\.three\.layers = 3: no measured unit"):
-        lab_of_data(lab, tmp_path, "lab")

@@ -242,13 +242,13 @@ def test_a_package_of_two_objects(tmp_path: Path) -> None:
     assert data["files"][0]["facts"]["volume_mm3"] == pytest.approx(1000)
 
 
-def test_an_stl_is_judged_without_cad_trimesh_scipy_or_a_parser(tmp_path: Path) -> None:
+def test_an_stl_is_judged_without_cad_trimesh_or_scipy(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(stl(np.concatenate([box(), box(at=(20, 0, 0)), box(at=(0, 20, 0))])))
     code = (
         "import sys\nfrom unitcad.cli import main\nsys.argv = ['unitcad', 'check', 'a.stl']\n"
         "try:\n    main()\nexcept SystemExit as stop:\n    assert stop.code == 0\n"
         "loaded = {m.split('.')[0] for m in sys.modules}\n"
-        "heavy = {'OCP', 'build123d', 'cadquery', 'trimesh', 'scipy', 'typer'} & loaded\n"
+        "heavy = {'OCP', 'build123d', 'cadquery', 'trimesh', 'scipy'} & loaded\n"
         "assert not heavy, heavy"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, timeout=60)

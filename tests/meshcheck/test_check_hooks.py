@@ -228,7 +228,7 @@ def test_the_page_on_ci_names_what_there_is() -> None:
     inputs = re.findall(r"(?m)^  ([\w-]+):$", action[action.index("inputs:") : action.index("runs:")])
     step = page[page.index("you/unitcad@REF  #") : page.index("- uses: github/codeql-action")]
     assert re.findall(r"(?m)^          ([\w-]+):", step) == inputs
-    known = {name for parameter in get_command(app).commands["check"].params for name in parameter.opts}
+    known = {name for parameter in get_command(app).get_command(None, "check").params for name in parameter.opts}
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", page)) <= known
 
 

@@ -12,10 +12,11 @@ import pytest
 import trimesh
 
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_view import patch_glb
 from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.export import glb
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.pipeline.plan import glb_content, patch_glb
+from unitcad.pipeline.plan import glb_content
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, cylinder
 from unitcad.validation import templates

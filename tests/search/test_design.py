@@ -318,7 +318,7 @@ def test_what_was_never_measured_is_said() -> None:
     )
     notes = " | ".join(invert(target, check=False).data["proposals"][0]["relies_on"])
     assert "motor" in notes
-    assert "diameter (not read by crossings)" in notes
+    assert "diameter and walls (not read by crossings)" in notes
     assert "frequency (not read by any model here)" in notes
 
 

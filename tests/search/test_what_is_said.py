@@ -129,8 +129,8 @@ def test_a_proposals_own_spec_is_recognised_and_another_is_not_called_a_proposal
 def test_a_specs_crosstalk_over_its_limit_is_among_the_reasons() -> None:
     """The edge of a wider unit lies nearer to its neighbour's middle."""
     made = _target(crosstalk_ratio_max=0.4, pitch_mm=20)
-    over = [line for line in explain(made, "three-layer")["reasons"] if "crosstalk" in line]
-    ratio = crosstalk_ratio(estimate_input(load("three-layer")), 20e-3).value
+    over = [line for line in explain(made, "motor-10mm")["reasons"] if "crosstalk" in line]
+    ratio = crosstalk_ratio(estimate_input(load("motor-10mm")), 20e-3).value
     assert ratio is not None
     assert over == [f"over a limit: crosstalk ratio {ratio:.3g} of at most 0.4"]
     assert not any("crosstalk" in line for line in explain(made, "encapsulating")["reasons"])
