@@ -93,6 +93,12 @@ def test_an_extreme_design_is_named_with_its_place() -> None:
     assert film["value"] == pytest.approx(1e-5 * VARIANT.frequency.middle / speed)
 
 
+def test_a_body_without_layers_has_no_thinnest_one() -> None:
+    bone = changed_struct(VARIANT, tissue=VARIANT.tissue[-1:])
+    film = next(row for row in extremes(SPEC, bone) if "thinnest layer" in row["what"])
+    assert (film["value"], film["at"], film["extreme"]) == (math.inf, "no layer", False)
+
+
 def test_a_cylinder_is_as_far_off_as_its_area_true_polygon() -> None:
     """Its corners are r (a - 1) outside, which is its bound, and its volume is exact."""
     pytest.importorskip("OCP")

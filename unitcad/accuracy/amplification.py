@@ -75,7 +75,7 @@ def extremes(spec: Spec, variant: EstimateInput) -> list[dict[str, Any]]:
     silicones = {one.material: one.youngs_modulus.middle for one in variant.layers}
     walls = {f"layers.{i}": one.wall_mm for i, one in enumerate(spec.layers)}
     wall, ends_of = min(walls, key=walls.__getitem__), sorted(silicones, key=silicones.__getitem__)
-    low = [min(one, key=one.__getitem__) for one in (loss, free, film, lengths)]
+    low = [min(one, key=one.__getitem__, default="no layer") for one in (loss, free, film, lengths)]
     rows: list[tuple[str, float, str, float, bool]] = [
         (
             "body: modulus, largest over least",
@@ -86,7 +86,7 @@ def extremes(spec: Spec, variant: EstimateInput) -> list[dict[str, Any]]:
         ),
         ("body: least tan delta", loss[low[0]], low[0], 1e-3, False),
         ("body: least 1 - 2 nu", free[low[1]], low[1], 1e-4, False),
-        ("body: thinnest layer / its shear wavelength", film[low[2]] if film else 1.0, low[2], 1e-3, False),
+        ("body: thinnest layer / its shear wavelength", film.get(low[2], math.inf), low[2], 1e-3, False),
         (
             "motor's radius / least shear wavelength",
             variant.motor_diameter / 2 / lengths[low[3]],
