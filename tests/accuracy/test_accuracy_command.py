@@ -17,8 +17,8 @@ from unitcad.accuracy.left_out import left_out_rows
 from unitcad.accuracy.meshes import mesh_rows, tolerances_of
 from unitcad.accuracy.responses import COMPONENTS, REFERENCE, RTOLS, compare, respond, response_rows
 from unitcad.attenuation.inputs import Quantity, body
+from unitcad.attenuation.layered import LayeredMedium
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.medium import LayeredMedium
 from unitcad.attenuation.layered.response import Response
 from unitcad.cli import app
 from unitcad.errors import Refusal
@@ -152,7 +152,7 @@ def test_a_response_off_by_more_than_its_bound_is_exit_code_1(monkeypatch: pytes
         return replace(found, u_z=found.u_z * 1.2) if rtol > REFERENCE else found
 
     monkeypatch.setattr(LayeredMedium, "response", off)
-    monkeypatch.setattr(survey, "survey_specs", lambda *_: {"by_ranges": [], "faults": []})
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.survey_specs", lambda *_: {"by_ranges": [], "faults": []})
     done = CliRunner().invoke(app, ["accuracy", "--media", "1", "--json"])
     assert done.exit_code == 1
     assert json.loads(done.stdout)["media"]["by_rtol"][4]["bounds_broken"] == 1
@@ -163,7 +163,7 @@ def test_a_spec_that_is_neither_built_nor_refused_is_exit_code_1(monkeypatch: py
     found = survey.survey_specs(4, 2, lambda stage: None)
     assert [row["faults"] for row in found["by_ranges"]] == [3, 1]
     assert found["faults"][3] == {"ranges": "extreme", "seed": 200_000, "kind": "crash", "message": "KeyError: 'x'"}
-    monkeypatch.setattr(survey, "survey_media", lambda *_: {"by_rtol": [], "by_class": []})
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.survey_media", lambda *_: {"by_rtol": [], "by_class": []})
     done = CliRunner().invoke(app, ["accuracy", "--specs", "2", "--json"])
     assert done.exit_code == 1
     assert "fault: extreme 0: crash: KeyError: 'x'" in done.stderr

@@ -126,11 +126,13 @@ def test_a_proposals_own_spec_is_recognised_and_another_is_not_called_a_proposal
     assert not any("among the proposals" in line for line in [*lines, *filled])
 
 
-def test_a_specs_crosstalk_over_its_limit_is_among_the_reasons() -> None:
+def test_a_specs_crosstalk_over_its_limit_is_among_the_reasons(tmp_path: Path) -> None:
     """The edge of a wider unit lies nearer to its neighbour's middle."""
     made = _target(crosstalk_ratio_max=0.4, pitch_mm=20)
-    over = [line for line in explain(made, "motor-10mm")["reasons"] if "crosstalk" in line]
-    ratio = crosstalk_ratio(estimate_input(load("motor-10mm")), 20e-3).value
+    wider = load("encapsulating", {"diameter_mm": 17.0})
+    (tmp_path / "wider.toml").write_text(to_toml(wider))
+    over = [line for line in explain(made, str(tmp_path / "wider.toml"))["reasons"] if "crosstalk" in line]
+    ratio = crosstalk_ratio(estimate_input(wider), 20e-3).value
     assert ratio is not None
     assert over == [f"over a limit: crosstalk ratio {ratio:.3g} of at most 0.4"]
     assert not any("crosstalk" in line for line in explain(made, "encapsulating")["reasons"])
