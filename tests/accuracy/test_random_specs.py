@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from benchmarks.accuracy import extremes
 from benchmarks.accuracy.runner import JOURNALS
+from unitcad.accuracy import outcomes
 from unitcad.accuracy.outcomes import (
     BUILT,
     CIRCLE,
@@ -113,12 +114,10 @@ def test_the_docs_have_the_documented_ranges():
 
 
 def test_a_refusal_without_a_field_is_a_fault(monkeypatch):
-    import unitcad.validation
-
     def refuse(data):
         raise Refusal("", 1, "nothing may be")
 
-    monkeypatch.setattr(unitcad.validation, "from_data", refuse)
+    monkeypatch.setattr(outcomes, "from_data", refuse)
     assert build_outcome(seeded_spec(0)).kind not in GOOD
 
 
