@@ -10,7 +10,7 @@ import shlex
 import sys
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib import metadata
 from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
@@ -51,7 +51,7 @@ def install_command(extras: str) -> str:
 
     try:
         source = json.loads(distribution("unitcad").read_text("direct_url.json") or "{}")
-    except (PackageNotFoundError, ValueError):
+    except (metadata.PackageNotFoundError, ValueError):
         source = {}
     url = source.get("url", "")
     local = url.startswith("file:")

@@ -83,7 +83,7 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
         ],
         "paper_beside": _paper_curves(variant, radius, r),
         "surface_m_per_pa": {"u_z_at_the_edge": float(edge)},
-        "error_estimate": axial.error / edge,
+        "error_estimate": rounded_error(axial.error / edge),
         "wavenumbers": axial.wavenumbers,
         "inputs_seen": _inputs_seen(variant),
         "hierarchical_over_control": None,
@@ -186,8 +186,13 @@ def _drive_block(variant: EstimateInput, drive: Drive, found: list[Response], be
             {"z_mm": z, "u": [float(v) for v in _size(one) / edges[0]]} for z, one in zip(DEPTHS_MM, below, strict=True)
         ],
         "m_per_n_at_the_edge": float(edges[0] / disc),
-        "error_estimate": float(np.max(error) / edges[0]),
+        "error_estimate": rounded_error(np.max(error) / edges[0]),
     }
+
+
+def rounded_error(error: float) -> float:
+    """Return an error to three digits: a difference of near-equal numbers has no more that all processors agree on."""
+    return float(f"{error:.3g}")
 
 
 def _over(one: Response, key: str, edge: float) -> list[float]:

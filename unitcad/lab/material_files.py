@@ -100,7 +100,7 @@ def data(
             "warnings": warnings(dynamic),
             "files": [{"name": curve.name, "sha256": curve.sha256}],
         }  # fmt: skip
-    return rounded(found)
+    return rounded(found, 6)
 
 
 def tensile_chart(name: str, result: TensileResult) -> str:

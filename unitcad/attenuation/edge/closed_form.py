@@ -187,9 +187,13 @@ class Constraint:
 
     @property
     def margin(self) -> Any:
-        """By how much it holds, in the unit of both sides; negative where it does not."""
+        """By how much it holds, in the unit of both sides, to the ninth digit of the larger one; negative if it fails.
+
+        Sides that differ by less are equal: what is left of their difference would depend on the processor.
+        """
         with _quiet():
-            return self.left - self.right if self.relation == ">" else self.right - self.left
+            margin = self.left - self.right if self.relation == ">" else self.right - self.left
+            return np.where(np.abs(margin) < 1e-9 * np.maximum(np.abs(self.left), np.abs(self.right)), 0.0, margin)
 
 
 def constraints(units: Units, control: Units) -> list[Constraint]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from unitcad.attenuation.curve import rounded_error
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.inputs import TissueLayer, body
 from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
@@ -26,7 +27,7 @@ POISSON = 0.4999
 THINNER_MM = 0.1
 FARTHEST_MM = 125.0
 """Walls farther from the unit are not looked at: no shipped printer makes such a box."""
-_RTOL = 1e-4
+_RTOL, _DECIMALS = 1e-4, 6
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def _curve(phantom: PhantomTable, stack: LayeredMedium, r_mm: np.ndarray) -> tup
     load = UniformDisc(phantom.motor_diameter_mm / 2e3)
     response = stack.response(load, 2 * math.pi * phantom.frequency_hz, r_mm * 1e-3, rtol=_RTOL)
     u = np.abs(response.u_z)
-    return u[1:] / u[0], float(np.max(response.error_z) / u[-1])
+    return u[1:] / u[0], rounded_error(np.max(response.error_z) / u[-1])
 
 
 def expected(
@@ -125,7 +126,7 @@ def expected(
     for i, layer in enumerate(phantom.layers):
         thickness = [one.thickness_mm - (THINNER_MM if j == i else 0.0) for j, one in enumerate(phantom.layers)]
         cases.append(curve(thickness=thickness))
-        sensitivity[layer.name] = float(cases[-1][-1] / value[-1] - 1)
+        sensitivity[layer.name] = round(float(cases[-1][-1] / value[-1] - 1), _DECIMALS)
     arm, beyond = _curve(phantom, body(forearm), r)[0], distances > 0
     factor = math.exp(float(np.mean(np.abs(np.log(value[beyond] / arm[beyond])))))
     value, low, high, arm = (tuple(one.tolist()) for one in (value, np.min(cases, 0), np.max(cases, 0), arm))

@@ -1,0 +1,84 @@
+"""The same bytes on every processor: OpenBLAS and NumPy take other code on each, and a process may choose it."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+LAB = Path(__file__).parent.parent / "templates" / "lab"
+CODE = """
+import json, sys
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from unitcad.cli import app
+from unitcad.estimating import estimate_spec
+from unitcad.validation import load, templates
+
+lab = Path(sys.argv[1])
+for name in sorted(templates()):
+    Path(f"{name}.json").write_text(json.dumps(estimate_spec(load(name)), indent=1))
+pulls = [str(lab / f"pull-{i}.csv") for i in (1, 2, 3)]
+for words in (
+    ["measure", str(lab / "campaign.toml")],
+    ["material", *pulls, "--name", "blend", "--like", "ecoflex-00-30"],
+    ["phantom", "skin"],
+    ["fit", "synthetic-bench"],
+    ["design", "paper", "--no-check"],
+):
+    done = CliRunner().invoke(app, [*words, "-o", words[0]])
+    assert done.exit_code == 0, done.output
+"""
+
+
+def written(folder: Path, **environment: str) -> tuple[set[str], dict[str, str]]:
+    """Return the code that OpenBLAS took, and the hash of each file that a process with this environment wrote."""
+    folder.mkdir()
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", CODE, str(LAB)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=folder,
+        env={**os.environ, "OPENBLAS_VERBOSE": "2", **environment},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    cores = {line.removeprefix("Core: ") for line in done.stderr.splitlines() if line.startswith("Core: ")}
+    return cores, {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], dict[str, str]]:
+    """What a process writes that takes the code for this very processor."""
+    return written(tmp_path_factory.mktemp("usual") / "out")
+
+
+@pytest.mark.parametrize("core", ["Haswell", "Zen", "SkylakeX", "Prescott"])
+def test_another_core_of_openblas_writes_the_same_bytes(
+    core: str, usual: tuple[set[str], dict[str, str]], tmp_path: Path
+) -> None:
+    cores, files = written(tmp_path / "out", OPENBLAS_CORETYPE=core)
+    if cores == usual[0]:
+        pytest.skip(f"{core} is this processor's own code, or it lacks it")
+    assert files == usual[1]
+
+
+def test_numpy_without_wide_vectors_writes_the_same_bytes(
+    usual: tuple[set[str], dict[str, str]], tmp_path: Path
+) -> None:
+    features = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    if not features:
+        pytest.skip("this processor has no more than NumPy's baseline")
+    _, files = written(tmp_path / "out", NPY_DISABLE_CPU_FEATURES=" ".join(features))
+    assert files == usual[1]
