@@ -50,7 +50,7 @@ def install_command(extras: str) -> str:
     """Return the command that adds extras to this installation, from the folder or address that it came from."""
 
     try:
-        source = json.loads(distribution("unitcad").read_text("direct_url.json") or "{}")
+        source = json.loads(metadata.distribution("unitcad").read_text("direct_url.json") or "{}")
     except (metadata.PackageNotFoundError, ValueError):
         source = {}
     url = source.get("url", "")
