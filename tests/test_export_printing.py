@@ -6,9 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_bodies import all_bodies, cup
 
-from unitcad.errors import UnitcadError
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.export import printing, stl
 from unitcad.kernels.mesh import arrays, realise
+from unitcad.pipeline.write import build
+from unitcad.validation import load
 
 BODIES = {body.name: body for body in all_bodies()}
 
@@ -77,6 +79,34 @@ def test_a_body_thinner_than_single_precision_is_refused():
     vertices, faces = arrays(manifold3d.Manifold.cube((100, 100, 1e-7)))
     with pytest.raises(UnitcadError, match="single precision"):
         printing.print_ready(vertices, faces)
+
+
+EDGE = """
+from unitcad.shape import box, union
+def unit(spec):
+    return union((box(-7, 0, -7, 0, 0, 3), box(0, 7, 0, 7, 0, 3)))
+"""
+EDGE_SPEC = """
+name = "edge"
+design = "edge.py:unit"
+diameter_mm = 20.0
+[[layers]]
+material = "ecoflex-00-30"
+wall_mm = 2.0
+cap_mm = 1.0
+"""
+
+
+@pytest.mark.parametrize("format", ["stl", "3mf", "glb"])
+def test_the_body_and_the_next_step_are_named_if_a_design_has_no_such_mesh(format, tmp_path):
+    """Two boxes touch along an edge: four faces meet there, and no file holds that as a closed surface."""
+    (tmp_path / "edge.py").write_text(EDGE)
+    (tmp_path / "edge.toml").write_text(EDGE_SPEC)
+    spec = load(tmp_path / "edge.toml", {"output.formats": [format]})
+    with pytest.raises(Refusal, match=r"single precision.*; draw them so that parts overlap, or are 0.01 mm") as caught:
+        build(spec, tmp_path / "out", only=("unit",))
+    assert (caught.value.field, caught.value.value) == ("design", "edge.py:unit")
+    assert "layer1: " in str(caught.value)
 
 
 def test_ready_mesh_does_not_depend_on_the_order_of_faces():

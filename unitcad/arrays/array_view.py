@@ -12,7 +12,7 @@ from unitcad.arrays.patch_pictures import laid_elsewhere, taken_apart
 from unitcad.export import glb
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.pipeline.plan import glb_content, glb_part
+from unitcad.pipeline.plan import glb_content, glb_part, joint_glb
 from unitcad.report.html_page import compressed
 from unitcad.shape import union
 from unitcad.shape.body import Body
@@ -59,7 +59,8 @@ def _by_kind(parts: Sequence[PatchPart]) -> list[PatchPart]:
 
 def patch_glb(moulds: MouldSet, parts: Sequence[PatchPart]) -> bytes:
     """Return the GLB of an array's whole patch: the mesh of each distinct body once, a node at each of its places."""
-    return glb.content(
+    return joint_glb(
+        moulds,
         [
             replace(
                 glb_part(moulds, part.body),
@@ -67,7 +68,7 @@ def patch_glb(moulds: MouldSet, parts: Sequence[PatchPart]) -> bytes:
                 places=[glb.Standing(f"{p.name}-{part.body.name}", p.x, p.y, p.angle_deg) for p in part.places],
             )
             for part in parts
-        ]
+        ],
     )
 
 

@@ -19,6 +19,7 @@ from unitcad.checks.check import MouldCheck
 from unitcad.checks.finding import MouldFinding, at_least, at_most
 from unitcad.checks.leaves import thickest_leaf
 from unitcad.designs.rib_leaves import MOST_STRAIN, farthest_push, leaf_mm, leaf_strain
+from unitcad.kernels.sections import thick_parts
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.ribs import SQUARE, ribs
 from unitcad.shape.profile import GRID_PER_MM
@@ -34,8 +35,6 @@ GRID = 3 / GRID_PER_MM
 """What snapping crest and face to the grid may add to the interference or take from it, mm."""
 FARTHEST, NEAR = 4.0, 1e-4
 """How far a play is looked for, and how finely, mm."""
-SLIVER = 1e-5
-"""Area of a patch that is what rounding leaves, mm2."""
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
@@ -91,11 +90,10 @@ def _patches(cup: Manifold, base: Manifold, level: float) -> list[tuple[float, f
     shared, plinth = cup.slice(level) ^ base.slice(level), base.slice(level).bounds()
     middle = np.array([plinth[0] + plinth[2], plinth[1] + plinth[3]]) / 2
     found = []
-    for patch in shared.decompose():
-        if patch.area() > SLIVER:
-            depth, normal = _narrowest(patch)
-            outwards = normal if float(normal @ (_middle(patch) - middle)) > 0 else -normal
-            found.append((depth / SQUARE, math.degrees(math.atan2(outwards[1], outwards[0])) % 360))
+    for patch in thick_parts(shared, GRID):
+        depth, normal = _narrowest(patch)
+        outwards = normal if float(normal @ (_middle(patch) - middle)) > 0 else -normal
+        found.append((depth / SQUARE, math.degrees(math.atan2(outwards[1], outwards[0])) % 360))
     return found
 
 
@@ -134,8 +132,8 @@ def _travel(wall: CrossSection, plinth: CrossSection, way: tuple[int, int]) -> f
     free, meets = 0.0, FARTHEST
     while meets - free > NEAR:
         middle = (free + meets) / 2
-        shared = (wall ^ plinth.translate((middle * way[0], middle * way[1]))).area()
-        free, meets = (free, middle) if shared > SLIVER else (middle, meets)
+        shared = wall ^ plinth.translate((middle * way[0], middle * way[1]))
+        free, meets = (free, middle) if thick_parts(shared, NEAR) else (middle, meets)
     return free
 
 

@@ -22,7 +22,7 @@ from unitcad.checks import overlap
 from unitcad.checks.check import MouldCheck
 from unitcad.checks.finding import MouldFinding, at_most
 from unitcad.geometry.boxes import Frame, boxes_of, frame_of, meeting_between, morton_order
-from unitcad.kernels.mesh import arrays
+from unitcad.kernels.mesh import arrays, thick_pieces
 from unitcad.moulds.cavities import boxes_meet, united
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -32,8 +32,6 @@ BLOCKED = 1e-5
 """Largest area of facing faces, mm2: what rounding leaves of faces that only touch along an edge."""
 LEVEL = 1e-9
 """Heights nearer than this are equal, mm."""
-SLIVER = 1e-4
-"""Volume of silicone that rounding leaves between two parts of it, mm3."""
 _Named = Sequence[tuple[str, Manifold]]
 _BLOCK = 100_000  # pairs of triangles clipped together
 
@@ -63,7 +61,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
                     yield _out_of_order(where, "there is no silicone where this part should be")
                     continue
                 # Silicone bends: what is still there lets a part go.
-                silicone = [("layer", whole)] if whole.volume() > SLIVER else []
+                silicone = [("layer", whole)] if thick_pieces(whole) else []
             elif removal.piece in there:
                 piece = there.pop(removal.piece)
             else:

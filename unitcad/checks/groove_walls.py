@@ -15,8 +15,8 @@ from scipy.spatial import KDTree
 
 from unitcad.checks.check import MouldCheck
 from unitcad.checks.finding import MouldFinding, at_least
-from unitcad.checks.hollows import GRID, SLIVER, hollows, wall_limit
-from unitcad.kernels.mesh import shells
+from unitcad.checks.hollows import GRID, hollows, wall_limit
+from unitcad.kernels.mesh import shells, thick_pieces
 from unitcad.moulds.congruence import Congruence, cropped, once_each, reaching
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
@@ -66,7 +66,7 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
                 beside = [cropped(piece, tiles[i]) for piece in reaching(deep, tiles[i])]
             inside = Manifold.extrude(there.offset(GRID, JoinType.Miter), step.rim - bottom + 2 * GRID)
             others = Manifold.compose(beside) - inside.translate((0, 0, bottom - GRID))
-            whole = [part for part in shells(others) if part.volume() > SLIVER]
+            whole = thick_pieces(others)
             if not whole:
                 return farthest
             others = Manifold.compose(whole).trim_by_plane((0, 0, -1), -top)

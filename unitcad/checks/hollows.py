@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from manifold3d import Manifold
 
-from unitcad.kernels.mesh import shells
+from unitcad.kernels.mesh import thick_pieces
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -12,17 +12,12 @@ from unitcad.shape.profile import GRID_PER_MM
 
 GRID = 3 / GRID_PER_MM
 """What snapping two faces to the grid may take from the wall between them, mm."""
-SLIVER = 1e-4
-"""Volume of a piece that rounding leaves along a face, mm3."""
 
 
 def hollows(moulds: MouldSet, piece: str) -> list[Manifold]:
     """Return what is missing of a piece's convex hull, in connected pieces."""
     solid = moulds.solids[piece]
-    return moulds.once(
-        f"hollows of {piece}",
-        lambda: [piece for piece in shells(solid.hull() - solid) if piece.volume() > SLIVER],
-    )
+    return moulds.once(f"hollows of {piece}", lambda: thick_pieces(solid.hull() - solid))
 
 
 def least_wall(moulds: MouldSet) -> float:

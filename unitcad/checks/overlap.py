@@ -1,6 +1,8 @@
 """C200: no two solids of the unit, of a patch, or of an assembled pour, share volume.
 
-Ribs count as crushed: C220 looks at them. A pocket counts as stretched round its unit: C310 looks at its strain.
+Ribs count as crushed: C220 looks at them. A pocket counts as stretched round its unit: C310 looks at its strain. Films
+of facets are left out of bodies from a file: two facets reach into each other by as much as both lie off the surface
+that they stand for.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from manifold3d import Manifold
 
 from unitcad.checks.check import MouldCheck
 from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.kernels.mesh import thick_pieces
 from unitcad.moulds.congruence import MARGIN, column_round
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -31,9 +34,9 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
 
 
 def _of_all(moulds: MouldSet) -> list[MouldFinding]:
-    volumes = _Volumes()
+    volumes = _Volumes(moulds.facets)
     pours = [*_of_pours(moulds, volumes)]
-    return [*of_unit(moulds, _Volumes(_of_layers(moulds, volumes))), *pours]
+    return [*of_unit(moulds, _of_layers(moulds, volumes)), *pours]
 
 
 def _of_layers(moulds: MouldSet, volumes: _Volumes) -> dict[tuple[str, str], float]:
@@ -45,10 +48,10 @@ def _of_layers(moulds: MouldSet, volumes: _Volumes) -> dict[tuple[str, str], flo
     return {(bodies[a], bodies[b]): volume for (a, b), volume in known if a in bodies and b in bodies}
 
 
-def of_unit(moulds: MouldSet, volumes: _Volumes | None = None) -> list[MouldFinding]:
-    """Look at the unit, or the patch, alone; `volumes` keeps what its pairs share."""
+def of_unit(moulds: MouldSet, known: Mapping[tuple[str, str], float] | None = None) -> list[MouldFinding]:
+    """Look at the unit, or the patch, alone; `known` has volumes that pairs share, by their names."""
     there = [(name, moulds.meshes(shapes)) for name, shapes in moulds.together]
-    return _findings("unit", there, volumes or _Volumes())
+    return _findings("unit", there, _Volumes(moulds.facets, known))
 
 
 _There = Sequence[tuple[str, Sequence[Manifold]]]
@@ -110,24 +113,30 @@ def _findings(where: str, there: _There, volumes: _Volumes) -> list[MouldFinding
     return [f for f in pairs if not f.ok] or sorted(pairs, key=lambda f: -f.value)[:1]
 
 
-def common_volume(one: Manifold, other: Manifold) -> float:
-    """Return the volume that two solids share, mm3.
+def common_volume(one: Manifold, other: Manifold, facets: float = 0.0) -> float:
+    """Return the volume that two solids share, mm3, without films up to `facets` thick.
 
     Where faces coincide the mesh kernel now and then keeps a part that is not shared, in one order of the two alone:
     what is found is found in both orders. `other` is cut first: a cup and then the base take half as long that way.
     """
-    volume = float((other ^ one).volume())
-    return volume if volume <= OVERLAP else min(volume, float((one ^ other).volume()))
+    shared = other ^ one
+    volume = float(shared.volume())
+    if volume <= OVERLAP:
+        return volume
+    if facets:
+        return sum(float(piece.volume()) for piece in thick_pieces(shared, facets))
+    return min(volume, float((one ^ other).volume()))
 
 
 class _Volumes:
     """The volumes that pairs share: a pair that stands together in several pours, or in like places, is cut once.
 
     `alike` has, for small solids of a pour by identity, a value that is the same for those in like surroundings;
-    `known` and `of_names` hold volumes by names.
+    `known` and `of_names` hold volumes by names; films up to `facets` thick, mm, are left out.
     """
 
-    def __init__(self, known: Mapping[tuple[str, str], float] | None = None) -> None:
+    def __init__(self, facets: float, known: Mapping[tuple[str, str], float] | None = None) -> None:
+        self.facets = facets
         self.alike: Mapping[int, Hashable] = {}
         self.of_names = dict(known or {})
         self._of_places: dict[Hashable, float] = {}
@@ -149,13 +158,13 @@ class _Volumes:
         if id(part) not in self.alike:
             part, a, beside, b = beside, b, part, a
         if id(part) not in self.alike:
-            return common_volume(part, beside)
+            return common_volume(part, beside, self.facets)
         # Of the large pieces there is one of each name; a small one is known by its place beside the first.
         own, box = self._box(part), self._box(beside)
         place = tuple(round(y - x, 6) for x, y in zip(own, box, strict=True)) if id(beside) in self.alike else b
         key = self.alike[id(part)], place
         if key not in self._of_places:
-            self._of_places[key] = common_volume(part, beside)
+            self._of_places[key] = common_volume(part, beside, self.facets)
         return self._of_places[key]
 
     def box(self, parts: Sequence[Manifold]) -> np.ndarray:

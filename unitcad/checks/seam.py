@@ -19,7 +19,7 @@ from unitcad.checks.draw import BLOCKED, blocked
 from unitcad.checks.finding import MouldFinding, at_least, at_most
 from unitcad.checks.gap import least_play, too_tight
 from unitcad.checks.overlap import OVERLAP
-from unitcad.kernels.mesh import arrays
+from unitcad.kernels.mesh import arrays, thick_pieces
 from unitcad.moulds.cavities import united
 from unitcad.moulds.dovetails import Split
 from unitcad.moulds.mould_set import MouldSet
@@ -30,8 +30,6 @@ WEEP = 0.01
 """Silicone in the seams of a pour, at most, as a share of its layer (assumed): far less than what is mixed over."""
 GRID = 3 / GRID_PER_MM
 """What snapping two borders to the grid may take from their gap, or add to it, mm."""
-SLIVER = 1e-6
-"""Volume of a piece of a gap that is what rounding leaves, mm3."""
 _Named = tuple[str, Manifold]
 THIN = 1e-3
 """A slice between two heights nearer than this is left out, and what is nearer is touched, mm."""
@@ -133,8 +131,8 @@ def _weep(moulds: MouldSet, step: Step, gaps: list[Manifold]) -> MouldFinding:
     """
     layers = moulds.meshes(step.layer)
     reached = 0.0
-    for part in chain.from_iterable(gap.trim_by_plane((0, 0, -1), -step.rim).decompose() for gap in gaps):
-        if part.volume() > SLIVER and any(part.min_gap(layer, 2 * THIN) < THIN for layer in layers):
+    for part in chain.from_iterable(thick_pieces(gap.trim_by_plane((0, 0, -1), -step.rim), GRID) for gap in gaps):
+        if any(part.min_gap(layer, 2 * THIN) < THIN for layer in layers):
             reached += float(part.volume())
     limit = WEEP * sum(float(layer.volume()) for layer in layers)
     advice = "the seams take silicone that the layer lacks: a deeper sheet, or fewer seams"

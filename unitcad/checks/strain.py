@@ -20,6 +20,7 @@ from unitcad.checks.draw import upright
 from unitcad.checks.finding import MouldFinding, at_most
 from unitcad.designs.stretch import allowed_strain, tail_strain
 from unitcad.kernels.mesh import arrays
+from unitcad.kernels.sections import thick_parts
 from unitcad.moulds.cavities import united
 from unitcad.moulds.congruence import once_each
 from unitcad.moulds.mould_set import MouldSet
@@ -32,8 +33,6 @@ FOOT = 1e-3
 """How far over its lowest point the foot of a part that is peeled off is looked at, mm."""
 TOUCHING = 1e-6
 """Area of silicone over the core, mm2, up to which nothing has to stretch: rounding where walls mate."""
-SLIVER = 1e-3
-"""Area between a section and its hull, mm2, that is no hole: where corners on one line are not quite on it."""
 CAPTIVE = 1e4
 """The strain written where there is no hole at all for what has to pass."""
 
@@ -161,7 +160,7 @@ def peel_strain(body: Manifold, base: Manifold, outline: CrossSection | None = N
         passing = base.trim_by_plane((0, 0, 1), z).project() ^ outline
         if (passing ^ silicone).area() <= TOUCHING:
             continue
-        holes = [part for part in (silicone.hull() - silicone).decompose() if part.area() > SLIVER]
+        holes = thick_parts(silicone.hull() - silicone)
         hole = CrossSection.compose(holes) if holes else CrossSection()
         room = _perimeter(hole.hull())
         needed = _perimeter(CrossSection.batch_hull([hole, passing]))

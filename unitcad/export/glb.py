@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.export.printing import single_precision
+from unitcad.export.printing import TooThin, single_precision
 from unitcad.geometry.arrays import unique_rows
 
 CREASE_DEG = 20.0
@@ -51,7 +51,7 @@ class GlbPart:
 
 
 def content(parts: Sequence[GlbPart]) -> bytes:
-    """Return the bytes of the file. Raises UnitcadError for a mesh that single precision can't hold."""
+    """Return the bytes of the file. Raises TooThin, with a part's name, if single precision can't hold its mesh."""
     buffer = bytearray()
     views: list[dict[str, Any]] = []
     accessors: list[dict[str, Any]] = []
@@ -69,9 +69,11 @@ def content(parts: Sequence[GlbPart]) -> bytes:
 
     meshes, materials, nodes = [], [], []
     for part in parts:
-        vertices, normals, faces = _ready(
-            part.vertices.astype(np.float64).tobytes(), part.faces.astype(np.int64).tobytes()
-        )
+        mesh = part.vertices.astype(np.float64).tobytes(), part.faces.astype(np.int64).tobytes()
+        try:
+            vertices, normals, faces = _ready(*mesh)
+        except TooThin as error:
+            raise TooThin(f"{part.name}: {error}") from None
         wide = len(vertices) > 65535
         corners = faces.ravel().astype("<u4" if wide else "<u2")
         primitive = {

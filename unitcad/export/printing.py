@@ -11,12 +11,16 @@ from unitcad.geometry.arrays import unique_rows
 ROUNDS = 6
 
 
+class TooThin(UnitcadError):
+    """A mesh that single precision can't hold."""
+
+
 def print_ready(vertices: np.ndarray, faces: np.ndarray, upside_down: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Lay a closed mesh (vertices (n, 3) mm, faces (m, 3)) on the bed, rounded to single precision, still closed.
 
     Returns float32 vertices and faces in a canonical order (vertices sorted, each face from its least vertex, faces
-    sorted), every face thicker than single precision resolves at this size. Raises UnitcadError where that is
-    not possible.
+    sorted), every face thicker than single precision resolves at this size. Raises TooThin if that is not
+    possible.
     """
     return single_precision(laid_down(vertices, upside_down), faces)
 
@@ -50,7 +54,8 @@ def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
         rounded = _rounded(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.int64))
         if len(rounded[1]) and _closed(rounded[1]) and _thinnest(*rounded) > step:
             return rounded
-    raise UnitcadError(f"the mesh can't be rounded to single precision: it is thinner than {step:.3g} mm somewhere")
+    where = f"parts of it touch along an edge only, or two faces are nearer than {step:.2g} mm"
+    raise TooThin(f"the mesh can't be rounded to single precision: {where}")
 
 
 def _rounded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

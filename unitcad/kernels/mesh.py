@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import manifold3d
@@ -13,7 +14,7 @@ from manifold3d import CrossSection, Manifold
 from unitcad.errors import UnitcadError
 from unitcad.geometry.components import components
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
-from unitcad.shape.profile import GRID_PER_MM, Profile, points
+from unitcad.shape.profile import FACETS, GRID_PER_MM, Profile, points
 from unitcad.shape.tree import by_quarters
 
 FINEST, COARSEST = 4096, 24
@@ -127,6 +128,29 @@ def shells(solid: Manifold) -> list[Manifold]:
     return found
 
 
+def thick_pieces(solid: Manifold, least: float = FACETS) -> list[Manifold]:
+    """Return the connected pieces of a solid that are thicker than what facets or rounding leave between two faces."""
+    return [piece for piece in shells(solid) if _is_thick(piece, least)]
+
+
+def _is_thick(piece: Manifold, least: float) -> bool:
+    """Tell whether a piece is thicker than `least` somewhere, mm.
+
+    A film's thickness is twice its volume over its area. What films hang on may be thicker than that: then something
+    is left between two copies of the piece, moved apart by `least`, in every direction.
+    """
+    volume = float(piece.volume())
+    if volume <= least**3 or 2 * volume > least * float(piece.surface_area()):
+        return volume > least**3
+    left = piece
+    for way in _WAYS:
+        x, y, z = (least / 2 * way).tolist()
+        left = left ^ piece.translate((x, y, z)) ^ piece.translate((-x, -y, -z))
+        if left.is_empty():
+            return False
+    return True
+
+
 def as_trimesh(solid: Manifold) -> Any:
     """Return the mesh as a trimesh.Trimesh, vertices and faces unchanged: nothing is merged."""
     import trimesh
@@ -140,6 +164,9 @@ def bounds(solid: Manifold) -> tuple[float, ...]:
     return tuple(solid.bounding_box())
 
 
+_WAYS = np.array([way for way in product((-1, 0, 1), repeat=3) if way > (0, 0, 0)], dtype=float)
+_WAYS /= np.linalg.norm(_WAYS, axis=1)[:, None]
+"""Directions from a cube's middle to its faces, edges and corners, one of each two that are opposite."""
 _FEW = 20
 """Shells up to which `decompose` is the quicker way."""
 _PROBE = 1e-4

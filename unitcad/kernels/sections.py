@@ -5,6 +5,7 @@ from __future__ import annotations
 from manifold3d import CrossSection, JoinType
 
 from unitcad.geometry.outline_gaps import between_outlines
+from unitcad.shape.profile import FACETS
 
 FINENESS = 1e-3
 """Accuracy of the widest circle's diameter, mm."""
@@ -29,6 +30,11 @@ def widest(section: CrossSection) -> tuple[float, tuple[float, float]]:
     # Any corner of the last offset lies that deep; the mean of its corners would not, were it a ring.
     corner = min(tuple(map(float, point)) for loop in kept.to_polygons() for point in loop)
     return 2 * low, (corner[0], corner[1])
+
+
+def thick_parts(section: CrossSection, least: float = FACETS) -> list[CrossSection]:
+    """Return the connected parts of a section that are wider than what facets or rounding leave between two faces."""
+    return [part for part in section.decompose() if not part.offset(-least / 2, JoinType.Miter).is_empty()]
 
 
 def gap(one: CrossSection, other: CrossSection, most: float) -> float:

@@ -25,8 +25,8 @@ from unitcad.designs import design_of, dimensions, inserts
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Tooling
 from unitcad.errors import UNIT_ALONE, Refusal
-from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_count
-from unitcad.kernels.sections import gap, widest
+from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_count, thick_pieces
+from unitcad.kernels.sections import gap, thick_parts, widest
 from unitcad.moulds.base import stand
 from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import cup_blank, groove, grooves, recess, skirt_end
@@ -37,8 +37,6 @@ from unitcad.shape import Below, Common, Component, Cut, Shape, box, cut, moved,
 from unitcad.shape.profile import GRID_PER_MM
 from unitcad.spec import Spec
 
-SLIVER = 1e-3
-"""Volume up to which a piece is what rounding leaves between two faces, mm3."""
 FILM = 0.1
 """Area up to which films are left, mm2: they reach less far than the clearance."""
 FLAT = math.ceil(10 * math.sqrt(4 * LEAST_AREA / math.pi)) / 10
@@ -102,10 +100,10 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         grooved.append(bool(overflow))
         bores, holes = in_cells([under]), in_cells(slid)
         cup = cut(blank, [recess(spec, lay), *bores, *holes, *overflow])
-        pieces = _pieces(realise(cup, segments))
-        if len(pieces) > 1:
+        parted = _pieces(realise(cup, segments))
+        if len(parted) > 1:
             cup = Component(cup, (lay.cup[0] - spec.moulds.skirt_wall_mm / 2, 0.0, skirt_end(spec) + LEVEL))
-            for lost in _pieces(Manifold.compose(pieces) - realise(cup, segments) - realise(base, segments)):
+            for lost in _pieces(Manifold.compose(parted) - realise(cup, segments) - realise(base, segments)):
                 raise _refused(spec, i, f"the base goes all round a piece of the cup, {_place(lost)}")
         cups.append(cup)
         # Down into the plinth too: where only faces touch, a way of no width could be left.
@@ -186,26 +184,26 @@ def _standing(
             if i == len(rims) - 1:
                 held.append(above)
                 standing.append(Component(beside, _inside(piece)))
-            elif (above - Manifold.compose(held)).volume() > SLIVER:
+            elif thick_pieces(above - Manifold.compose(held)):
                 why = f"a piece of {_place(above)} stands alone in layer {i + 1}, and a later layer takes its place"
                 raise _refused(spec, i, why)
         needed = realise(Cut(Below(union(cast[: i + 1]), 0.0), tuple(cast[: i + 1])), segments)
         for j in range(i + 1, len(cast)):
             lost = needed ^ solids[j]
-            if lost.volume() > SLIVER:
+            if thick_pieces(lost):
                 why = f"layer {j + 1} lies under layer {i + 1} in a space of {_place(lost)}, where its core would stand"
                 raise _refused(spec, i, why)
     return standing, max([bounds(piece)[5] for piece in held], default=LEVEL)
 
 
 def _pieces(solid: Manifold) -> list[Manifold]:
-    """Return the connected pieces, lowest first, without what rounding leaves."""
-    return sorted((p for p in solid.decompose() if p.volume() > SLIVER), key=bounds)
+    """Return the connected pieces, lowest first, without what facets and rounding leave."""
+    return sorted(thick_pieces(solid), key=bounds)
 
 
 def _stands(piece: Manifold) -> bool:
-    """Tell whether a piece has a foot on the seat; by area, since rounding leaves films without thickness."""
-    return piece.slice(LEVEL / 2).area() > SLIVER
+    """Tell whether a piece has a foot on the seat that is wider than what facets and rounding leave."""
+    return bool(thick_parts(piece.slice(LEVEL / 2)))
 
 
 def _without_films(shape: Shape, segments: int) -> Shape:
@@ -213,10 +211,10 @@ def _without_films(shape: Shape, segments: int) -> Shape:
 
     A film has area and no volume, and faces nowhere upwards: none is under the upward faces.
     """
-    pieces = _pieces(realise(shape, segments))
-    if not pieces:
+    kept = _pieces(realise(shape, segments))
+    if not kept:
         return shape
-    whole = Manifold.compose(pieces)
+    whole = Manifold.compose(kept)
     low, area = bounds(whole)[2], whole.surface_area()
     cleared, least = shape, area - FILM
     for other in (Below(shape, low), Common((shape, Below(shape, low - BEYOND)))):

@@ -21,8 +21,10 @@ from unitcad.moulds.ribs import rib_spaces
 from unitcad.moulds.surroundings import Surroundings, surroundings
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
+from unitcad.shape.profile import FACETS
 from unitcad.spec import Spec, from_json, to_json, with_formats
 from unitcad.spec.asked import CastingTable
+from unitcad.spec.custom_code import is_body_file
 from unitcad.spec.effective import Estimate
 
 _T = TypeVar("_T")
@@ -135,6 +137,15 @@ class MouldSet:
         """Sides of every full turn in this set's meshes: one number, so that mating faces mate."""
 
         return segment_count(self.dimensions.outer_radius, self.spec.output.tolerance_mm)
+
+    @property
+    def facets(self) -> float:
+        """How far this set's facets may lie from what they stand for, mm: 0 if no body is from a file."""
+        if not is_body_file(self.spec.design):
+            return 0.0
+        from unitcad.kernels.bounds import deviation
+
+        return FACETS + max(deviation(body.shape, self.segments) for body in self.unit)
 
     def mesh(self, body: Body) -> Manifold:
         """Return a body's mesh, kept once made."""

@@ -23,9 +23,9 @@ from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.views import picture_path
 from unitcad.casting.written import step_section
 from unitcad.designs import design_of, no_estimate
-from unitcad.errors import UnitcadError, WrongArgument, unknown_name
+from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
 from unitcad.export import glb, stl, svg, threemf
-from unitcad.export.printing import print_ready
+from unitcad.export.printing import TooThin, print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import mould_set
 from unitcad.moulds.mould_set import MouldSet
@@ -35,6 +35,7 @@ from unitcad.shape import Shape, content_hash
 from unitcad.shape.body import Body, copies, part_names
 from unitcad.spec import Spec
 from unitcad.spec.asked import OUTPUTS, Output
+from unitcad.spec.custom_code import is_body_file, is_custom
 
 GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
@@ -204,8 +205,23 @@ def file_stem(body: Body) -> str:
 
 
 def ready(moulds: MouldSet, body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mesh as it is written: its count of faces and both mesh formats come from one rounding."""
-    return _ready(body.shape, moulds.segments, body.upside_down)
+    """Return the mesh as it is written: its count of faces and both mesh formats come from one rounding.
+
+    Raises Refusal, with the body's name, for a mesh that single precision can't hold.
+    """
+    try:
+        return _ready(body.shape, moulds.segments, body.upside_down)
+    except TooThin as error:
+        raise _refused(moulds.spec, f"{body.name}: {error}") from None
+
+
+def _refused(spec: Spec, why: str) -> Refusal:
+    """Return the refusal of a spec for a mesh that single precision can't hold."""
+    if is_custom(spec.design):
+        do = "export the file again" if is_body_file(spec.design) else "draw them"
+        return Refusal("design", spec.design, f"{why}; {do} so that parts overlap, or are 0.01 mm apart")
+    tolerance = spec.output.tolerance_mm
+    return Refusal("output.tolerance_mm", tolerance, f"{why}; other facets may do, of a larger or a smaller tolerance")
 
 
 @lru_cache(maxsize=64)
@@ -237,7 +253,15 @@ def threemf_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
 
 def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
     """Return the GLB of several bodies as assembled; what is cut or bought is in it too."""
-    return glb.content([glb_part(moulds, body) for body in bodies])
+    return joint_glb(moulds, [glb_part(moulds, body) for body in bodies])
+
+
+def joint_glb(moulds: MouldSet, parts: Sequence[glb.GlbPart]) -> bytes:
+    """Return the GLB of several parts. Raises Refusal for a part that is too thin to write."""
+    try:
+        return glb.content(parts)
+    except TooThin as error:
+        raise _refused(moulds.spec, str(error)) from None
 
 
 def glb_part(moulds: MouldSet, body: Body) -> glb.GlbPart:

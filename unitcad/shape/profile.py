@@ -10,6 +10,8 @@ import numpy as np
 
 GRID_PER_MM = 1024
 """Lengths live on a grid of 1/1024 mm: sums and differences are exact in binary, so faces meant to coincide do."""
+FACETS = 0.01
+"""Largest distance of a STEP body's facets from its surface, mm: what is no thicker is left by facets or rounding."""
 
 Vertex = tuple[float, float, float]
 _BLOCK = 256

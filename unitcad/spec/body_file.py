@@ -25,12 +25,10 @@ from unitcad.meshcheck.readers.threemf_package import open_package
 from unitcad.meshcheck.rules import s_scale
 from unitcad.meshcheck.rules.f_file import F011, Deadline, Limits, Unreadable
 from unitcad.shape import Polyhedron
-from unitcad.shape.profile import GRID_PER_MM
+from unitcad.shape.profile import FACETS, GRID_PER_MM
 
 MOST_FACES = 40_000
 """Triangles of all bodies together: what moulds can be made round in a minute or so."""
-TOLERANCE = 0.01
-"""Largest distance of a STEP body's facets from its surface, mm."""
 _HEAD = "unitcad bodies 1"
 _NAME = re.compile(r"layer[1-9][0-9]?|motor|fpcb|[a-z][a-z0-9-]{0,31}")
 _HALF = 0.5 + 1e-6
@@ -68,7 +66,7 @@ def body_text(design: str, path: Path) -> str:
     names = [name for name, _, _ in bodies]
     if not ("layer1" in names and len(set(names)) == len(names) and all(map(_NAME.fullmatch, names))):
         names = [f"layer{i + 1}" for i in range(len(bodies))]
-    lines = [f"{_HEAD}: {path.name}" + (f", facets within {TOLERANCE:g} mm" if _is_step(path) else "")]
+    lines = [f"{_HEAD}: {path.name}" + (f", facets within {FACETS:g} mm" if _is_step(path) else "")]
     for name, (_, vertices, faces) in zip(names, bodies, strict=True):
         solid = _on_grid(design, name, vertices, faces)
         lines.append(" ".join((name, *(base64.b64encode(held).decode() for held in (solid.vertices, solid.faces)))))
@@ -105,7 +103,7 @@ def _bodies(path: Path) -> list[tuple[str, np.ndarray, np.ndarray]]:
     limits = Limits()
     deadline, data = Deadline(limits.seconds), memoryview(path.read_bytes())
     if _is_step(path):
-        return step_bodies(path, TOLERANCE, limits.seconds)
+        return step_bodies(path, FACETS, limits.seconds)
     if readers.kind_of(path.name) == "3mf":
         build = read_build(open_package(data, limits, deadline, strict=False), limits)
         instances = build.instances if build else []

@@ -21,7 +21,7 @@ from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, unit_bodies
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import UnitcadError
-from unitcad.kernels.mesh import realise, segment_count
+from unitcad.kernels.mesh import realise, segment_count, thick_pieces
 from unitcad.moulds.blade import bar
 from unitcad.moulds.cavities import united
 from unitcad.moulds.cuts import seams
@@ -141,8 +141,6 @@ LEAST_WEB = 2.0
 """Silicone between two pockets, at least, mm (assumed): a narrower strip tears as a unit is pushed in."""
 OFF_ROUND = 0.05
 """How far a unit's outline may lie off its disc, mm (assumed): a quarter of the usual hold."""
-SLIVER = 1e-6
-"""Volume that is rounding's, mm3."""
 
 
 def apart(unit: Spec) -> tuple[float, str]:
@@ -180,15 +178,15 @@ def unfit(unit: Spec, sheet: Sheet) -> str:
     disc = f"a pocket holds a disc of diameter_mm = {unit.diameter_mm:g}"
     low, high = made.bounding_box()[2::3]
     beyond = made - realise(cylinder(radius + OFF_ROUND, low - BEYOND, high + BEYOND), segments)
-    if beyond.volume() > SLIVER:
+    if thick_pieces(beyond):
         x0, y0, _, x1, y1, _ = beyond.bounding_box()
         return f"{disc}, and this unit reaches {max(-x0, -y0, x1, y1):.3g} mm from its axis"
     at_sheet = realise(cylinder(radius + OFF_ROUND, sheet.low, sheet.high), segments)
     across = whole.trim_by_plane((0, 0, 1), sheet.low).trim_by_plane((0, 0, -1), -sheet.high) - at_sheet
-    if across.volume() > SLIVER:
+    if thick_pieces(across):
         return f"its circuit or wires leave where the sheet lies, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin"
     edge = ring(radius - OFF_ROUND - sheet.hold_mm, radius - OFF_ROUND, sheet.low, sheet.high)
-    if (realise(edge, segments) - made).volume() > SLIVER:
+    if thick_pieces(realise(edge, segments) - made):
         return f"{disc}; where the sheet lies, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin, this unit is none"
     return ""
 
