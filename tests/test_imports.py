@@ -270,3 +270,17 @@ def test_a_room_can_be_deleted(gone: set[str], tmp_path: Path) -> None:
     run("check", str(built / "moulds"))
     for kind in run("list").split():
         run("list", kind)
+
+
+def test_the_core_needs_no_extra() -> None:
+    """Every public name, and the module of every command, loads without the packages of the extras."""
+    extras = ("build123d", "cadquery", "OCP", "skfem", "threadpoolctl", "libdlf", "pyuff", "nptdms", "h5py", "ezdxf")
+    extras += ("starlette", "uvicorn", "tomlkit", "distributed", "dask", "fsspec", "s3fs", "pyarrow")
+    code = (
+        f"import sys\nfor name in {extras}: sys.modules[name] = None\n"
+        "import unitcad\nfrom unitcad.rooms import commands, load\n"
+        "for name in unitcad.__all__: getattr(unitcad, name)\n"
+        "for command in commands().values(): load(command.run)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -11,7 +11,6 @@ from manifold3d import Manifold
 from unitcad import notebook
 from unitcad.catalogue import materials
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
-from unitcad.kernels import build123d, cadquery
 from unitcad.kernels.mesh import as_trimesh
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import unit_section
@@ -72,11 +71,13 @@ class Variant(MouldSet):
 
     def to_build123d(self) -> Any:
         """Return unit and moulds as a named, coloured build123d Compound, mm. Raises UnitcadError without the extra."""
+        from unitcad.kernels import build123d
 
         return build123d.compound((*self.bodies.values(),))
 
     def to_cadquery(self) -> Any:
         """Return unit and moulds as a named, coloured CadQuery Assembly, mm. Raises UnitcadError without the extra."""
+        from unitcad.kernels import cadquery
 
         return cadquery.assembly((*self.bodies.values(),))
 
