@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.accuracy.timing import interleaved
-from unitcad.kernels import bounds, mesh, occt
+from unitcad.kernels import bounds, mesh
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape
 
@@ -69,6 +69,7 @@ def _realise(shapes: Sequence[Shape], segments: int) -> list[Mesh]:
 
 def _exact(shapes: Sequence[Shape]) -> dict[Shape, tuple[Any, float]]:
     """Return each shape's solid by OCCT, and its volume (mm3)."""
+    from unitcad.kernels import occt
 
     return {s: (solid, occt.measure(solid).volume) for s, solid in zip(shapes, occt.solids(shapes), strict=True)}
 
