@@ -16,6 +16,7 @@ PARTS = ("__init__.py", "errors.py", "text.py", "files.py", "workers.py", "geome
 LIBRARIES = {"numpy", "scipy", "manifold3d", "msgspec", "typing_extensions"}  # the last one if numpy finds it
 CODE = """
 import json, sys
+started = set(sys.modules)  # a .pth file of the environment may load a library before the first line
 from types import SimpleNamespace
 from unitcad.meshcheck import Options, baseline, manifest
 from unitcad.meshcheck.file_checks import check_files
@@ -29,7 +30,7 @@ work = [(path, Options(printer=printer)) for path in sys.argv[1:]]
 reports = list(check_files(work))
 assert list(check_files(work, jobs=2)) == reports
 assert all(render(reports, form) for form in FORMATS)
-loaded = {name: getattr(module, "__file__", None) or "" for name, module in sys.modules.items()}
+loaded = {name: getattr(module, "__file__", None) or "" for name, module in sys.modules.items() if name not in started}
 libraries = {name.partition(".")[0] for name, path in loaded.items() if "site-packages" in path}
 print(json.dumps([[[item.code for item in report.findings] for report in reports], sorted(libraries)]))
 """
