@@ -256,9 +256,7 @@ def test_layer_1_is_taken_out_and_laid_in_before_the_rest_is_injected(made: Proc
     assert made.time_line[-1].name == "motors and circuit in"
     # What is cast flat bonds later.
     assert all(pour.agent == () for pour in made.pours)
-    assert "No release agent on any piece" in next(
-        step.text for step in made.pours[0].steps if step.title == "Cup 1 on"
-    )
+    assert "No release agent" in next(step.text for step in made.pours[0].steps if step.title == "Cup 1 on")
 
 
 def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> None:
@@ -283,7 +281,7 @@ def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> No
 def test_the_syringe_takes_the_whole_mix_and_the_filaments_go_in_before_the_base_stands(made: Procedure) -> None:
     """9.7 ml are mixed for cavities of 6.1 ml: the next syringe that is sold has 10."""
     text = {step.title: step.text for step in made.pours[1].steps}
-    assert text["Draw up"].startswith("Draw all of it into a syringe of 10 ml")
+    assert "into a syringe of 10 ml" in text["Draw up"]
     (syringe,) = [item for item in made.bill if item.item == "syringe"]
     assert syringe.note.startswith("10 ml")
     filament = text["Filament into base 2"]
@@ -314,8 +312,8 @@ def test_fins_of_the_flat_base_are_greased_and_the_curved_base_is_levelled_under
     (length,) = re.findall(r"outermost ([0-9.]+) mm", grease.text)
     assert float(length) == pytest.approx(outer + 1.2)
     (level,) = [step for step in made.pours[1].steps if step.title == "Level base 2"]
-    assert "small spirit level, on lid 2" in level.text
-    assert "less than 5 degrees" in level.text
+    assert "level on lid 2" in level.text
+    assert "within 5 degrees" in level.text
 
 
 def test_resin_prints_as_long_as_the_tallest_piece_takes() -> None:
@@ -328,13 +326,7 @@ def test_resin_prints_as_long_as_the_tallest_piece_takes() -> None:
             heights[tool.name] = float(np.ptp(points[:, 2]))
     assert max(heights, key=lambda name: heights[name]) in ("base2", "lid2")
     minutes = max(heights.values()) / moulds.spec.moulds.layer_mm * RESIN_LAYER_S / 60
-    (said,) = [line for line in printing_of(moulds) if line.startswith("Takes")]
-    hours, rest = divmod(5 * round(minutes / 5), 60)
-    assert said.startswith(f"Takes about {hours} h {rest} min" if hours else f"Takes about {rest} min")
-
-
-def printing_of(moulds: PatchMoulds) -> tuple[str, ...]:
-    return curved_procedure(moulds, [100.0] * 2, 1000.0).printing
+    assert curved_procedure(moulds, [100.0] * 2, 1000.0).printing.minutes == 5 * round(minutes / 5)
 
 
 def test_pockets_are_cast_flat() -> None:

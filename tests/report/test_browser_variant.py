@@ -59,6 +59,7 @@ def test_loads_from_a_file_and_asks_for_nothing(visit: Visit) -> None:
     assert visit.page.inner_text("h1") == "encapsulating"
     heads = visit.page.locator("section > h2").all_inner_texts()
     assert heads == [
+        "Make it",
         "3D",
         "Section",
         "Attenuation estimate",
@@ -308,7 +309,7 @@ def test_the_procedure_is_all_there(visit: Visit, built: Path) -> None:
     items = visit.page.locator("#procedure ol > li").all_inner_texts()
     pours = [step for pour in casting["pours"] for step in pour["steps"]]
     steps = [*casting["preparation"], *pours, *casting["release"], *casting["assembly"]]
-    assert items == [f"{step['title']}. {step['text']}" for step in steps]
+    assert items == [f"{step['title']}. {step['short'] or step['text']}" for step in steps]
     assert "of which" in visit.page.locator("#procedure").inner_text()
     starts = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.start)")
     lengths = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.children.length)")
