@@ -228,7 +228,9 @@ def test_a_batch_keeps_its_cache_within_the_limit(tmp_path: Path, own_cache: Pat
 
 
 def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: Path) -> None:
-    blocks = re.findall(r"^```(\w+)\n(.*?)^```", (DOCS / "batch.md").read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    blocks = re.findall(
+        r"^```(\w+)\n(.*?)^```", (DOCS / "how-to" / "sweep.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
     code = next(text for kind, text in blocks if kind == "python" and "def " in text)
     spec = next(text for kind, text in blocks if kind == "toml" and "dome.py:" in text)
     (tmp_path / "dome.py").write_text(code)
