@@ -1,4 +1,4 @@
-"""docs/tutorials/lab-data.md as a new user follows it, in an empty folder."""
+"""docs/tutorials/lab-data-to-estimate.md as a new user follows it, in an empty folder."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from page_examples import ROOT, run_console
 
-PAGE = ROOT / "docs" / "tutorials" / "lab-data.md"
+PAGE = ROOT / "docs" / "tutorials" / "lab-data-to-estimate.md"
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Run the page in a fresh folder, comparing the output of each command."""
     folder = tmp_path_factory.mktemp("lab")
-    assert run_console(PAGE, folder) == 5
+    assert run_console(PAGE, folder) == 6
     return folder
 
 
