@@ -13,6 +13,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(r"^```(\w+(?: \w+)?)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
+FILE = "# file: "
+
 
 def pages(root: Path = ROOT) -> list[Path]:
     """Return README.md and the pages of docs/ and of its folders."""
@@ -27,29 +29,39 @@ def blocks(page: Path, language: str) -> list[str]:
 def missing(shown: list[str], output: list[str]) -> str | None:
     """Return the first line of `shown` that `output` lacks at its place, or a line that is not shown.
 
-    The line "..." stands for any lines.
+    The line "..." stands for any lines, "..." within a line for any words.
     """
     at, anywhere = 0, False
     for line in shown:
         if line == "...":
             anywhere = True
             continue
-        found = next((i for i in range(at, len(output)) if output[i] == line), None)
+        found = next((i for i in range(at, len(output)) if _fits(line, output[i])), None)
         if found is None or (found > at and not anywhere):
             return line
         at, anywhere = found + 1, False
     return None if anywhere or at == len(output) else output[at]
 
 
+def _fits(shown: str, line: str) -> bool:
+    return re.fullmatch(re.escape(shown).replace(re.escape("..."), ".*"), line) is not None
+
+
 def run_console(page: Path, folder: Path) -> int:
     """Run the commands of a page's console blocks in their order in one folder; return how many ran.
 
+    A block that begins with "# file: NAME" is written as that file first.
     A command that ends in "# exit 2" must exit with 2, others with 0; "# not run: REASON" is left out. Lines below a
     command are its output; if there are none, the output is not compared.
     """
     here, count = Path(sys.executable).parent, 0
     environment = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
-    for part in [part for block in blocks(page, "console") for part in re.split(r"(?m)^\$ ", block)[1:]]:
+    parts: list[str] = []
+    for language, text in BLOCK.findall(page.read_text("utf-8")):
+        parts += re.split(r"(?m)^\$ ", text)[1:] if language == "console" else []
+        if text.startswith(FILE):
+            (folder / text.partition("\n")[0].removeprefix(FILE)).write_text(text, "utf-8")
+    for part in parts:
         line, *shown = part.splitlines()
         if "# not run: " in line:
             continue
