@@ -101,7 +101,7 @@ class LayerTable(Table, frozen=True, kw_only=True):
     wall_mm: Annotated[Thickness, Meta(description="thickness of the layer at the skin")]
     cap_mm: Annotated[
         Thickness | None,
-        Meta(description="thickness of the layer above the motor; encapsulating needs it, embedded refuses it"),
+        Meta(description="thickness of the layer above the motor, for a design that has caps"),
     ] = None
 
 
@@ -224,7 +224,7 @@ class AskedSpec(Table, frozen=True, kw_only=True):
         str, Meta(min_length=1, max_length=120, description="a name of the variant; the result's folder begins with it")
     ]
     design: Annotated[
-        str, Meta(description="embedded, encapsulating, FILE.py:NAME, or a file of bodies (.step, .stl, .3mf)")
+        str, Meta(description="a design (unitcad list designs), FILE.py:NAME, or a file of bodies (.step, .stl, .3mf)")
     ]
     diameter_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM, description="diameter of the unit")]
     motor: MotorTable = MotorTable(part=DEFAULT_MOTOR)
