@@ -1,6 +1,6 @@
-"""The overflow grooves round the bores of a back sheet's cups: rings that stop where a wall would be too thin.
+"""The overflow grooves round the bores of a back sheet's cups: rings that stop before a wall gets too thin.
 
-A groove stops square to its way. So what is left of it is as wide as a groove, and no slit stays between two stops.
+A groove ends square to its way. So its rest has its full width, and no slit stays between two stops.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def stopped_ring(
 ) -> Shape | None:
     """Draw a groove between two radii and two heights (mm), without the sectors that meet a stop; None if all do."""
     inner, outer = radii
-    kept = ~_met(centre, radii, stops)
+    kept = ~_meets(centre, radii, stops)
     least = math.ceil(TURN * (outer - inner) / (2 * math.pi * inner))
     for start, end in _runs(kept):
         if end - start < min(least, TURN):  # shorter than it is wide
@@ -38,8 +38,8 @@ def stopped_ring(
     return moved(cut(ring(inner, outer, low, high), gone), *centre)
 
 
-def _met(centre: Point, radii: tuple[float, float], stops: Sequence[Feature]) -> np.ndarray:
-    """Return which sectors meet a stop (TURN): a point of them lies in it, or all but does."""
+def _meets(centre: Point, radii: tuple[float, float], stops: Sequence[Feature]) -> np.ndarray:
+    """Return which sectors meet a stop (TURN): a point of them is in it, or nearly."""
     angles = (np.arange(TURN) + 0.5) * (2 * math.pi / TURN)
     across = np.linspace(*radii, RINGS)
     slack = math.hypot(radii[1] * math.pi / TURN, (across[1] - across[0]) / 2)
@@ -51,7 +51,7 @@ def _met(centre: Point, radii: tuple[float, float], stops: Sequence[Feature]) ->
             (x0, y0), *_ = corners
             inside = np.hypot(x - x0, y - y0) <= radius + slack
         else:
-            # Counter-clockwise: what is left of every side.
+            # Counter-clockwise: the inside is on the left of every side.
             ends = [*corners[1:], corners[0]]
             beyond = [
                 ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / math.hypot(bx - ax, by - ay)
