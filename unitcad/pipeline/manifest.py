@@ -26,7 +26,7 @@ from unitcad.validation import warnings
 CASTING = ("bom.csv", "casting.json", "casting.md")
 UNCHECKED = "--no-check"
 NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
-NO_KERNEL = "no B-rep kernel is installed for STEP: in a clone, pip install '.[step]'"
+NO_KERNEL = "no B-rep kernel is installed for STEP"
 
 
 class BodyFile(TypedDict):
