@@ -77,7 +77,7 @@ def test_a_piece_goes_on_the_first_plate_with_room() -> None:
 
 
 def test_the_procedure_says_what_is_on_each_plate() -> None:
-    first = " ".join(printing(SETS["split"](), 1000.0))
+    first = " ".join(printing(SETS["split"](), 1000.0).how)
     named = ("moulds/moulds-1.3mf with base piece 1", "moulds/moulds-2.3mf with", "cup 2 piece 2")
     places = [first.index(words) for words in named]
     assert all(one < other for one, other in pairwise(places))

@@ -29,7 +29,7 @@ from unitcad.arrays.tails import CLEAR
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, shipped
 from unitcad.designs.design import Fitting
 from unitcad.designs.limits import filament_groove
-from unitcad.designs.parts import BEYOND
+from unitcad.designs.parts import ADHESIVE, BEYOND, bond
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point, nearer
@@ -712,12 +712,11 @@ def assembly(array: Array) -> tuple[Fitting, ...]:
         "patch on its back, the cavities up."
     )
     lay_in = (
-        "Put a smear of Layer 1's silicone on each pad, where the cap of Layer 1 will touch it (assumed: silicone "
-        "bonds poorly to bare metal and polyimide; a primer or a silicone adhesive holds better). Lay the circuit in "
-        "from the skin's side, motor by motor, its rows in the notches, and push each motor in until its pad lies "
-        "against that cap. The spine lies free between the units. The notches may be filled with the same silicone."
+        f"{bond('each pad', 'the cap of Layer 1')} Lay the circuit in from the skin's side, motor by motor, its rows "
+        "in the notches, and push each motor in until its pad lies against that cap. The spine lies free between the "
+        "units."
     )
-    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, silicone=1, mixed="smear")
+    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, (ADHESIVE,))
 
 
 CONSTRUCTION = Construction(
