@@ -18,6 +18,7 @@ import pytest
 import trimesh
 
 import unitcad
+from tests.sample_bodies import LEADLESS
 from unitcad import cli
 from unitcad.errors import UnitcadError
 from unitcad.kernels import mesh
@@ -187,7 +188,7 @@ def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tm
     ("name", "what"),
     [
         ("single-embedded", "second pour"),
-        ("no-fpcb", "tongue and slot"),
+        (LEADLESS, "tongue and slot"),
         ("embedded", "tongue and slot"),
         ("embedded", "filament stub and hole"),
         ("embedded", "mould checks"),

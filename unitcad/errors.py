@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copyreg
+import importlib.util
 import json
 import math
 import re
@@ -57,6 +58,8 @@ def install_command(extras: str) -> str:
     local = url.startswith("file:")
     folder = Path(url2pathname(urlsplit(url).path)) if local else Path(__file__).parent.parent
     command = [sys.executable, "-m", "pip", "install"]
+    if importlib.util.find_spec("pip") is None:  # an environment made by uv
+        command = ["uv", "pip", "install", "--python", sys.executable]
     if (local or not url) and (folder / "pyproject.toml").is_file():
         if (folder / "constraints.txt").is_file():
             command += ["-c", str(folder / "constraints.txt")]
@@ -64,8 +67,10 @@ def install_command(extras: str) -> str:
         return shlex.join([*command, f"{folder}[{extras}]"])
     if vcs := source.get("vcs_info"):
         return shlex.join([*command, f"unitcad[{extras}] @ {vcs['vcs']}+{url}@{vcs['commit_id']}"])
-    if "archive_info" in source and not local:
+    if "archive_info" in source and (not local or folder.is_file()):
         return shlex.join([*command, f"unitcad[{extras}] @ {url}"])
+    if not url:
+        return shlex.join([*command, f"unitcad[{extras}]"])
     return f"in a clone, {shlex.join([*command, f'.[{extras}]'])}"
 
 

@@ -223,7 +223,7 @@ def test_what_is_not_known_is_asked_for(text, field, tmp_path):
 
 
 def test_the_shipped_campaign_has_the_levels_put_in():
-    """What docs/measuring.md shows: computed recordings, which say so."""
+    """What docs/how-to/measure.md shows: computed recordings, which say so."""
     path = Path(__file__).parents[2] / "templates" / "lab" / "campaign.toml"
     asked = read_campaign(path)
     assert "synthetic" in asked.note
@@ -236,5 +236,5 @@ def test_the_shipped_campaign_has_the_levels_put_in():
 
 
 def test_every_finding_is_on_the_page():
-    page = (Path(__file__).parents[2] / "docs" / "measuring.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "measure.md").read_text("utf-8")
     assert [code for code in RULES if f"| {code} |" not in page] == []

@@ -10,6 +10,7 @@ import pytest
 from faulty_sets import set_of, with_fault
 from manifold3d import Manifold, OpType
 
+from tests.sample_bodies import LEADLESS
 from unitcad.checks import check_moulds, draw, groove_walls
 from unitcad.kernels.mesh import realise, shells
 from unitcad.moulds.congruence import column_round
@@ -18,7 +19,7 @@ from unitcad.shape import Shape, box, cut, union
 
 BED = ("moulds.bed_x_mm=1000", "moulds.bed_y_mm=1000")
 GANGS = [
-    ("no-fpcb", "moulds.cavities=[3,3]"),
+    (LEADLESS, "moulds.cavities=[3,3]"),
     ("encapsulating", "moulds.cavities=[2,3]"),
     ("encapsulating", "moulds.cavities=[2,2]", "moulds.pour=injected"),
     ("embedded", "moulds.cavities=[1,3]", "fpcb.tail=both"),
@@ -64,8 +65,8 @@ def test_a_cell_s_cavity_is_that_of_the_whole_plate(gang: tuple[str, ...]) -> No
     "gang",
     [
         GANGS[0],
-        ("no-fpcb", "moulds.cavities=[4,2]"),
-        pytest.param(("no-fpcb", "moulds.cavities=[6,6]"), marks=pytest.mark.long),
+        (LEADLESS, "moulds.cavities=[4,2]"),
+        pytest.param((LEADLESS, "moulds.cavities=[6,6]"), marks=pytest.mark.long),
     ],
 )
 def test_like_cells_have_the_findings_that_each_has_alone(gang: tuple[str, ...]) -> None:
@@ -77,7 +78,7 @@ def test_like_cells_have_the_findings_that_each_has_alone(gang: tuple[str, ...])
 @pytest.mark.parametrize(
     "gang",
     [
-        pytest.param(("no-fpcb", f"moulds.cavities=[{columns},{rows}]"), marks=[] if cells <= 6 else [pytest.mark.long])
+        pytest.param((LEADLESS, f"moulds.cavities=[{columns},{rows}]"), marks=[] if cells <= 6 else [pytest.mark.long])
         for columns in range(1, 7)
         for rows in range(1, 7)
         if (cells := columns * rows) in (4, 6, 9, 16, 25, 36)
@@ -102,7 +103,7 @@ def test_a_groove_that_joins_its_cells_is_looked_at_cell_by_cell(monkeypatch: py
         return tiles(*given)
 
     monkeypatch.setattr(groove_walls, "_tiles", counted)
-    assert len(list(groove_walls.findings(set_of("no-fpcb", "moulds.cavities=[10,2]", *BED)))) == len(made)
+    assert len(list(groove_walls.findings(set_of(LEADLESS, "moulds.cavities=[10,2]", *BED)))) == len(made)
     assert made == [20] * len(made)
 
 
@@ -135,7 +136,7 @@ FAULTS: list[tuple[str, str, Callable[[Shape], Shape]]] = [
 
 @pytest.mark.parametrize(("code", "tool", "change"), FAULTS)
 def test_a_fault_in_one_cell_is_found_there(code: str, tool: str, change: Callable[[Shape], Shape]) -> None:
-    faulty = with_fault(set_of("no-fpcb", "moulds.cavities=[3,3]"), tool, change)
+    faulty = with_fault(set_of(LEADLESS, "moulds.cavities=[3,3]"), tool, change)
     found = {(f.code, f.where) for f in check_moulds(faulty) if not f.ok}
     alone = {(f.code, f.where) for f in check_moulds(each_cell_alone(faulty)) if not f.ok}
     assert code in {code for code, _ in found}
@@ -146,7 +147,7 @@ def test_a_fault_in_one_cell_is_found_there(code: str, tool: str, change: Callab
 
 def test_of_stubs_that_leave_together_the_one_that_is_caught_is_named() -> None:
     """A piece of the base below the middle stub stops it, and no other."""
-    faulty = with_fault(set_of("no-fpcb", "moulds.cavities=[3,3]"), "base", lambda base: union((base, BELOW)))
+    faulty = with_fault(set_of(LEADLESS, "moulds.cavities=[3,3]"), "base", lambda base: union((base, BELOW)))
     found = [f for f in draw.findings(faulty) if not f.ok]
     assert [f.where for f in found] == ["pour 2: stub5 out against base"]
     radius = faulty.spec.moulds.filament_mm / 2
@@ -156,12 +157,12 @@ def test_of_stubs_that_leave_together_the_one_that_is_caught_is_named() -> None:
 
 def test_a_hundred_cells_have_one_surrounding() -> None:
     """The filaments' ways, which differ from row to row, lie below them; numbers lie beside them."""
-    moulds = set_of("no-fpcb", "moulds.cavities=[10,10]", *BED)
+    moulds = set_of(LEADLESS, "moulds.cavities=[10,10]", *BED)
     assert [len(set(cells)) for cells in moulds.cells] == [1, 1]
 
 
 def test_a_mesh_that_lacks_a_wedge_makes_a_cell_of_its_own() -> None:
-    moulds = set_of("no-fpcb", "moulds.cavities=[3,3]")
+    moulds = set_of(LEADLESS, "moulds.cavities=[3,3]")
     cell = moulds.plan.layout.cells[4]
     wedge = Manifold.cube((0.5, 0.02, 0.5)).translate((cell.x + 4.2, cell.y, 1.0))
     damaged = MouldSet(moulds.spec, replace(moulds.plan))

@@ -11,6 +11,7 @@ import pytest
 from manifold3d import CrossSection, Manifold
 from typer.testing import CliRunner
 
+from tests.sample_bodies import LEADLESS
 from unitcad.casting import coupon
 from unitcad.catalogue import printers
 from unitcad.kernels.mesh import area_true, realise
@@ -76,7 +77,7 @@ def test_its_toml_is_taken_by_a_spec(name: str) -> None:
     assert spec.moulds.plinth_clearance_mm == float(printer.plinth_clearance_mm)
     for fit in coupon.Coupon(printer).fits.values():
         own = tomllib.loads(fit.toml(3))
-        data = {**read("no-fpcb"), "moulds": {"printer": "mine"}, "printers": {"mine": {"like": name, **own}}}
+        data = {**read(LEADLESS), "moulds": {"printer": "mine"}, "printers": {"mine": {"like": name, **own}}}
         assert getattr(from_data(data).moulds, fit.key) == fit.values_mm[3]
 
 
