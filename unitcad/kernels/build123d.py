@@ -47,7 +47,7 @@ def show(assembly: b3d.Compound) -> None:
 
         yacv_server.show(*assembly.children, names=[child.label for child in assembly.children])
     else:
-        raise UnitcadError("no viewer is installed: pip install ocp-vscode or pip install yacv-server")
+        raise UnitcadError("no viewer is installed: install ocp-vscode or yacv-server")
 
 
 def line(start: brep.Point, end: brep.Point) -> b3d.Edge:
