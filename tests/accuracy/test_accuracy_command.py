@@ -137,7 +137,7 @@ def test_a_request_leaves_out_what_it_does_not_ask_for() -> None:
 
 
 def test_an_array_is_measured_as_it_is_cast(monkeypatch: pytest.MonkeyPatch) -> None:
-    pair = ["layout.columns=2", "layout.rows=1"]
+    pair = ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3, 10]"]
     monkeypatch.setattr("unitcad.accuracy.accuracy_command.left_out_rows", lambda subject: [])
     sets = [word for change in pair for word in ("--set", change)]
     done = CliRunner().invoke(app, ["accuracy", "forearm-pockets", *sets, "--json"])

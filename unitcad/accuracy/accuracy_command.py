@@ -50,7 +50,7 @@ _RANGES = ("ranges", "specs", "built", "refused", "faults", "longest_s")
 def accuracy(
     spec: Annotated[
         str | None,
-        typer.Argument(metavar="SPEC", help="Template or TOML file of a unit or an array; default: the survey."),
+        typer.Argument(metavar="SPEC", help="A unit or an array: template or TOML file; default: the survey."),
     ] = None,
     sets: Sets = None,
     media: Annotated[
@@ -65,7 +65,8 @@ def accuracy(
     """Measure the errors of meshes and response, their bounds and what they cost. Exit 1 if an error exceeds its bound.
 
     With SPEC: error against time at five tolerances, the inputs that move the results most, and the parts that a build
-    leaves out. An array's response and inputs are those of its unit. Without SPEC: the bounds of random media, and builds of random specs.
+    leaves out. An array's response and inputs are those of its unit. Without SPEC: the bounds of random media, and
+    builds of random specs.
     """
     if spec is None:
         if sets:
