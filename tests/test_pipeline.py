@@ -275,5 +275,5 @@ def test_few_files_and_frames_lie_between_the_command_and_the_mesh_of_a_cup(monk
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert left.value.code == 0
-    assert len(paths[0]) <= 14
+    assert len(paths[0]) <= 12
     assert len({frame.filename for frame in paths[0]}) <= 8
