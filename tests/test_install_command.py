@@ -6,7 +6,7 @@ import json
 import re
 import shlex
 import sys
-from importlib import metadata
+from importlib import metadata, util
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -48,12 +48,6 @@ def test_an_address_is_installed_from_again(installed_from) -> None:
     assert installed_from(archive)[-1] == "unitcad[lab] @ https://git.example/unitcad-1.whl"
 
 
-def test_a_wheel_on_this_disk_is_installed_from_again(installed_from, tmp_path: Path) -> None:
-    wheel = tmp_path / "unitcad-0.1.0-py3-none-any.whl"
-    wheel.touch()
-    assert installed_from({"url": wheel.as_uri(), "archive_info": {}})[-1] == f"{wheel}[lab]"
-
-
 def test_every_command_to_install_comes_from_the_one_function() -> None:
     """Messages that spell one fail where the package came from elsewhere."""
     package = Path(errors.__file__).parent
@@ -69,3 +63,19 @@ def test_a_folder_that_is_gone_is_a_clone_to_be_found(installed_from, tmp_path: 
     gone = {"url": (tmp_path / "gone").as_uri(), "dir_info": {}}
     assert installed_from(gone)[:3] == ["in", "a", "clone,"]
     assert installed_from(gone)[-1] == ".[lab]"
+
+
+def test_a_wheel_file_is_installed_from_again_while_it_is_there(installed_from, tmp_path: Path) -> None:
+    wheel = tmp_path / "unitcad-1-py3-none-any.whl"
+    wheel.touch()
+    source = {"url": wheel.as_uri(), "archive_info": {}}
+    assert installed_from(source)[-1] == f"unitcad[lab] @ {wheel.as_uri()}"
+    wheel.unlink()
+    assert installed_from(source)[:3] == ["in", "a", "clone,"]
+
+
+def test_an_environment_without_pip_uses_uv(installed_from, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(util, "find_spec", lambda name: None)
+    source = {"url": "https://git.example/unitcad-1.whl", "archive_info": {}}
+    command = ["uv", "pip", "install", "--python", sys.executable]
+    assert installed_from(source) == [*command, "unitcad[lab] @ https://git.example/unitcad-1.whl"]

@@ -120,7 +120,7 @@ def test_a_pitch_out_of_range_is_refused_before_what_follows_from_it(name: str, 
 
 
 def test_the_docs_quote_refusals_as_they_are() -> None:
-    text = " ".join((Path(__file__).parents[2] / "docs" / "arrays.md").read_text("utf-8").split())
+    text = " ".join((Path(__file__).parents[2] / "docs" / "explanation" / "arrays.md").read_text("utf-8").split())
     for name, changes in (("hex-19", {"layout.pitch_mm": 12}), ("sleeve-curved", {"body.radius_mm": 25})):
         assert f"is refused: `{refusal_of(name, changes)}`" in text
 

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from tests.sample_bodies import LEADLESS
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import back_sheet_procedure
 from unitcad.arrays.patch import patch_moulds
@@ -15,7 +16,7 @@ from unitcad.catalogue import materials
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load, warnings
 
-LOOSE = ("no-fpcb", "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]", "motor.fill=false")
+LOOSE = (LEADLESS, "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]", "motor.fill=false")
 
 
 def moulds_of(*source: str) -> MouldSet:
@@ -40,7 +41,7 @@ def test_the_silicone_of_a_filled_ring_is_bought(cells: int) -> None:
     bought = quantities(casting(*LOOSE, gang, "casting.minimum_mix_g=0.1"))
     of_pour = sum(pour.part_a_g for pour in casting(*LOOSE, gang, "casting.minimum_mix_g=0.1").pours)
     grams = cells * (filled - loose) / 1000 * float(materials()["ecoflex-00-10"].density_g_cm3)
-    waste = 1 + load("no-fpcb").casting.waste
+    waste = 1 + load(LEADLESS).casting.waste
     ring = max(grams * waste, 0.1)
     assert bought["ecoflex-00-10 part A"] - of_pour == pytest.approx(ring / 2, rel=1e-4)
     assert bought["petroleum jelly"] == 1
@@ -121,8 +122,8 @@ def test_the_sheet_begins_with_what_to_measure() -> None:
 
 def test_a_cavity_without_a_way_out_for_leads_is_a_warning() -> None:
     leads = ["no way out for the motor's leads: they lie between unit and skin; add a table [wires] or [fpcb]"]
-    assert warnings(load("no-fpcb")) == leads
-    assert warnings(load("no-fpcb", ["wires={ diameter_mm = 0.6 }"])) == []
+    assert warnings(load(LEADLESS)) == leads
+    assert warnings(load(LEADLESS, ["wires={ diameter_mm = 0.6 }"])) == []
     assert warnings(load("encapsulating")) == []
     open_ring = load(LOOSE[0], LOOSE[1:])  # leads leave upwards
     assert leads[0] not in warnings(open_ring)

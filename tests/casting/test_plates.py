@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from tests.sample_bodies import LEADLESS
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.bill import mould_plates
@@ -20,7 +21,7 @@ from unitcad.validation import load
 
 
 def _gang(*settings: str) -> MouldSet:
-    return MouldSet(load("no-fpcb", settings))
+    return MouldSet(load(LEADLESS, settings))
 
 
 SETS = {

@@ -225,7 +225,7 @@ def test_what_is_not_known_is_asked_for(text: str, field: str, tmp_path: Path) -
 
 
 def test_the_shipped_campaign_has_the_levels_put_in() -> None:
-    """What docs/measuring.md shows: computed recordings, which say so."""
+    """What docs/how-to/measure.md shows: computed recordings, which say so."""
     path = Path(__file__).parents[2] / "templates" / "lab" / "campaign.toml"
     asked = read_campaign(path)
     assert "synthetic" in asked.note
@@ -238,5 +238,5 @@ def test_the_shipped_campaign_has_the_levels_put_in() -> None:
 
 
 def test_every_finding_is_on_the_page() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "measuring.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "measure.md").read_text("utf-8")
     assert [code for code in RULES if f"| {code} |" not in page] == []

@@ -14,6 +14,7 @@ import pytest
 from casting_rules import broken_rules
 from faulty_sets import set_of
 
+from tests.sample_bodies import LEADLESS
 from unitcad.casting import figures, pouring, written
 from unitcad.casting import procedure as casting_procedure
 from unitcad.casting.figures import off_grid, unit_heights
@@ -145,7 +146,7 @@ def test_weep_goes_with_the_cube_of_the_clearance() -> None:
     silicone = materials()["ecoflex-00-30"]
     weep = [figures.weep_mm3(m, m.plan.steps[0], silicone) for m in (one, two)]
     assert weep[1] / weep[0] == pytest.approx(8, rel=1e-9)
-    closed = set_of("no-fpcb")
+    closed = set_of(LEADLESS)
     assert figures.weep_mm3(closed, closed.plan.steps[0], silicone) == 0
 
 
@@ -272,7 +273,7 @@ def test_no_tool_of_a_template_is_off_the_grid(name: str, printer: str, more: li
 def test_a_slot_on_the_grid_still_takes_what_leaves(thickness: float, wires: bool, layer: float) -> None:
     """Tail or wires lie inside the slot, which is no lower than printer and clearance ask for."""
     leaves = ["wires={diameter_mm=0.4}"] if wires else ["fpcb={thickness_mm=0.11}"]
-    moulds = set_of("no-fpcb", f"motor.thickness_mm={thickness}", f"moulds.layer_mm={layer}", *leaves)
+    moulds = set_of(LEADLESS, f"motor.thickness_mm={thickness}", f"moulds.layer_mm={layer}", *leaves)
     exit, dims = moulds.dimensions.exit, moulds.dimensions
     assert exit is not None
     low, high = (dims.core_height - 0.5, dims.core_height - 0.1) if wires else (thickness, thickness + 0.11)
@@ -352,7 +353,7 @@ def test_a_unit_weighs_what_one_trimmed_unit_weighs(more: list[str]) -> None:
 def test_a_motor_that_nothing_holds_is_fixed() -> None:
     """An open ring without a pad: silicone round the motor, or motor.fill."""
     ring = "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]"
-    assert "fill the ring of 1 mm" in procedure("no-fpcb", "design=embedded", ring).assembly[-2].text
+    assert "fill the ring of 1 mm" in procedure(LEADLESS, "design=embedded", ring).assembly[-2].text
 
 
 @pytest.mark.parametrize("name", sorted(templates()))

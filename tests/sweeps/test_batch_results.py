@@ -228,19 +228,21 @@ def test_a_batch_keeps_its_cache_within_the_limit(tmp_path: Path, own_cache: Pat
 
 
 def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: Path) -> None:
-    blocks = re.findall(r"^```(\w+)\n(.*?)^```", (DOCS / "batch.md").read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    blocks = re.findall(
+        r"^```(\w+)\n(.*?)^```", (DOCS / "how-to" / "custom-design.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
     code = next(text for kind, text in blocks if kind == "python" and "def " in text)
-    spec = next(text for kind, text in blocks if kind == "toml" and "dome.py:" in text)
-    (tmp_path / "dome.py").write_text(code)
-    (tmp_path / "dome.toml").write_text(spec)
-    done = unitcad("build", tmp_path / "dome.toml", "-o", tmp_path / "out", "--formats", "stl,3mf", "--only", "unit")
+    spec = next(text for kind, text in blocks if kind == "toml" and "tub.py:" in text)
+    (tmp_path / "tub.py").write_text(code)
+    (tmp_path / "tub.toml").write_text(spec)
+    done = unitcad("build", tmp_path / "tub.toml", "-o", tmp_path / "out", "--formats", "stl,3mf", "--only", "unit")
     assert done.returncode == 0, done.stderr
     folder = Path(done.stdout.splitlines()[-1])
     manifest = json.loads((folder / "manifest.json").read_text())
     assert [part["name"] for part in manifest["parts"]] == ["layer1", "motor"]
     assert manifest["check"]["errors"] == 0
     assert {left["what"] for left in manifest["left_out"]} >= {"moulds", "casting", "estimate"}
-    (tmp_path / "dome.py").unlink()
+    (tmp_path / "tub.py").unlink()
     again = [folder / "spec.toml", "-o", tmp_path / "out", "--formats", "stl,3mf", "--only", "unit"]
     refused = unitcad("build", *again)
     assert refused.returncode == 2

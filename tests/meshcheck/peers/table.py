@@ -1,4 +1,4 @@
-"""docs/check-peers.md: our verdicts, computed now, beside the frozen ones. `python table.py` writes it."""
+"""docs/evidence/check-peers.md: our verdicts, computed now, beside the frozen ones. `python table.py` writes it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from unitcad.meshcheck import FileReport, Options, check_file
 
 HERE = Path(__file__).parent
 CORPUS = HERE.parent.parent / "corpus"
-PAGE = HERE.parent.parent.parent / "docs" / "check-peers.md"
+PAGE = HERE.parent.parent.parent / "docs" / "evidence" / "check-peers.md"
 PEERS = ("trimesh", "admesh", "lib3mf", "PrusaSlicer")
 ASCII = "lib3mf reads binary STL only."
 ZEROS = "admesh recomputes every normal, since the stored ones are no unit vectors; the vertices stay."
