@@ -36,68 +36,73 @@ SkippedLines = Annotated[int, Meta(ge=0, le=100000)]
 
 
 class SensorTable(Table, frozen=True, kw_only=True):
-    """Quantity and unit of the samples after `scale`, which is that unit per `per`, the unit in the file."""
+    """The sensor, and how its samples become the quantity."""
 
-    quantity: Quantity
-    unit: Name
-    scale: Positive = 1.0
-    per: Annotated[
-        Name | None, Meta(description="unit in the files that scale is per; V, or none given, if left out")
+    quantity: Annotated[Quantity, Meta(description="quantity that the sensor measures")]
+    unit: Annotated[Name, Meta(description="unit of the samples after scale, such as mm/s")]
+    scale: Annotated[Positive, Meta(description="unit per volt, or per the unit in per")] = 1.0
+    per: Annotated[Name | None, Meta(description="unit of the numbers in the files; default: V, or no unit")] = None
+    full_scale: Annotated[
+        Positive | None,
+        Meta(
+            description="largest value that the sensor gives, in unit; default: unitcad finds clipping in the samples"
+        ),
     ] = None
-    full_scale: Annotated[Positive | None, Meta(description="largest value that the sensor gives, in unit")] = None
 
 
 class OwnRecordingTable(Table, frozen=True, kw_only=True):
-    """How some of the records are read: names, or patterns such as "motor-*.mat", and what is their own."""
+    """Settings of some records; they override [recording]."""
 
-    records: Records
-    rate_hz: Rate | None = None
-    channel: Column | None = None
-    motor_channel: Column | None = None
-    time_column: Column | None = None
-    time_unit: TimeUnit | None = None
-    delimiter: Delimiter | None = None
-    decimal: DecimalSign | None = None
-    skip_lines: SkippedLines | None = None
+    records: Annotated[Records, Meta(description="names of records, or patterns such as motor-*.mat")]
+    rate_hz: Annotated[Rate | None, Meta(description="samples per second")] = None
+    channel: Annotated[Column | None, Meta(description="the unit's channel: a name, or a number from 1")] = None
+    motor_channel: Annotated[Column | None, Meta(description="the motor's channel")] = None
+    time_column: Annotated[Column | None, Meta(description="column of the time")] = None
+    time_unit: Annotated[TimeUnit | None, Meta(description="unit of the time column")] = None
+    delimiter: Annotated[Delimiter | None, Meta(description="sign between two columns")] = None
+    decimal: Annotated[DecimalSign | None, Meta(description="decimal sign")] = None
+    skip_lines: Annotated[SkippedLines | None, Meta(description="lines to skip at the beginning")] = None
 
 
 class RecordingTable(Table, frozen=True, kw_only=True):
-    """How the files are read, where they don't say it themselves; `own` has other values for some of them."""
+    """Settings of all records, for what their files do not state."""
 
-    rate_hz: Rate | None = None
-    channel: Column | None = None
-    motor_channel: Annotated[Column | None, Meta(description="the motor, recorded at the same time")] = None
-    time_column: Column | None = None
-    time_unit: TimeUnit | None = None
-    delimiter: Delimiter = ""
-    decimal: DecimalSign = ""
-    skip_lines: SkippedLines = 0
+    rate_hz: Annotated[Rate | None, Meta(description="samples per second, if the files do not state it")] = None
+    channel: Annotated[Column | None, Meta(description="the unit's channel: a name, or a number from 1")] = None
+    motor_channel: Annotated[Column | None, Meta(description="the motor's channel, recorded at the same time")] = None
+    time_column: Annotated[Column | None, Meta(description="column of the time")] = None
+    time_unit: Annotated[TimeUnit | None, Meta(description="unit of the time column")] = None
+    delimiter: Annotated[Delimiter, Meta(description="sign between two columns; default: found in the file")] = ""
+    decimal: Annotated[DecimalSign, Meta(description="decimal sign; default: found in the file")] = ""
+    skip_lines: Annotated[SkippedLines, Meta(description="lines to skip at the beginning of each file")] = 0
     own: Annotated[tuple[OwnRecordingTable, ...], Meta(max_length=100)] = ()
 
 
 class BlankTable(Table, frozen=True, kw_only=True):
-    """Records with the motor off: they tell the mains. Where they have a motor's channel, they tell its mains too."""
+    """Records with the motor off. They show the mains of the sensor."""
 
-    records: Records
-    motor_records: Annotated[Records, Meta(description="motor off, by the motor_sensor where it records alone")] = ()
+    records: Annotated[Records, Meta(description="records with the motor off")]
+    motor_records: Annotated[
+        Records, Meta(description="records with the motor off by motor_sensor, if that sensor records alone")
+    ] = ()
 
 
 class PointTable(Table, frozen=True, kw_only=True):
     """Records at a distance from the unit's edge along the skin."""
 
-    distance_mm: Annotated[float, Meta(ge=0.01, le=1000)]
-    records: Records
+    distance_mm: Annotated[float, Meta(ge=0.01, le=1000, description="distance from the unit's edge along the skin")]
+    records: Annotated[Records, Meta(description="records at this point")]
 
 
 class UnitTable(Table, frozen=True, kw_only=True):
     """One unit: its spec or the record of its casting, and its records."""
 
-    name: Name
-    spec: Name | None = None
-    cast: Name | None = None
-    cavity: Cavity | None = None
-    reference: Annotated[Records, Meta(description="the motor alone, where no channel has it")] = ()
-    edge: Records = ()
+    name: Annotated[Name, Meta(description="a name of the unit")]
+    spec: Annotated[Name | None, Meta(description="spec file or template of the unit")] = None
+    cast: Annotated[Name | None, Meta(description="cast record of the unit, in place of spec")] = None
+    cavity: Annotated[Cavity | None, Meta(description="cavity of the cast record")] = None
+    reference: Annotated[Records, Meta(description="records of the motor alone, without motor_channel")] = ()
+    edge: Annotated[Records, Meta(description="records at the unit's edge")] = ()
     lines: Annotated[int, Meta(ge=1, description="only 1: one motor runs at a time")] = 1
     point: tuple[PointTable, ...] = ()
 
@@ -105,8 +110,8 @@ class UnitTable(Table, frozen=True, kw_only=True):
 class Campaign(Table, frozen=True, kw_only=True):
     """A campaign: one sensor, units with their records."""
 
-    name: Name
-    note: Annotated[str, Meta(max_length=1000)] = ""
+    name: Annotated[Name, Meta(description="a name of the campaign")]
+    note: Annotated[str, Meta(max_length=1000, description="a remark for the results")] = ""
     sensor: SensorTable
     recording: RecordingTable = RecordingTable()
     motor_sensor: SensorTable | None = None

@@ -51,32 +51,41 @@ class LevelTable(Table, frozen=True, kw_only=True):
     """A level and its 95 % interval."""
 
     value: LevelValue
-    low: LevelValue | None = None
-    high: LevelValue | None = None
+    low: Annotated[LevelValue | None, Meta(description="lower end of the 95 % interval")] = None
+    high: Annotated[LevelValue | None, Meta(description="upper end of the 95 % interval")] = None
 
 
 class FitUnitTable(Table, frozen=True, kw_only=True):
-    """A measured unit: its spec with changes, or the record of its casting; its level, or the file that has it."""
+    """One measured unit: its spec or cast record, and its level or the file with the level."""
 
-    name: Name
-    spec: str | None = None
-    cast: str | None = None
-    cavity: Cavity | None = None
-    set: dict[str, Any] = field(default_factory=dict)
-    frequency_hz: Frequency | None = None
+    name: Annotated[Name, Meta(description="a name of the unit")]
+    spec: Annotated[str | None, Meta(description="spec file or template of the unit")] = None
+    cast: Annotated[str | None, Meta(description="cast record of the unit, in place of spec")] = None
+    cavity: Annotated[Cavity | None, Meta(description="cavity of the cast record")] = None
+    set: Annotated[dict[str, Any], Meta(description="values of the spec to change, by path")] = field(
+        default_factory=dict
+    )
+    frequency_hz: Annotated[Frequency | None, Meta(description="frequency of the measurement; default: the spec's")] = (
+        None
+    )
     level: LevelTable | None = None
-    measured: str | None = None
+    measured: Annotated[str | None, Meta(description="measured.toml of unitcad measure, in place of level")] = None
 
 
 class FitLabFile(Table, frozen=True, kw_only=True):
-    """A lab's measured units as typed."""
+    """A lab's measured units."""
 
-    name: Name
-    note: Annotated[str, Meta(max_length=1000)] = ""
-    moduli: Literal["dynamic", "quasi-static"] = "dynamic"
-    with_paper: Annotated[bool, Meta(description="the paper's nine units beside the lab's own")] = True
+    name: Annotated[Name, Meta(description="a name of the lab")]
+    note: Annotated[str, Meta(max_length=1000, description="a remark for the results")] = ""
+    moduli: Annotated[
+        Literal["dynamic", "quasi-static"],
+        Meta(description="moduli of the silicones: at the motor's frequency, or of a slow pull"),
+    ] = "dynamic"
+    with_paper: Annotated[
+        bool, Meta(description="whether the paper's nine units count in addition to the lab's own")
+    ] = True
     between_labs: Annotated[
-        float, Meta(ge=0, le=100, description="scatter of a constant between labs over that between units")
+        float, Meta(ge=0, le=100, description="scatter of a constant between labs, over that between units")
     ] = BETWEEN_LABS
     materials: dict[str, MaterialEntry] = field(default_factory=dict)
     unit: Annotated[tuple[FitUnitTable, ...], Meta(min_length=1, max_length=1000)]

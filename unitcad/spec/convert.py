@@ -186,7 +186,7 @@ def _name(plain: type, kind: Any) -> str:
 def _list_of(kind: Any) -> str:
     """Say what a list holds, by an example where its entries are short."""
     entry = entry_in(kind)
-    if meaning(kind) and not _words(entry):
+    if meaning(kind) and _plain_kinds(entry) & {list, dict}:
         return f": {meaning(kind)}"
     if table_in(entry):
         return f", each entry {_name(dict, entry)}"
@@ -211,7 +211,7 @@ def _needs(kind: Any) -> str:
     """Say what an empty text, list or table must hold."""
     entry = named_in(kind) or entry_in(kind)
     words = f"one or more of {', '.join(_words(entry))}" if entry and _words(entry) else ""
-    needed = meaning(kind) or words or ("one entry or more" if entry else "one character or more")
+    needed = words or meaning(kind) or ("one entry or more" if entry else "one character or more")
     return f"must not be empty: needs {needed}"
 
 

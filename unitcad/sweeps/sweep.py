@@ -65,14 +65,25 @@ class Range(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SweepFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A sweep as typed: `from_file` validates `fixed` and the paths of `sweep`."""
+    """A sweep: which specs, over which values."""
 
-    base: str | Annotated[list[str], Meta(min_length=1)]
-    name: Annotated[str, Meta(min_length=1, max_length=60)] | None = None
+    base: Annotated[
+        str | Annotated[list[str], Meta(min_length=1)],
+        Meta(description="a template, a spec or array file next to this one (./mine.toml), or a list of them"),
+    ]
+    name: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=60)] | None,
+        Meta(description="a name of the sweep; default: that of the file"),
+    ] = None
     fixed: Annotated[dict[str, Any], Meta(description="values by path, the same for every variant")] = field(
         name="set", default_factory=dict
     )
-    sweep: Annotated[dict[str, Any], Meta(description="values by path", extra_json_schema={"properties": _KEYS})]
+    sweep: Annotated[
+        dict[str, Any],
+        Meta(
+            description="mode (product, zip or cases), and the values by path", extra_json_schema={"properties": _KEYS}
+        ),
+    ]
 
 
 class SweepTable(Struct, frozen=True):

@@ -18,7 +18,10 @@ class ListTable(Table, frozen=True, kw_only=True):
     """The centres [x, y] of the units in their order, in any frame; they are named P1, P2 ... in it."""
 
     kind: Literal["list"] = "list"
-    points_mm: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Meta(min_length=1, max_length=1024)]
+    points_mm: Annotated[
+        tuple[tuple[Coordinate, Coordinate], ...],
+        Meta(min_length=1, max_length=1024, description="centres as [x, y], at least one; they are named P1, P2 ..."),
+    ]
 
 
 def points(table: ListTable, radius: float | None) -> tuple[Point, ...]:

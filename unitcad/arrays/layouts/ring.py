@@ -18,9 +18,9 @@ class RingTable(Table, frozen=True, kw_only=True):
     """`count` units round the limb whose radius `body.radius_mm` gives, in `bands`, `band_pitch_mm` along the limb."""
 
     kind: Literal["ring"] = "ring"
-    count: Annotated[int, Meta(ge=2, le=200)]
-    bands: Annotated[int, Meta(ge=1, le=50)] = 1
-    band_pitch_mm: Pitch | None = None
+    count: Annotated[int, Meta(ge=2, le=200, description="units around the limb")]
+    bands: Annotated[int, Meta(ge=1, le=50, description="number of bands along the limb")] = 1
+    band_pitch_mm: Annotated[Pitch | None, Meta(description="distance between two bands")] = None
 
 
 def points(table: RingTable, radius: float | None) -> tuple[Point, ...]:

@@ -85,16 +85,28 @@ ChainName = Annotated[str, Meta(min_length=1, max_length=40)]
 
 
 class ChainTable(Table, frozen=True, kw_only=True):
-    """The chains and their parameters; the first one's levels are the result. The paper's are assumed ones."""
+    """The signal chains and their parameters."""
 
-    use: Annotated[tuple[ChainName, ...], Meta(min_length=1, max_length=8)] = ("line",)
-    mains_hz: Annotated[float, Meta(ge=40, le=400)] = 50.0
-    band_hz: tuple[Hertz, Hertz] = (60.0, 250.0)
-    order: Annotated[int, Meta(ge=1, le=10)] = 4
-    q: Annotated[float, Meta(ge=1, le=1000)] = 30.0
-    zero_phase: bool = True
-    measure: Literal["rms", "peak"] = "rms"
-    trim_s: Annotated[float, Meta(ge=0, le=1000)] = 0.25
+    use: Annotated[
+        tuple[ChainName, ...],
+        Meta(
+            min_length=1,
+            max_length=8,
+            description="signal chains, line or paper; the first one's levels are the result",
+        ),
+    ] = ("line",)
+    mains_hz: Annotated[float, Meta(ge=40, le=400, description="frequency of the mains")] = 50.0
+    band_hz: Annotated[tuple[Hertz, Hertz], Meta(description="band in which the motor's line is searched")] = (
+        60.0,
+        250.0,
+    )
+    order: Annotated[int, Meta(ge=1, le=10, description="order of the band-pass (chain paper)")] = 4
+    q: Annotated[float, Meta(ge=1, le=1000, description="quality of the comb filter (chain paper)")] = 30.0
+    zero_phase: Annotated[bool, Meta(description="whether filters run forwards and backwards (chain paper)")] = True
+    measure: Annotated[Literal["rms", "peak"], Meta(description="amplitude as rms or peak (chain paper)")] = "rms"
+    trim_s: Annotated[
+        float, Meta(ge=0, le=1000, description="seconds cut from both ends after filtering (chain paper)")
+    ] = 0.25
 
 
 @dataclass(frozen=True)
