@@ -18,6 +18,7 @@ import pytest
 import trimesh
 
 import unitcad
+from tests.sample_bodies import LEADLESS
 from unitcad import cli
 from unitcad.errors import UnitcadError
 from unitcad.kernels import mesh
@@ -225,7 +226,7 @@ def test_a_result_that_appears_between_the_two_renames_is_not_lost(
     ("name", "what"),
     [
         ("single-embedded", "second pour"),
-        ("no-fpcb", "tongue and slot"),
+        (LEADLESS, "tongue and slot"),
         ("embedded", "tongue and slot"),
         ("embedded", "filament stub and hole"),
         ("embedded", "mould checks"),

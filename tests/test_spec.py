@@ -9,6 +9,7 @@ import pytest
 import tomli_w
 from msgspec import structs
 
+from tests.sample_bodies import LEADLESS
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.spec import from_json, parse_toml, to_data, to_json, to_toml
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
@@ -69,7 +70,7 @@ def test_odd_names_survive_the_file() -> None:
         ("encapsulating", "layers.0.wall_mm=-1.0", "layers.0.wall_mm", 0.5),
         ("encapsulating", "diameter_mm=1e300", "diameter_mm", 1000),
         ("encapsulating", "layers.0.cap_mm=0.9", "layers.0.cap_mm", 0.99),
-        ("no-fpcb", "layers.0.cap_mm=0.4", "layers.0.cap_mm", 0.5),
+        (LEADLESS, "layers.0.cap_mm=0.4", "layers.0.cap_mm", 0.5),
         ("encapsulating", "fpcb.tail_width_mm=7.0", "fpcb.tail_width_mm", 6.3),
         ("encapsulating", "fpcb.pad_diameter_mm=9.5", "fpcb.pad_diameter_mm", 9.0),
         ("encapsulating", "fpcb.pad_diameter_mm=2.0", "fpcb.pad_diameter_mm", 3.0),

@@ -16,6 +16,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
 
+from tests.sample_bodies import LEADLESS
 from unitcad.checks import balance, draw, overlap
 from unitcad.checks.draw import blocked
 from unitcad.errors import UnitcadError
@@ -61,7 +62,7 @@ def block(at: tuple[float, float]) -> Shape:
 
 def mould(slant: Slant, at: tuple[float, float], insert: Shape = INSERT) -> MouldSet:
     """The block as a mould: an insert lies in the moat, the rest is poured."""
-    spec = load("no-fpcb")
+    spec = load(LEADLESS)
     plan = MouldSet(spec).plan
     room, laid = placed(MOAT, slant, at), placed(insert, slant, at)
     step = Step(

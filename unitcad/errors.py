@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copyreg
+import importlib.util
 import json
 import math
 import re
@@ -15,8 +16,10 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
-from unitcad.text import toml
+from unitcad.text import some, toml
 
+PIP = (sys.executable, "-m", "pip")
+"""The pip of this installation."""
 NEAREST = "; nearest accepted: "
 """What a refusal's sentence names the nearest accepted value after."""
 UNIT_ALONE = "; --only unit makes the unit alone"
@@ -56,7 +59,9 @@ def install_command(extras: str) -> str:
     url = source.get("url", "")
     local = url.startswith("file:")
     folder = Path(url2pathname(urlsplit(url).path)) if local else Path(__file__).parent.parent
-    command = [sys.executable, "-m", "pip", "install"]
+    command = [*PIP, "install"]
+    if importlib.util.find_spec("pip") is None:  # an environment made by uv
+        command = ["uv", "pip", "install", "--python", sys.executable]
     if (local or not url) and (folder / "pyproject.toml").is_file():
         if (folder / "constraints.txt").is_file():
             command += ["-c", str(folder / "constraints.txt")]
@@ -66,6 +71,10 @@ def install_command(extras: str) -> str:
         return shlex.join([*command, f"unitcad[{extras}] @ {vcs['vcs']}+{url}@{vcs['commit_id']}"])
     if "archive_info" in source and not local:
         return shlex.join([*command, f"unitcad[{extras}] @ {url}"])
+    if local and folder.is_file():  # a wheel or an archive
+        return shlex.join([*command, f"{folder}[{extras}]"])
+    if not url:
+        return shlex.join([*command, f"unitcad[{extras}]"])
     return f"in a clone, {shlex.join([*command, f'.[{extras}]'])}"
 
 
@@ -125,9 +134,7 @@ def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusa
 
     known = sorted(known)
     close = get_close_matches(value, known, n=3, cutoff=0.6)
-    most = _shown_of(known, _MOST_NAMES)
-    more = f" and {len(known) - most} more" if len(known) > most else ""
-    names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known[:most])}{more}"
+    names = f"closest: {', '.join(close)}" if close else f"known: {some(known)}"
     return kind(field, value, f"not known; {names}", close[0] if close else None)
 
 
@@ -148,15 +155,8 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
     )
     nearest = f"{table}.{best}" if table and best else best
     alike = sorted(known, key=lambda name: -SequenceMatcher(None, key, name).ratio())
-    most = _shown_of(known, _MOST_KEYS)
-    more = len(known) - most
-    rest = f" and {more} more{f' ({lists} lists all)' if lists else ''}" if more > 0 else ""
-    return UnknownKey(field, value, f"unknown key; known here: {', '.join(alike[:most])}{rest}", nearest)
-
-
-def _shown_of(names: list[str], most: int) -> int:
-    """Return how many names to show: the last one rather than its number."""
-    return most + 1 if len(names) == most + 1 else most
+    rest = f" ({lists} lists all)" if lists and len(known) > _MOST_KEYS + 1 else ""
+    return UnknownKey(field, value, f"unknown key; known here: {some(alike, _MOST_KEYS)}{rest}", nearest)
 
 
 def misfit(error: Exception) -> str:
@@ -201,7 +201,5 @@ def _text(value: object) -> str:
 
 _MOST_KEYS = 5
 """Keys of a table that are named for one that it does not have."""
-_MOST_NAMES = 10
-"""Names that are listed where none is close to one that is not known."""
 _LONGEST = 200
 """Characters of a value that are shown."""

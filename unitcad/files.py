@@ -16,6 +16,7 @@ import os
 import re
 import secrets
 import stat
+import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
@@ -35,6 +36,8 @@ maker lives. They are two files, since nobody can read a locked file on Windows.
 FORMAT = "unitcad scratch 1"
 _TOKEN = re.compile(re.escape(TEMPORARY) + "[0-9a-f]{16}")
 OLD, NEW = "old", "new"
+EMPTY_S = 60.0
+"""After this time an empty scratch folder belongs to no process that is just making or removing it."""
 _DEVICE = re.compile(r"con|prn|aux|nul|com[0-9]|lpt[0-9]", re.IGNORECASE)
 
 
@@ -255,8 +258,8 @@ def _remove_scratch(folder: Path) -> None:
 def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
     """Yield the scratch folders in `parent` whose process is gone, each with its name, locked meanwhile.
 
-    Only real folders with our mark and their own token inside are yielded, and those that hold an empty lock alone:
-    their process ended before it wrote the mark, or after it had removed it.
+    Only real folders with our mark and their own token inside are yielded, and those without a mark that contain an
+    empty lock, or nothing for EMPTY_S: their process ended before it wrote the mark, or after it had removed it.
     """
     from filelock import FileLock
 
@@ -281,8 +284,10 @@ def _marked(folder: Path) -> str | None:
     try:
         if not stat.S_ISDIR(folder.lstat().st_mode):
             return None
-        if _TOKEN.fullmatch(folder.name) and [(e.name, e.lstat().st_size) for e in folder.iterdir()] == [(LOCK, 0)]:
-            return ""
+        if _TOKEN.fullmatch(folder.name):
+            inside = [(entry.name, entry.lstat().st_size) for entry in folder.iterdir()]
+            if inside == [(LOCK, 0)] or (not inside and time.time() - folder.lstat().st_mtime > EMPTY_S):
+                return ""
         form, token, name, rest = read_text(folder / MARK, largest=1000, links=False).split("\n")
     except (UnitcadError, ValueError, OSError):
         return None

@@ -92,6 +92,14 @@ def listed(words: Iterable[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+def some(words: Iterable[object], most: int = 10) -> str:
+    """Return the first words of a list, each cut at 60 characters, and the number of the others: "a, b and 7 more"."""
+    every = list(words)
+    shown = [str(word) for word in (every if len(every) <= most + 1 else every[:most])]
+    more = f" and {len(every) - len(shown)} more" if len(every) > len(shown) else ""
+    return ", ".join(word if len(word) <= 63 else f"{word[:60]}..." for word in shown) + more
+
+
 def spaced(name: str) -> str:
     """Return a body's name as it is read: "cup1" as "cup 1", which stays."""
     return re.sub(r"(?<=[^\d\s])(?=\d+$)", " ", name)

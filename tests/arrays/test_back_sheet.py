@@ -9,19 +9,15 @@ from functools import cache
 
 import pytest
 
+from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds, mould_checks
 from unitcad.checks.draw import blocked
 from unitcad.errors import Refusal
-from unitcad.export import stl
-from unitcad.export.printing import print_ready
-from unitcad.kernels.mesh import arrays
-from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.cavities import united
 from unitcad.moulds.removal import Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, union
-from unitcad.spec import printer_of
 
 Change = Callable[[Shape], Shape]
 
@@ -53,11 +49,7 @@ def test_every_mould_check_holds(overrides: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("overrides", VARIANTS[:4], ids=[" ".join(v) for v in VARIANTS[:4]])
 def test_every_tool_prints_without_support(overrides: tuple[str, ...]) -> None:
-    moulds = patch(*overrides)
-    for body in (*moulds.unit, *moulds.plan.tools):
-        content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
-        printer = printer_of(moulds.spec) if body.made == "printed" else None
-        assert check_bytes(content, f"{body.name}.stl", Options(printer=printer)).findings == ()
+    assert mesh_findings(patch(*overrides)) == []
 
 
 def test_the_silicone_has_the_volume_of_its_lengths() -> None:

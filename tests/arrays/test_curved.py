@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import curved_procedure
 from unitcad.arrays.array_view import patch_model
@@ -21,13 +22,10 @@ from unitcad.casting.procedure import Procedure
 from unitcad.casting.views import views
 from unitcad.checks import air, balance, check_moulds, mould_checks
 from unitcad.errors import Refusal
-from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
-from unitcad.spec import printer_of
 
 Change = Callable[[Shape], Shape]
 R = 40.0
@@ -87,11 +85,7 @@ def test_vents_that_stand_aside_on_a_large_limb_begin_in_the_sheet() -> None:
 
 
 def test_every_tool_prints_without_support() -> None:
-    moulds = sleeve()
-    for body in (*moulds.unit, *moulds.plan.tools):
-        content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
-        printer = printer_of(moulds.spec) if body.made == "printed" else None
-        assert check_bytes(content, f"{body.name}.stl", Options(printer=printer)).findings == ()
+    assert mesh_findings(sleeve()) == []
 
 
 def test_the_silicone_has_the_volume_of_its_lengths() -> None:

@@ -7,19 +7,15 @@ from typing import Any
 
 import pytest
 
+from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.construction import constructions
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import check_moulds, overlap
 from unitcad.errors import Refusal
-from unitcad.export import stl
-from unitcad.export.printing import print_ready
-from unitcad.kernels.mesh import arrays
-from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.cavities import BALANCE
 from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, union
 from unitcad.shape.tree import Revolve
-from unitcad.spec import printer_of
 from unitcad.validation import load
 
 POCKETS = ["forearm-pockets", "hex-19"]
@@ -37,11 +33,7 @@ def test_every_mould_check_holds(name: str) -> None:
 
 @pytest.mark.parametrize("name", POCKETS)
 def test_every_tool_prints_without_support(name: str) -> None:
-    moulds = patch_moulds(load_array(name))
-    for tool in moulds.plan.tools:
-        content = stl.content(*print_ready(*arrays(moulds.mesh(tool)), tool.upside_down), tool.name)
-        report = check_bytes(content, f"{tool.name}.stl", Options(printer=printer_of(moulds.spec)))
-        assert [f for f in report.findings if f.severity != "info"] == []
+    assert mesh_findings(patch_moulds(load_array(name))) == []
 
 
 def test_a_pocket_is_smaller_than_its_unit_by_the_hold() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.construction import constructions
 from unitcad.arrays.patch import patch_moulds
@@ -103,3 +104,4 @@ def judge(data: dict[str, Any]) -> None:
     broken = [f"{f.code} {f.where}: {f.value:.3g}, limit {f.limit:.3g} {f.unit}" for f in findings if not f.ok]
     assert broken == []
     assert len(findings) > 8
+    assert mesh_findings(moulds) == []  # both kinds of checks agree

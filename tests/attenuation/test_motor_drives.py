@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.sample_bodies import LEADLESS
 from unitcad.attenuation import Point, UniformDisc
 from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.inputs import body
@@ -98,7 +99,7 @@ def test_fall_from_7_to_30_mm_as_once_measured() -> None:
 
 def test_the_drive_is_the_part_s_where_the_spec_gives_none() -> None:
     assert {name for name, motor in motors().items() if motor.drive.value == "axial"} == {"VG1040003D"}
-    plain = read("no-fpcb")
+    plain = read(LEADLESS)
     lra = {"part": "VG1040003D"}
     assert from_data({**plain, "diameter_mm": 18.0, "motor": lra}).motor.drive == "axial"
     assert from_data({**plain, "diameter_mm": 18.0, "motor": {**lra, "drive": "flat"}}).motor.drive == "flat"

@@ -220,7 +220,7 @@ def test_what_words_name_is_named_in_the_picture(source: tuple[str, ...]) -> Non
         names = {name.text for name in shown[step.picture].names} if step.picture else set()
         assert set(wanted.get(step.title, "").split(", ")) - {""} <= names, step.title
         if step.title == "Tongue in, grease":
-            length = step.text.partition("until ")[2].partition(" mm")[0]
+            length = step.text.partition("Stop ")[2].partition(" mm")[0]
             assert names == {f"grease {length} mm"}
         if step.title.endswith(" off") and step.title.startswith("Cup"):
             assert names == {"screwdriver"}

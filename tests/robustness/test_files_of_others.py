@@ -8,6 +8,7 @@ import signal
 import stat
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -236,12 +237,14 @@ def test_no_command_hangs_on_or_swallows_what_is_no_spec(arguments: str, kind: s
 
 
 def test_scratch_of_a_process_that_ended_before_its_mark_is_removed(tmp_path: Path) -> None:
-    """A folder with our token and nothing but the empty lock; one with anything else in it stays."""
-    ours, theirs = tmp_path / ".tmp-0123456789abcdef", tmp_path / ".tmp-fedcba9876543210"
-    for folder in (ours, theirs):
+    """A folder with our token and nothing but the empty lock, or nothing for a minute; any other one stays."""
+    locked, empty, photo, fresh = folders = [tmp_path / f".tmp-{i:016x}" for i in range(4)]
+    for folder in folders:
         folder.mkdir()
+    for folder in (locked, photo):
         (folder / files.LOCK).touch()
-    (theirs / "photo.jpg").write_bytes(b"1")
+    (photo / "photo.jpg").write_bytes(b"1")
+    os.utime(empty, times=(0, time.time() - files.EMPTY_S - 1))
     clear_leftovers(tmp_path)
-    assert [folder.name for folder in sorted(tmp_path.iterdir())] == [theirs.name]
-    assert sorted(file.name for file in theirs.iterdir()) == ["photo.jpg", files.LOCK]
+    assert sorted(tmp_path.iterdir()) == [photo, fresh]
+    assert sorted(file.name for file in photo.iterdir()) == ["photo.jpg", files.LOCK]

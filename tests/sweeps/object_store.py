@@ -40,10 +40,10 @@ def s3_server() -> Iterator[dict[str, str]]:
     }
     os.environ.update(environment)
     try:
-        import fsspec
+        import s3fs
 
-        fsspec.get_filesystem_class("s3").clear_instance_cache()  # one may know the address of another server
-        fsspec.filesystem("s3").mkdir(BUCKET)
+        s3fs.S3FileSystem.clear_instance_cache()  # one may know the address of another server
+        s3fs.S3FileSystem().mkdir(BUCKET)
         yield environment
     finally:
         for name in environment:

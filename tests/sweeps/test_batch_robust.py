@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import psutil
 import pytest
 from batching import bytes_of, calls, command, environment, leftovers, ring_sweep, rows, unitcad
+
+from unitcad.cache import DiskStore, MemoryStore, MissingContent, disk
+from unitcad.errors import UnitcadError
+from unitcad.pipeline.write import build
+from unitcad.validation import load
 
 HEIGHTS = [float(h) for h in range(2, 9)]
 
@@ -227,3 +234,44 @@ def test_what_failed_before_is_tried_again_last(tmp_path: Path) -> None:
     assert again.returncode == 1
     assert "stopped: variant 0:" in again.stderr
     assert [row["status"] for row in rows(out)] == ["failed", *["ok"] * 5]
+
+
+def test_a_cache_that_is_deleted_again_and_again_stops_no_batch(tmp_path: Path) -> None:
+    sweep, cache = ring_sweep(tmp_path / "s", "slow", HEIGHTS[:4]), tmp_path / "cache"
+    outs = [tmp_path / name for name in ("a", "b")]
+    running = [_start("batch", sweep, "-o", out, "-j", 2, "--cache", cache) for out in outs]
+    while any(child.poll() is None for child in running):
+        shutil.rmtree(cache, ignore_errors=True)
+        time.sleep(0.05)
+    for child in running:
+        _, told = child.communicate()
+        assert child.returncode == 0, told
+    assert bytes_of(outs[0]) == bytes_of(outs[1])
+    assert len(_results(outs[0])) == 4
+
+
+def test_a_half_deleted_cache_is_waited_for_and_another_folder_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(disk, "_CLAIM_S", 0.01)
+    half = tmp_path / "half"
+    (half / "content" / "ab").mkdir(parents=True)
+    with ThreadPoolExecutor(1) as others:
+        others.submit(lambda: (time.sleep(0.1), shutil.rmtree(half)))
+        DiskStore(half).close()
+    assert (half / disk.MARK).is_file()
+    (tmp_path / "theirs" / "content").mkdir(parents=True)
+    with pytest.raises(UnitcadError, match="is not a cache of unitcad, and not empty"):
+        DiskStore(tmp_path / "theirs")
+
+
+class Forgetful(MemoryStore):
+    """A store of which others delete each content before it is placed."""
+
+    def place(self, sha256: str, target: object) -> None:
+        raise MissingContent(sha256)
+
+
+def test_a_build_does_without_a_cache_that_keeps_nothing(tmp_path: Path) -> None:
+    built = build(load("single-embedded", ["output.formats=['stl']"]), tmp_path, only=["unit"], store=Forgetful())
+    assert _whole(built.folder)

@@ -33,10 +33,10 @@ from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import fields_of
 from unitcad.spec.toml import text_of
+from unitcad.spec.toml_lines import line_of
 from unitcad.text import listed
 from unitcad.validation import custom_templates, default_template, from_data, templates
 from unitcad.validation.dotted import ABSENT, at
-from unitcad.validation.faults import line_of
 from unitcad.validation.load import changed, override
 from unitcad.validation.shipped_files import named_file, shipped_files
 from unitcad.validation.tables import Changes, changes_of

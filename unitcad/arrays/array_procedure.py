@@ -40,7 +40,7 @@ from unitcad.casting.pouring import (
 )
 from unitcad.casting.pouring import release as flat_release
 from unitcad.casting.pouring import shown as grams_shown
-from unitcad.casting.preparation import cleaning, fall, joining, level, printing
+from unitcad.casting.preparation import Printing, cleaning, fall, joining, level, printing
 from unitcad.casting.procedure import Procedure, pour_of, procedure, times
 from unitcad.casting.steps import NEEDS, BenchStep, Phase, duration, phases
 from unitcad.casting.views import picture_path, views
@@ -152,7 +152,7 @@ def _sort_curved(moulds: PatchMoulds) -> BenchStep:
     cups = listed(f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps[:-1])
     return BenchStep(
         "Sort the pieces",
-        f"Print the pieces as they lie in their files, without supports. All are engraved {label}. The flat ones are "
+        f"All are engraved {label}. The flat ones are "
         f"for Layer 1: the base has a b before it, and of the cups {cups}. The curved ones are for the last pour: "
         f"{_base(moulds)} has B{last.index:X} before it, {spaced(last.lid or '')} L{last.index:X}.",
         picture_path("pieces"),
@@ -188,10 +188,9 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
     )
     yield BenchStep(
         f"Level {base}",
-        f"Put {base} where it will stay and {lid} on it, dry. Lay a phone with its level, or a small spirit level, on "
-        f"{lid}, along it and across, and put paper under a corner of {base} until it shows less than 5 degrees: so "
-        f"much the vents clear (C400). Lift {lid} off again. {base.capitalize()} stays there: it is filled and cured "
-        "on this spot.",
+        f"Put {base} where it will stay and {lid} on it, dry. Lay a level on {lid}, along it and across, and put paper "
+        f"under a corner of {base} until it shows none; within 5 degrees is good enough, since the vents clear so "
+        f"much. Lift {lid} off; leave {base} there until it is cured.",
         _picture(step, "level"),
         minutes=5.0,
         needs=("level", "paper"),
@@ -425,9 +424,9 @@ def pocket_procedure(
         *joining(moulds),
         # The sheet must not get thinner at one end by more than a dent.
         level(
-            f"{fall(moulds)}. Put the tray where it will stay. Lay a phone with its level, or a small spirit level, on "
-            "the cores, which are as high as the wall, along the tray and across, and put paper under a corner until "
-            "it shows less. The tray stays there: it is poured and cured on this spot."
+            "Put the tray where it will stay. Lay a level on the cores, which are as high as the wall, along the tray "
+            f"and across, and put paper under a corner until it shows none. {fall(moulds)} Leave the tray there until "
+            "it is cured."
         ),
     )
     poured = (
@@ -435,10 +434,10 @@ def pocket_procedure(
         *struck(
             batch,
             "Pour in a thin thread, first along the wall and round every core, until the tray stands over its rim and "
-            "the cores are covered. Prick the bubbles that you see with a pin.",
-            "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke from end to "
-            "end: it runs on rim and cores. What it takes goes into the groove.",
-            " The film that it leaves on the cores cures too and is trimmed at the end.",
+            "the cores are covered. Prick bubbles with a pin.",
+            "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke: it runs on rim "
+            "and cores. The rest goes into the groove.",
+            " The film on the cores is trimmed at the end.",
             len(array.places),
             1,
             picture_path,
@@ -462,7 +461,7 @@ def pocket_procedure(
         earliest_finish_min=finish,
         bench_min=sum(phase.bench_min for phase in until),
         time_line=line,
-        printing=tuple(_printing(moulds, printed_mm3, array, units)),
+        printing=_printing(moulds, printed_mm3, array, units),
         preparation=(*cast, *prepared),
         off_grid=(),
         unit_heights=(),
@@ -536,11 +535,12 @@ def _and_blade(moulds: PatchMoulds) -> str:
     return " and blade" * all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
 
 
-def _printing(moulds: PatchMoulds, solid_mm3: float, array: Array, folders: Iterable[str]) -> Iterator[str]:
-    yield from printing(moulds, solid_mm3)
+def _printing(moulds: PatchMoulds, solid_mm3: float, array: Array, folders: Iterable[str]) -> Printing:
+    sheet = printing(moulds, solid_mm3)
     of_units = zip(folders, array.units, strict=True)
     files = (f"{folder}/{file}" for folder, unit in of_units for file in mould_plates(MouldSet(unit)))
-    yield f"The units' moulds: {listed(files)}, as their casting.md says."
+    units = f"The units' moulds: {listed(files)}, as their casting.md says."
+    return replace(sheet, how=(*sheet.how, units))
 
 
 def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:

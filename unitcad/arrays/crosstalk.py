@@ -20,7 +20,7 @@ from unitcad.attenuation.inputs import Drive, EstimateInput, body
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input, estimate_spec
-from unitcad.text import listed, number
+from unitcad.text import listed, number, some
 
 BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
 SHAPE = (0.82, 1.14)
@@ -309,7 +309,7 @@ def _masses(units: Decays) -> dict[str, Any]:
         raise Refusal("--masses", n, f"are worked out for at most {MOST_LOADED} units at once")
     frequencies = {one.frequency.middle for one in units.inputs}
     if len(frequencies) > 1:
-        shown = " and ".join(f"{hertz:g}" for hertz in sorted(frequencies))
+        shown = some(f"{hertz:g}" for hertz in sorted(frequencies))
         limit = "units that load each other's skin are worked out at one frequency (estimate.frequency_hz)"
         raise Refusal("--masses", f"{shown} Hz", limit)
     omega = 2.0 * math.pi * frequencies.pop()

@@ -32,9 +32,10 @@ from unitcad.serve.unit_answers import holds_code as unit_holds_code
 from unitcad.serve.unit_answers import printed_mm3, unit_procedure
 from unitcad.spec.custom_code import files_named
 from unitcad.spec.toml import from_json, read_toml, to_json
+from unitcad.spec.toml_lines import line_of
 from unitcad.validation import templates
 from unitcad.validation.dotted import at
-from unitcad.validation.faults import every_fault, line_of
+from unitcad.validation.faults import every_fault
 
 as_toml = to_toml
 

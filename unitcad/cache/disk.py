@@ -30,6 +30,8 @@ GATE = "unitcad-cache.lock"
 """The lock held while a store opens, and while one process collects alone."""
 FOLDERS = ("data", "files", "content", "locks", "tmp")
 _POLL_S = 0.01
+_CLAIMS, _CLAIM_S = 40, 0.05
+"""How often a cache that is being deleted is tried, and the pause between, s."""
 _DECODED = 64
 """Entries that a store keeps decoded: variants of a geometry read the same few."""
 
@@ -290,20 +292,36 @@ def _signature(path: str) -> tuple[int, int, int]:
 
 
 def _claim(root: Path) -> None:
-    """Make a folder a cache, or refuse one that holds something else."""
+    """Make a folder a cache, or refuse one that holds something else.
+
+    A cache that another process is deleting has lost its mark and some of its folders: it is waited for.
+    """
+    for left in reversed(range(_CLAIMS)):
+        if _claimed(root, last=not left):
+            return
+        time.sleep(_CLAIM_S)
+
+
+def _claimed(root: Path, last: bool) -> bool:
+    """Make a folder a cache; False for one that may be half deleted, which is refused at the `last` try."""
     try:
         root.mkdir(parents=True, exist_ok=True)
         if not (root / MARK).exists():
             # A process that claims the folder at the same time writes the mark first.
             others = {path.name for path in root.iterdir()} - {MARK, GATE}
             if others not in (set(), set(FOLDERS)) and not (root / MARK).exists():
+                if others <= set(FOLDERS) and not last:
+                    return False
                 raise UnitcadError(f"{root}: is not a cache of unitcad, and not empty; choose another with --cache")
             (root / MARK).write_text("unitcad keeps shared results here; it may be deleted at any time\n", "utf-8")
         for name in FOLDERS:
             (root / name).mkdir(exist_ok=True)
+        return True
     except (FileExistsError, NotADirectoryError):
         raise UnitcadError(f"{root}: is a file, not a folder; choose another with --cache") from None
     except OSError as error:
+        if isinstance(error, FileNotFoundError) and not last:
+            return False
         raise UnitcadError(f"{root}: can't be used as a cache: {error.strerror}") from None
 
 

@@ -28,7 +28,7 @@ from unitcad.cli.shared_options import (
     overrides,
     with_fit,
 )
-from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.errors import UnitcadError, WrongArgument, install_command
 from unitcad.pipeline import step_helper
 from unitcad.pipeline.make import Subject
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest
@@ -151,7 +151,7 @@ def _print_faults(manifest: Manifest) -> None:
         warn(f"warning: {warning}")
     for entry in manifest["left_out"]:
         if entry["why"] == NO_KERNEL:
-            typer.echo(f"note: STEP left out: {entry['why']}", err=True)
+            warn(f"note: STEP left out: {entry['why']}; {install_command('step')}")
     checks = manifest["laws"]
     for check in checks:
         if not check["ok"]:

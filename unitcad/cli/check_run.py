@@ -10,7 +10,7 @@ from pathlib import Path
 
 from unitcad import catalogue, files
 from unitcad.catalogue import Printer, printers
-from unitcad.cli import check_settings
+from unitcad.cli import check_diff, check_settings
 from unitcad.cli.check_settings import Configuration
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.export import finding_pictures
@@ -51,6 +51,7 @@ class Asked:
     baseline: str | None = None
     write_baseline: bool = False
     show: str | None = None
+    diff: tuple[str, str] | None = None
     config: str | None = None
     no_config: bool = False
     statistics: bool = False
@@ -101,6 +102,12 @@ def run(asked: Asked) -> int:
         locations=MOST if asked.all_locations or base is not None or asked.show is not None else SHOWN,
         draw=asked.show is not None,
     )
+    if asked.diff is not None:
+        if asked.files or asked.manifest is not None or base is not None:
+            raise UnitcadError("--diff compares its two names alone: leave out other files, --manifest and --baseline")
+        said, code = check_diff.run(*asked.diff, options, fail_on, output_format, asked.show)
+        _write(said, plain=output_format == "text")
+        return code
     if not asked.files and asked.manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
     for pattern, codes in (configuration.value("per_file_ignores") or {}).items():

@@ -77,7 +77,7 @@ def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]
         if not fitting:
             return None
         if len(fitting) > 1:
-            names = ", ".join(f"{i + 1} {channels[i].name!r}" for i in fitting)
+            names = recording.numbered(fitting)
             limit = f"{recording.path.name} has several columns for {quantity}: {names}; declare {quantity}=COLUMN:UNIT"
             raise Refusal("--column", None, limit)
         at = fitting[0]

@@ -22,6 +22,7 @@ from unitcad.catalogue import Material
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.lab.columns import Declared, column_of, columns, columns_of
 from unitcad.lab.readers import AS_FOUND, Layout, open_recording
+from unitcad.text import some
 
 LEAST_POINTS = 5
 _HEADER_LINES = 200
@@ -385,7 +386,7 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
     ratio = max(by_specimen) / min(by_specimen)
     if ratio > OTHER_MATERIAL:
         pairs = zip(curves, by_specimen, strict=True)
-        shown = ", ".join(f"{curve.name} {one / 1e3:.3g} kPa" for curve, one in pairs)
+        shown = some(f"{curve.name} {one / 1e3:.3g} kPa" for curve, one in pairs)
         why = "these are not specimens of one silicone, or a unit is wrong"
         raise Refusal("FILES", None, f"differ by a factor of {ratio:.3g} ({shown}): {why}")
     scatter = None

@@ -15,6 +15,7 @@ from unitcad.casting.cast_record import CastRecord, CastUnit, read_cast_record
 from unitcad.catalogue import materials
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.spec import Spec, check_plain
+from unitcad.text import some
 from unitcad.validation import custom_templates, from_data, put, read, templates
 from unitcad.validation.shipped_files import is_path
 
@@ -122,7 +123,7 @@ def _cast(unit: UnitNames, folder: Path, field: str) -> tuple[CastRecord, CastUn
         raise Refusal(where, name, str(error)) from None
     units = {one.cavity: one for one in record.units}
     usable = [one for one in record.units if one.usable]
-    listed, field = ", ".join(map(str, units)), f"{field}.cavity"
+    listed, field = some(units), f"{field}.cavity"
     if unit.cavity is not None:
         found = units.get(unit.cavity)
         if found is None and units:

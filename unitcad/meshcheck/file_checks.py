@@ -184,7 +184,7 @@ def _step_needs() -> str:
     """Return what STEP files need and is not there, or nothing."""
     from unitcad.meshcheck.readers import read_step
 
-    return "" if read_step.installed() else read_step.NEEDS
+    return read_step.missing()
 
 
 def _walked(folder: Path) -> Iterator[str]:

@@ -23,10 +23,10 @@ from unitcad.spec import Spec, spec_hash
 from unitcad.spec.asked import OUTPUTS
 from unitcad.validation import warnings
 
-CASTING = ("bom.csv", "casting.json", "casting.md")
+CASTING = ("bom.csv", "casting.json", "casting.md", "troubleshooting.md")
 UNCHECKED = "--no-check"
 NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
-NO_KERNEL = "no B-rep kernel is installed for STEP: in a clone, pip install '.[step]'"
+NO_KERNEL = "no B-rep kernel is installed for STEP"
 
 
 class BodyFile(TypedDict):

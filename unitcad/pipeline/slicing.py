@@ -13,6 +13,7 @@ from unitcad.export import slicer
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.write import held
 from unitcad.spec import Spec, printer_of
+from unitcad.text import some
 
 SLICED = "slicer.json"
 
@@ -47,7 +48,7 @@ def slice_tools(spec: Spec, folder: Path, manifest: Manifest, say: Callable[[str
             return f"not sliced: {error}"
         files.write(folder / SLICED, (json.dumps(report, indent=2) + "\n").encode())
     if repaired := [piece["file"] for piece in report["pieces"] if piece["repaired"]]:
-        return f"{report['slicer']} had to repair {', '.join(repaired)}"
+        return f"{report['slicer']} had to repair {some(repaired)}"
     hours, minutes = divmod(round(report["print_s"] / 60), 60)
     return f"prints in {hours} h {minutes:02d} min with {report['filament_cm3']:.1f} cm3 ({report['slicer']})"
 

@@ -81,6 +81,12 @@ class Variant(MouldSet):
 
         return cadquery.assembly((*self.bodies.values(),))
 
+    def show(self) -> None:
+        """Show unit and moulds, named and coloured, in ocp-vscode or YACV. Raises UnitcadError without either."""
+        from unitcad.kernels import build123d
+
+        build123d.show(self.to_build123d())
+
     def section(self) -> str:
         """Return the drawing of the unit cut along its tail, with dimensions in mm, as SVG."""
         return unit_section(self)

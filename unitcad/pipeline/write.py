@@ -82,13 +82,13 @@ def build(
         formats: tuple[Format, ...] = tuple(form for form in FORMATS if form in (*there.formats, *wanted.formats))
         every, checked = checked_outputs((*outputs, *there.outputs)), check or there.checked
         with contextlib.suppress(_Changed):  # another build has put a result there: what it has is made too
-            maker = partial(wanted.with_formats(formats).make, every, checked, store)
+            maker = partial(wanted.with_formats(formats).make, every, checked)
             return write(folder, maker, store, say, unchanged=lambda there=there: earlier(folder, wanted) == there)
 
 
 def write(
     folder: Path,
-    maker: Callable[[Progress], Product],
+    maker: Callable[[Store, Progress], Product],
     store: Store,
     say: Callable[[str], object] = lambda stage: None,
     *,
@@ -100,9 +100,11 @@ def write(
     `scratch`: see `placing`. Raises _Changed if the folder is not `unchanged` any more.
     """
     for left in reversed(range(TRIES)):
+        if not left:
+            store = MemoryStore()  # others clear the cache all the time
         progress, before = Progress(say), Counter(store.counts)
         try:
-            product = maker(progress)
+            product = maker(store, progress)
             progress("")
             timings = {
                 "code": code_version(),
@@ -116,8 +118,7 @@ def write(
                 files.write_new(fresh / "timings.json", json_bytes(timings))
             return Built(folder, product.manifest, digest(product.own["manifest.json"]))
         except MissingContent:  # the cache is cleared meanwhile
-            if not left:
-                raise
+            continue
     raise AssertionError
 
 

@@ -14,7 +14,7 @@ from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.errors import Refusal
 from unitcad.search.candidates import Candidates
 from unitcad.search.ranking import novelty
-from unitcad.text import listed, number
+from unitcad.text import listed, number, some
 
 _PITCHES = np.unique(np.round([*np.arange(1.0, 100.0, 0.1), *np.arange(100.0, MOST_PITCH_MM + 1.0)], 1))
 """Pitches that are offered, mm: those of three digits."""
@@ -174,4 +174,4 @@ def label(found: Candidates, row: int) -> str:
 
 
 def _left_out(found: Candidates) -> str:
-    return f"; not tried, without a modulus: {listed(found.left_out)}" if found.left_out else ""
+    return f"; not tried, without a modulus: {some(found.left_out)}" if found.left_out else ""

@@ -26,7 +26,7 @@ from unitcad.serve.jobs import RESULTS
 from unitcad.serve.messages import Source, Trusted
 from unitcad.spec import parse_toml, read_toml
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
-from unitcad.text import listed
+from unitcad.text import some
 from unitcad.validation import compound_kind, custom_templates, default_template, every_template
 from unitcad.validation.shipped_files import is_path, named_file
 
@@ -124,7 +124,7 @@ def _source(source: str | None) -> tuple[str | None, Path | None]:
         if len(specs) == 1:
             return str(specs[0]), None
         if specs:
-            raise UnitcadError(f"{error}; it has {listed([path.name for path in specs])}: give one of them") from None
+            raise UnitcadError(f"{error}; it has {some(path.name for path in specs)}: give one of them") from None
         raise
     return None, folder
 

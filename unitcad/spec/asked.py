@@ -43,9 +43,9 @@ class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_u
 
 
 class MotorTable(Table, frozen=True, kw_only=True):
-    """The motor: a `part` of the catalogue, or its size, or both: a size then overrides the part's.
+    """The motor: a catalogue `part`, or its size; a size given beside a part overrides the catalogue's.
 
-    Default: the part LCM0720A3463F.
+    Without either it is `DEFAULT_MOTOR`.
     """
 
     part: Annotated[
@@ -64,7 +64,7 @@ class MotorTable(Table, frozen=True, kw_only=True):
 
 
 class FpcbTable(Table, frozen=True, kw_only=True):
-    """The flexible circuit: a round pad on the motor and a straight tail. Leave the table out for no circuit."""
+    """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
 
     tail: Annotated[
         Literal["one", "both"], Meta(description="sides on which the circuit leaves: one (+x), or both")
@@ -84,7 +84,7 @@ class FpcbTable(Table, frozen=True, kw_only=True):
 
 
 class WiresTable(Table, frozen=True, kw_only=True):
-    """Wires in place of a circuit: side by side, out along +x through one slot or notch."""
+    """Wires instead of a circuit: side by side, from the motor's side out along +x, through one exit."""
 
     diameter_mm: Annotated[float, Meta(ge=0.05, le=20, description="diameter of one wire with its insulation")]
     count: Annotated[int, Meta(ge=1, le=8, description="number of wires")] = 2
@@ -92,7 +92,7 @@ class WiresTable(Table, frozen=True, kw_only=True):
 
 
 class LayerTable(Table, frozen=True, kw_only=True):
-    """One silicone layer, from the inside out. One table is a single-layer control."""
+    """One silicone layer: a wall and, in a design of closed layers, a cap."""
 
     material: Annotated[
         str,
@@ -101,12 +101,12 @@ class LayerTable(Table, frozen=True, kw_only=True):
     wall_mm: Annotated[Thickness, Meta(description="thickness of the layer at the skin")]
     cap_mm: Annotated[
         Thickness | None,
-        Meta(description="thickness of the layer above the motor; encapsulating needs it, embedded refuses it"),
+        Meta(description="thickness of the layer above the motor, for a design that has caps"),
     ] = None
 
 
 class MouldsTable(Table, frozen=True, kw_only=True):
-    """The moulds. Lengths of the printer override those of its catalogue entry."""
+    """The tooling. Whatever the printer's catalogue entry gives can be given here instead."""
 
     printer: Annotated[
         str, Meta(description="printer of the catalogue (unitcad list printers), or of the spec's own [printers.NAME]")
@@ -161,7 +161,7 @@ class MouldsTable(Table, frozen=True, kw_only=True):
 
 
 class CastingTable(Table, frozen=True, kw_only=True):
-    """The bench: scale, mixing, room, and the margin on a silicone's elongation."""
+    """The lab: scale, mixing, room and the margin on a silicone's elongation."""
 
     scale_resolution_g: Annotated[float, Meta(ge=1e-6, le=1000, description="smallest step of the scale")] = 0.01
     minimum_mix_g: Annotated[float, Meta(ge=0.001, le=1e6, description="smallest batch to mix")] = 2.0
@@ -177,7 +177,7 @@ class CastingTable(Table, frozen=True, kw_only=True):
 
 
 class EstimateTable(Table, frozen=True, kw_only=True):
-    """Inputs of the estimate."""
+    """Inputs of the attenuation estimate; what is left out is the motor's."""
 
     frequency_hz: Annotated[
         kinds.Frequency | None, Meta(description="frequency of the drive; default: the motor's")
@@ -206,7 +206,7 @@ class EstimateTable(Table, frozen=True, kw_only=True):
 
 
 class OutputTable(Table, frozen=True, kw_only=True):
-    """File formats and the tolerance of meshes."""
+    """Formats, and the largest distance of a mesh from the true surface."""
 
     formats: Annotated[
         tuple[Format, ...] | None,
@@ -218,13 +218,13 @@ class OutputTable(Table, frozen=True, kw_only=True):
 
 
 class AskedSpec(Table, frozen=True, kw_only=True):
-    """A haptic unit. Required: name, design, diameter_mm and [[layers]]."""
+    """A haptic unit as asked for; `layers` run from the inside out, one entry being a single-layer control."""
 
     name: Annotated[
         str, Meta(min_length=1, max_length=120, description="a name of the variant; the result's folder begins with it")
     ]
     design: Annotated[
-        str, Meta(description="embedded, encapsulating, FILE.py:NAME, or a file of bodies (.step, .stl, .3mf)")
+        str, Meta(description="a design (unitcad list designs), FILE.py:NAME, or a file of bodies (.step, .stl, .3mf)")
     ]
     diameter_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM, description="diameter of the unit")]
     motor: MotorTable = MotorTable(part=DEFAULT_MOTOR)

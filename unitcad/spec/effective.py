@@ -216,7 +216,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
         rows = [
             ("design", self.design),
             ("diameter_mm", self.diameter_mm),
-            ("motor", self.motor.part or f"{self.motor.diameter_mm:g} x {self.motor.thickness_mm:g} mm"),
+            ("motor", f"{self.motor.diameter_mm:g} x {self.motor.thickness_mm:g} mm"),
             ("circuit", self.fpcb and f"tail {self.fpcb.tail}, {self.fpcb.tail_width_mm:g} mm wide"),
             *(
                 (f"layers.{i}", f"{layer.material}, wall {layer.wall_mm:g} mm, cap {layer.cap_mm:g} mm")

@@ -16,6 +16,10 @@ from msgspec import structs
 from unitcad.errors import UnitcadError
 from unitcad.files import read_text
 from unitcad.spec.effective import Spec, with_formats
+from unitcad.spec.toml_lines import has_more
+
+MOST = 20_000
+"""Keys, tables and list entries that a TOML file may have, together."""
 
 
 def read_toml(path: Path, links: bool = True) -> dict[str, Any]:
@@ -28,7 +32,12 @@ def read_toml(path: Path, links: bool = True) -> dict[str, Any]:
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Return a TOML text's data. Raises UnitcadError, which says `name`, and the place where it does not parse."""
+    """Return a TOML text's data.
+
+    Raises UnitcadError, which begins with `name`: with the place if the text does not parse, and if it is too large.
+    """
+    if has_more(text, MOST):
+        raise UnitcadError(f"{name}: has more than {MOST:,} keys, tables and list entries")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -75,13 +75,6 @@ def make(
 
     Raises Refusal or UnitcadError where nothing can be run.
     """
-    if options.store == "":
-        raise WrongArgument("store", "", "needs a folder or an address", "store")
-    if options.store and options.store.startswith("memory://"):
-        if workers.jobs != 0:
-            raise WrongArgument("store", options.store, "is in the memory of one process: leave it out, or jobs = 0")
-        if options.shard or options.folders is False:
-            raise WrongArgument("store", options.store, "ends with this process: each variant needs a folder then")
     if options.folders is False and workers.scheduler is not None and options.store is None and not options.shard:
         why = "results of a cluster go to folders here, or with --store to a store: name one, or leave it out"
         raise WrongArgument("folders", False, why)

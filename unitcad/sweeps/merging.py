@@ -20,7 +20,7 @@ from unitcad.sweeps.shards import ShardRecord, read_shards, shard_folders
 from unitcad.sweeps.store_address import found_at, note_store
 from unitcad.sweeps.unread_keys import swept_estimate
 from unitcad.sweeps.unread_keys import warnings as unread_warnings
-from unitcad.text import listed
+from unitcad.text import some
 
 
 def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
@@ -39,7 +39,7 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     wanted = folders_wanted(options, first.variants)
     if len(opened) > 1 and not wanted:
         raise UnitcadError(
-            f"the shards have their results in {len(opened)} stores, {', '.join(sorted(opened))}, and a batch has one; "
+            f"the shards have their results in {len(opened)} stores, {some(sorted(opened))}, and a batch has one; "
             "merge with --folders"
         )
     _expect_finished(shards, stores)
@@ -91,7 +91,7 @@ def _opened(folder: Path, record: ShardRecord) -> Journal:
 def _maker(*records: ShardRecord) -> str:
     numbers = [f"{record.number}/{record.of}" for record in records]
     each = "each of " if len(numbers) > 1 else ""
-    return f"the sweep with {each}--shard {listed(numbers)} and"
+    return f"the sweep with {each}--shard {some(numbers)} and"
 
 
 def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping[Path, SharedStore]) -> None:

@@ -11,7 +11,6 @@ from unitcad.errors import Refusal
 from unitcad.rooms import load
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
-from unitcad.text import listed
 from unitcad.validation import compound_kind
 
 
@@ -48,7 +47,7 @@ def _entries(count: int) -> str:
     """Say how the entries of a list are numbered."""
     if count < 2:
         return "its only one is 0" if count else "it is empty"
-    return f"they are {listed(map(str, range(count)))}"
+    return f"they are 0 to {count - 1}"
 
 
 def known_paths(base: dict[str, Any]) -> list[str]:

@@ -21,6 +21,7 @@ from unitcad.sweeps.batch_records import BatchHead
 from unitcad.sweeps.journal import SHARDS, batch_in
 from unitcad.sweeps.store_address import found_at
 from unitcad.sweeps.sweep import Sweep
+from unitcad.text import some
 
 RECORD = "shard.json"
 MOST_SHARDS = 9999
@@ -172,7 +173,7 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     of = next(iter(records.values()))[1].of
     missing = [number for number in range(1, of + 1) if number not in records]
     if missing:
-        named = ", ".join(f"{number}/{of}" for number in missing[:5]) + (" ..." if len(missing) > 5 else "")
+        named = some((f"{number}/{of}" for number in missing), 5)
         are = "is" if len(missing) == 1 else "are"
         them = "it" if len(missing) == 1 else "them"
         raise UnitcadError(f"{len(missing)} of {of} shards {are} missing: {named}; run {them} with --shard, then merge")

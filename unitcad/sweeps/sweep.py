@@ -31,6 +31,7 @@ from unitcad.rooms import load
 from unitcad.spec import check_plain, convert, read_toml
 from unitcad.spec.fields import fields_of
 from unitcad.sweeps.paths import check_path
+from unitcad.text import some
 from unitcad.validation import compound_kind, confirm_known, every_template, override, put, read
 from unitcad.validation.load import all_faults
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files
@@ -324,5 +325,5 @@ def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> No
         raise Refusal("sweep", None, 'the sweep is empty: it needs a path with values, such as "diameter_mm"')
     lengths = {axis.path: len(axis) for axis in axes if len(axis) > 1}
     if mode == "zip" and len(set(lengths.values())) > 1:
-        counts = ", ".join(f"{path} has {count}" for path, count in lengths.items())
+        counts = some(f"{path} has {count}" for path, count in lengths.items())
         raise Refusal("sweep.mode", "zip", f"the lists are of unequal lengths: {counts}")

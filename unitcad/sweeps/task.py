@@ -154,6 +154,8 @@ def _delivered(job: Job, task: Task, known: Bundle | None, store: SharedStore, a
     spec = subject_of_text(job.spec)
     maker = _store(task.cache) if task.cache else MemoryStore(known)
     for left in reversed(range(TRIES)):
+        if not left:
+            maker = MemoryStore(known)  # others clear the cache all the time
         before = Counter(maker.counts)
         try:
             product = spec.make(task.only, task.check, maker, Progress())
@@ -161,8 +163,7 @@ def _delivered(job: Job, task: Task, known: Bundle | None, store: SharedStore, a
             store.keep_all([maker.content(sha) for sha in shared if anew or not store.noted(sha)], anew=anew)
             break
         except MissingContent:  # the cache is cleared meanwhile
-            if not left:
-                raise
+            continue
     outcome = _of_product(job, spec, product, maker.counts - before)
     bundle = maker.bundle() if isinstance(maker, MemoryStore) and outcome.built else None
     if bundle:
@@ -201,7 +202,7 @@ def _locally(job: Job, task: Task, out: Path, scratch: Path) -> VariantOutcome:
         return _outcome(job, spec, folder.name, manifest, _manifest_sha256(folder), Counter({"file reused": 1}))
     store = _store(task.cache)
     before = Counter(store.counts)
-    built = folders.write(folder, partial(spec.make, task.only, task.check, store), store, scratch=scratch)
+    built = folders.write(folder, partial(spec.make, task.only, task.check), store, scratch=scratch)
     return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
 
 

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 from unitcad.arrays.array import Array, Box
 from unitcad.arrays.circuit.wiring import Wiring, wiring
 from unitcad.arrays.construction import Construction, Level
+from unitcad.arrays.grooves import stopped_ring
 from unitcad.arrays.limb import bent_stretches
 from unitcad.arrays.piece_seams import (
     Strip,
@@ -28,7 +29,7 @@ from unitcad.arrays.tails import CLEAR
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, shipped
 from unitcad.designs.design import Fitting
 from unitcad.designs.limits import filament_groove
-from unitcad.designs.parts import BEYOND
+from unitcad.designs.parts import ADHESIVE, BEYOND, bond
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point, nearer
@@ -36,7 +37,7 @@ from unitcad.moulds import filament
 from unitcad.moulds.base import PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER, core, outline, plate_top, pry_floor, pry_slot
 from unitcad.moulds.blade import blade
 from unitcad.moulds.cuts import BESIDE, Feature, seams
-from unitcad.moulds.dovetails import Interval, Seam, Split, seen, split, strips
+from unitcad.moulds.dovetails import Interval, Seam, Split, split, strips, unseen
 from unitcad.moulds.labels import corner_labels, engraved, row_width, set_label
 from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, stub_pieces
@@ -46,15 +47,11 @@ from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import (
     Common,
     Extrude,
-    Profile,
     Shape,
     box,
     cut,
     cylinder,
     moved,
-    polygon,
-    ring,
-    turned,
     union,
 )
 from unitcad.shape.body import Body
@@ -402,35 +399,34 @@ def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
     inner = dims.radii[layer] + moulds.land_mm
     outer, depth = inner + moulds.groove_width_mm, groove_depth_of(spec, rim)
     low, high = rim - depth, rim + BEYOND
-    stops: list[list[Shape]] = [[] for _ in cells]
+    stops: list[list[Feature]] = [[] for _ in cells]
     for i, cell in enumerate(cells):
         for other in cells:
             apart = math.hypot(other.x - cell.x, other.y - cell.y)
             if other is not cell and apart < outer + inner:
-                stops[i].append(moved(cylinder(inner, low - BEYOND, high + BEYOND), other.x, other.y))
+                stops[i].append(Feature(((other.x, other.y),), inner))
             if other is not cell and apart < 2 * outer + moulds.least_wall_mm:
-                between = _halfway((cell.x, cell.y), (other.x, other.y), outer, moulds.least_wall_mm)
-                stops[i].append(Extrude(between, low - BEYOND, high + BEYOND))
+                stops[i].append(_halfway((cell.x, cell.y), (other.x, other.y), outer, moulds.least_wall_mm))
     for fin in drawing.fins if low - slot_roof(spec) < moulds.least_wall_mm else ():
         wider = moulds.plinth_clearance_mm + moulds.least_wall_mm
-        over = fin.drawn(drawing.array, outer + BEYOND, wider, low - BEYOND, high + BEYOND)
-        stops[fin.place].append(over)
+        stops[fin.place].append(box_feature(*fin.taken(drawing.array, outer + BEYOND, wider)))
     for seam in drawing.cup_seams:
         for strip in strips(seam, moulds.least_wall_mm + seam.play / 2):
-            over = Extrude(polygon(*strip), low - BEYOND, high + BEYOND)
+            corners = tuple(unseen(corner, seam.across) for corner in strip)
             for i, cell in enumerate(cells):
-                if nearer([seen((cell.x, cell.y), seam.across)], strip, outer):
-                    stops[i].append(over if seam.across == "x" else turned(over, "z", 1))
-    return [cut(moved(ring(inner, outer, low, high), c.x, c.y), stops[i]) for i, c in enumerate(cells)]
+                if nearer([(cell.x, cell.y)], corners, outer):
+                    stops[i].append(Feature(corners))
+    drawn = (stopped_ring((c.x, c.y), (inner, outer), (low, high), stops[i]) for i, c in enumerate(cells))
+    return [groove for groove in drawn if groove]
 
 
-def _halfway(a: Point, b: Point, half: float, width: float) -> Profile:
+def _halfway(a: Point, b: Point, half: float, width: float) -> Feature:
     """Return a strip across the middle of the way from a to b, `half` long to either side of it, mm."""
     apart = math.dist(a, b)
     way = (b[0] - a[0]) / apart, (b[1] - a[1]) / apart
     at = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
     sides = [(along * width / 2, across * half) for along, across in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    return polygon(*((at[0] + u * way[0] - v * way[1], at[1] + u * way[1] + v * way[0]) for u, v in sides))
+    return Feature(tuple((at[0] + u * way[0] - v * way[1], at[1] + u * way[1] + v * way[0]) for u, v in sides))
 
 
 def _seals(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
@@ -716,12 +712,11 @@ def assembly(array: Array) -> tuple[Fitting, ...]:
         "patch on its back, the cavities up."
     )
     lay_in = (
-        "Put a smear of Layer 1's silicone on each pad, where the cap of Layer 1 will touch it (assumed: silicone "
-        "bonds poorly to bare metal and polyimide; a primer or a silicone adhesive holds better). Lay the circuit in "
-        "from the skin's side, motor by motor, its rows in the notches, and push each motor in until its pad lies "
-        "against that cap. The spine lies free between the units. The notches may be filled with the same silicone."
+        f"{bond('each pad', 'the cap of Layer 1')} Lay the circuit in from the skin's side, motor by motor, its rows "
+        "in the notches, and push each motor in until its pad lies against that cap. The spine lies free between the "
+        "units."
     )
-    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, silicone=1, mixed="smear")
+    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, (ADHESIVE,))
 
 
 CONSTRUCTION = Construction(

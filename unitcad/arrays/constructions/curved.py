@@ -545,7 +545,7 @@ def assembly(array: Array) -> tuple[Fitting, ...]:
     solder, lay_in = back_sheet.assembly(array)
     flat = (
         "Open the sleeve until it lies flat and tape its ends down: the circuit is flat, as long as the sheet laid "
-        "flat, and bends with the sleeve when it is worn. It stays flat until the smear is cured."
+        "flat, and bends with the sleeve when it is worn. It stays flat until the adhesive is cured."
     )
     return replace(solder, text=f"{solder.text} {flat}"), lay_in
 

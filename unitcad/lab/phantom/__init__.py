@@ -20,6 +20,7 @@ from unitcad.kernels.mesh import bounds, realise
 from unitcad.lab.phantom.box import BoxLengths, cast, expect_apart, lengths, pieces
 from unitcad.lab.phantom.recipe import PhantomTable, Recipe, recipe, stiffening
 from unitcad.shape.body import Body
+from unitcad.text import some
 
 ACRYLIC = {"density_kg_m3": 1190.0, "youngs_modulus_kpa": 3e6, "poisson_ratio": 0.37, "loss_factor": 0.05}
 """Cast acrylic at room temperature (secondary: data sheets)."""
@@ -167,7 +168,7 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
     """
     recipes = tuple(recipe(one, table.frequency_hz, f"layers.{i}") for i, one in enumerate(table.layers))
     if len({layer.name for layer in table.layers}) < len(table.layers):
-        raise Refusal("layers", ", ".join(layer.name for layer in table.layers), "each layer needs a name of its own")
+        raise Refusal("layers", some(layer.name for layer in table.layers), "each layer needs a name of its own")
     expect_apart(table.points_mm)
     printer = choose("printer", table.printer, printers())
     wall, farthest = wall_distance(table, recipes), f"at {max(table.points_mm):g} mm"
