@@ -132,7 +132,7 @@ def _print_spec(data: dict[str, Any]) -> None:
         _table("Stiff or extreme", _EXTREMES, rows)
         _print_amplification(data["amplification"]["results"])
     rows = [{**row, "left_out": ", ".join(one["what"] for one in row["left_out"])} for row in data["left_out"]]
-    _table("Left out by a request, and what that saves", _REQUESTS, rows)
+    _table("Time saved by requests for fewer outputs", _REQUESTS, rows)
 
 
 def _print_amplification(results: Sequence[dict[str, Any]]) -> None:

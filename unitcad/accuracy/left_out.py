@@ -1,4 +1,4 @@
-"""What a build of a spec leaves out by what is asked for, and the time that it saves."""
+"""The outputs that a build skips for each request, and the time that this saves."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def time_requests(spec: Spec, requests: Mapping[str, Request], repeats: int) -> 
 
 
 def left_out_rows(spec: Spec) -> list[dict[str, Any]]:
-    """Return the time, how much less than for everything that is, and what was left out: a row for each request."""
+    """Return a row for each request: its time, the saving against all outputs, and the skipped outputs."""
     requests = {EVERYTHING: REQUESTS[EVERYTHING], "as the spec asks": (OUTPUTS, spec.output.formats, True), **REQUESTS}
     times = time_requests(spec, requests, 1)
     whole = times[EVERYTHING].median

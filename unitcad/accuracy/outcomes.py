@@ -1,4 +1,4 @@
-"""What becomes of a spec: a build that passes every check, a refusal with a field, or a fault of this program."""
+"""The outcome of a spec: a build that passes every check, a refusal with a field, or a fault of this program."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class Sheet:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Array:
-    """Units at their places on one sheet. `radius_mm`: of the limb, None where it is flat.
+    """Units at their places on one sheet. `radius_mm`: of the limb, None if it is flat.
 
     `layout`: the table that the places came from. `asked`: plain data that gives the same array when read again.
     """

@@ -212,7 +212,7 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
 
 
 def makeable_array(data: Mapping[str, Any]) -> Array:
-    """Return the array of plain data as `array_of` does. Raises Refusal also where no tools or circuit can be made."""
+    """Return the array of plain data as `array_of` does. Raises Refusal also if no tools or circuit can be made."""
     array = array_of(data)
     made_plan(array)
     return array
@@ -232,7 +232,7 @@ def _locate(
 ) -> None:
     """Name the file and the line of a refused value that stands in an array file, and not in an option.
 
-    Nor where an option changed its table: another `layout.kind` has other keys. `written` is the file's data with the
+    Nor if an option changed its table: another `layout.kind` has other keys. `written` is the file's data with the
     whole spec of each unit, `whole` that with the options in it.
     """
     table = refusal.field.rpartition(".")[0]

@@ -91,7 +91,7 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
 
 
 def _model(folder: Path, warn: Callable[[str], None]) -> dict[str, Any] | None:
-    """Return what the 3D view shows; None, and a warning, where it can't be made, as of a unit that runs code."""
+    """Return what the 3D view shows; None, and a warning, if it can't be made, as of a unit that runs code."""
     try:
         return array_model(array_of(read_toml(folder / ARRAY_FILE, links=False)))
     except UnitcadError as error:
@@ -245,7 +245,7 @@ def _places(array: Mapping[str, Any]) -> str:
 
 
 def _tail_end(hidden: Mapping[str, Any] | None) -> str:
-    """Say where a tail ends: under the sheet it has to be made longer, or wires soldered on."""
+    """Say if a tail ends: under the sheet it has to be made longer, or wires soldered on."""
     if hidden is None:
         return "not under the sheet"
     blocked, turn = hidden["blocked_by"], hidden.get("angle_deg")

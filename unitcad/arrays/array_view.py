@@ -24,7 +24,7 @@ BELOW = 14.0
 def array_model(array: Array) -> dict[str, Any]:
     """Return an array for the page in the form of `viewer_models.model`: the patch; tools with what is cast in them.
 
-    Raises UnitcadError where the tools can't be made any more.
+    Raises UnitcadError if the tools can't be made any more.
     """
     model = {**patch_model(array), **tools_model(array)}
     return model | {key: compressed(model[key]) for key in ("unit", "moulds")}
@@ -75,7 +75,7 @@ def patch_glb(moulds: MouldSet, parts: Sequence[PatchPart]) -> bytes:
 def tools_model(array: Array) -> dict[str, Any]:
     """Return the tools of an array's sheet for the viewer, and what is cast in them: a GLB file as bytes, each pour.
 
-    Lengths in mm. Raises UnitcadError where the tools can't be made.
+    Lengths in mm. Raises UnitcadError if the tools can't be made.
     """
     moulds = patch_moulds(array).blank
     plan, apart = moulds.plan, dict(taken_apart(moulds))

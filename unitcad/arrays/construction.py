@@ -20,7 +20,7 @@ from unitcad.spec import Spec
 
 
 class Level(NamedTuple):
-    """Where a sheet lies, mm over the skin, and the thickest that would fit there."""
+    """If a sheet lies, mm over the skin, and the thickest that would fit there."""
 
     low: float
     high: float
@@ -36,11 +36,11 @@ class Construction:
     thickness_mm  of the sheet where the file gives none
     apart         least distance between the edges of two units, mm, and why
     level         from the distinct units, a thickness and the limb's radius (None: flat) to where the sheet lies
-    unfit         from a unit and the sheet to why the sheet can't hold it; "" where it can
+    unfit         from a unit and the sheet to why the sheet can't hold it; "" if it can
     bodies        the silicone that an array has besides its units, as cast
-    plan          tools and pours of those bodies; raises Refusal where they can't be made
+    plan          tools and pours of those bodies; raises Refusal if they can't be made
     assembly      how motors and circuit go into what was cast, a sentence each; () where they are in the units
-    greased       what gets petroleum jelly before the cup of a pour (from 1) is put on; "" where nothing does
+    greased       what gets petroleum jelly before the cup of a pour (from 1) is put on; "" if nothing does
     """
 
     name: str

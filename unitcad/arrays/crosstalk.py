@@ -432,7 +432,7 @@ def _most(data: Crosstalk) -> str:
 def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:
     """Return each array's crosstalk over that of the first: nearest neighbour, and the sums at the worst places.
 
-    In units' own levels at their edge. A ratio is None where one of the two is a single unit.
+    In units' own levels at their edge. A ratio is None if one of the two is a single unit.
     """
     first, found = every[0], []
     for other in every[1:]:

@@ -77,7 +77,7 @@ def patch_map_svg(
     circuit: Profile | None = None,
     key: str = "root_sum_of_squares",
 ) -> str:
-    """Return the patch from outside as an SVG document: sheet, strap slots, units by name, the circuit where given.
+    """Return the patch from outside as an SVG document: sheet, strap slots, units by name, the circuit if given.
 
     With the `data` of `crosstalk_matrix.crosstalk` each unit is coloured by the amplitude that all others together give
     it, in per cent of one unit's level at its edge; `key`: "root_sum_of_squares", or "sum" for the worst phases.
@@ -146,12 +146,12 @@ def _cells(matrix: Sequence[Sequence[float | None]], left: float, top: float, ce
 
 
 def _largest(values: Iterable[float]) -> float:
-    """Return the value that the scale of colours ends at: the largest, 1 where there is none, as of a single unit."""
+    """Return the value that the scale of colours ends at: the largest, 1 if there is none, as of a single unit."""
     return max(values, default=0.0) or 1.0
 
 
 def _share(value: float, high: float) -> float:
-    """Return where a value lies from 0 to `high`, as both are written."""
+    """Return if a value lies from 0 to `high`, as both are written."""
     return float(_percent(value)) / float(_percent(high))
 
 

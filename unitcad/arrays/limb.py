@@ -104,7 +104,7 @@ class Bending:
 
 
 def bending(array: Array) -> Bending | None:
-    """Return how an array bends round its limb; None where it is worn flat."""
+    """Return how an array bends round its limb; None if it is worn flat."""
     radius, middle = array.radius_mm, array.middle_radius_mm
     if radius is None or middle is None:
         return None
@@ -122,7 +122,7 @@ def bending(array: Array) -> Bending | None:
 
 
 def bent_stretches(array: Array) -> tuple[tuple[str, float], ...]:
-    """Return where a plan's silicone stretches as the array is bent, or laid flat, and by how many percent."""
+    """Return if a plan's silicone stretches as the array is bent, or laid flat, and by how many percent."""
     bent = bending(array)
     if not bent:
         return ()

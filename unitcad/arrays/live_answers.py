@@ -51,7 +51,7 @@ def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
 
 
 def asked_toml(text: str, data: Mapping[str, Any], array: Array, trusted: Trusted) -> str:
-    """Return what a text asks for as TOML that names no file: the text itself where it names none."""
+    """Return what a text asks for as TOML that names no file: the text itself if it names none."""
     return to_toml(array) if named_files(data) else text
 
 
@@ -80,7 +80,7 @@ def faults_of(first: Refusal, whole: dict[str, Any], text: str) -> list[Refusal]
 
 
 def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the whole data of a shipped array: of the same construction and kind of layout, where there is one."""
+    """Return the whole data of a shipped array: of the same construction and kind of layout, if there is one."""
     shipped = [expanded(read_toml(path), path.parent) for path in array_templates().values()]
     alike = [one for one in shipped if one["layout"]["kind"] == at(data, "layout.kind")] or shipped
     return next((one for one in alike if one["array"] == data.get("array")), alike[0])
@@ -113,7 +113,7 @@ def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[
 
 
 def holds_code(array: Array) -> bool:
-    """Tell whether a unit of an array holds code. Raises Refusal where it may not run."""
+    """Tell whether a unit of an array holds code. Raises Refusal if it may not run."""
     return any([unit_holds_code(unit) for unit in array.units])
 
 
@@ -123,7 +123,7 @@ def as_data(array: Array) -> dict[str, Any]:
 
 
 def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
-    """Return the form of an array's plain data; `array` None where the data is refused."""
+    """Return the form of an array's plain data; `array` None if the data is refused."""
     holds = array.asked if array else {}
     choices = {
         **choices_of(data),

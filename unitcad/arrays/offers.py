@@ -140,7 +140,7 @@ def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judg
 
 
 def _met(data: Mapping[str, Any], changes: Mapping[str, object], judge: Judge) -> Refusal | None:
-    """Return what data with changes is refused for; None where it is accepted."""
+    """Return what data with changes is refused for; None if it is accepted."""
     tried = copy.deepcopy(dict(data))
     try:
         for path, value in changes.items():
@@ -200,7 +200,7 @@ def _refused_for(bed: str, data: Mapping[str, Any], changes: Mapping[str, object
 
 
 def _largest(most: int, fits: Callable[[int], bool]) -> int:
-    """Return the largest whole number below `most` that fits, where all below one that fits do; 0 for none."""
+    """Return the largest whole number below `most` that fits, if all below one that fits do; 0 for none."""
     low, high = 0, most
     while high - low > 1:
         middle = (low + high) // 2

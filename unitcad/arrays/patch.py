@@ -235,7 +235,7 @@ class PatchMoulds(MouldSet):
 
     @cached_property
     def plan(self) -> Plan:
-        """Tools and pours. Raises Refusal where the moulds can't be made."""
+        """Tools and pours. Raises Refusal if the moulds can't be made."""
         if self.altered:
             return self.altered
         try:

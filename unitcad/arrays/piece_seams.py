@@ -42,7 +42,7 @@ def weep(array: Array, seams: Sequence[Seam], outline: Box, heights: tuple[float
 def too_much(
     array: Array, outline: Box, heights: tuple[float, float], layer_mm3: float
 ) -> Callable[[Sequence[Seam]], str]:
-    """Return what says why seams take more of a layer's volume than C250 lets them, "" where they do not.
+    """Return what says why seams take more of a layer's volume than C250 lets them, "" if they do not.
 
     `outline` and `heights` as those of `weep`.
     """
@@ -78,7 +78,7 @@ class Strip(NamedTuple):
 def on_pieces(strip: Strip, rows: Sequence[Sequence[str]], seams: Sequence[Seam]) -> list[Shape]:
     """Draw a row of texts on each piece of a tool: the first of the `rows` that has room there, else the last.
 
-    Where the tool is cut the piece's number stands after them. A piece without an outer edge has none.
+    If the tool is cut the piece's number stands after them. A piece without an outer edge has none.
     """
     x0, y0, x1, y1 = strip.outer
     columns, lines = intervals((x0, x1), seams, "x"), intervals((y0, y1), seams, "y")[::-1]
@@ -186,9 +186,9 @@ def sized(
     close: Sequence[Feature],
     under: Sequence[Feature] = (),
 ) -> tuple[Sized, ...]:
-    """Return a tool with its `outline` along x and along y, where it exceeds the bed.
+    """Return a tool with its `outline` along x and along y, if it exceeds the bed.
 
-    Cuts lie between the features `clear` where that gives pieces that fit, else between `close`, which none may meet.
+    Cuts lie between the features `clear` if that gives pieces that fit, else between `close`, which none may meet.
     A straight line may cross what lies `under` the tool, teeth stand clear of it. Raises Refusal for a sheet that is
     too narrow for a dovetail.
     """
@@ -252,7 +252,7 @@ def _stepping(array: Array, features: Sequence[Feature]) -> Iterator[Place]:
 
 
 def _passes(row: Sequence[Placed], start: float, pitch: float) -> float:
-    """Return where a row of places is passed: the gap, or the place beside the row, that is nearest to `start`."""
+    """Return if a row of places is passed: the gap, or the place beside the row, that is nearest to `start`."""
     beside = [row[0].x - pitch / 2, row[-1].x + pitch / 2]
     if not beside[0] < start < beside[1]:
         return start
@@ -269,7 +269,7 @@ def _line(passed: Sequence[tuple[float, float]], through: float) -> tuple[Point,
     line = list(dict.fromkeys([*line, (passed[-1][1], FAR)]))
     kept = [line[0]]
     for point, after in pairwise(line[1:]):
-        # None where the line goes straight on.
+        # None if the line goes straight on.
         if to_segment(point, kept[-1], after) > 1e-3:
             kept.append(point)
     return (*kept, line[-1])

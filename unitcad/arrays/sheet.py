@@ -58,14 +58,14 @@ BESIDE_SLOT = 2.0
 LEAST_THICKNESS = 0.5
 """Of a sheet, mm."""
 HOLD_MM = 0.2
-"""How much smaller than its unit's a pocket's radius is where nothing else is asked for, mm."""
+"""How much smaller than its unit's a pocket's radius is if nothing else is asked for, mm."""
 MOST_HOLD = 0.25
 """Hoop strain of a pocket round its unit, at most (assumed)."""
 BUCKLES = "assumed: a sheet stretched further buckles, and squeezes the unit out of round"
 
 
 def middle_radius(asked: AskedArray, way: Construction, units: list[Spec]) -> float | None:
-    """Return the radius of the sheet's middle round the limb, mm; None where the array is worn flat."""
+    """Return the radius of the sheet's middle round the limb, mm; None if the array is worn flat."""
     if asked.body.radius_mm is None:
         return None
     level = way.level(_distinct(units), _thickness(asked, way, _distinct(units)), asked.body.radius_mm)
@@ -77,7 +77,7 @@ def _distinct(units: list[Spec]) -> tuple[Spec, ...]:
 
 
 def _thickness(asked: AskedArray, way: Construction, units: tuple[Spec, ...]) -> float:
-    """Return the sheet's thickness; where none is asked for, the construction's, or as much as there is room for."""
+    """Return the sheet's thickness; if none is asked for, the construction's, or as much as there is room for."""
     if asked.sheet.thickness_mm is not None:
         return asked.sheet.thickness_mm
     most = down(way.level(units, way.thickness_mm, asked.body.radius_mm).most)

@@ -176,7 +176,7 @@ def _longest(
     laid: Sequence[Sequence[Tail]],
     slots: Sequence[Box],
 ) -> float:
-    """Return the longest tail that finds a way at one of the angles, mm in steps of 0.1; 0 where none does."""
+    """Return the longest tail that finds a way at one of the angles, mm in steps of 0.1; 0 if none does."""
     free = [tails_of if j != owner else [] for j, tails_of in enumerate(laid)]
 
     def fits(tenths: int) -> bool:
@@ -247,11 +247,11 @@ MOST_NAMES = 12
 class HiddenTail:
     """A tail, or a bundle of wires, whose end the sheet covers.
 
-    short_mm    from its end to where all of its width is out, along it
+    short_mm    from its end to if all of its width is out, along it
     length_mm   of the tail that would come out, beyond the unit's edge
     field       the spec's key of that length
     blocked_by  what stands in the straight way there; "" where it is free
-    angle_deg   at which the tail as it is would come out; None where none of the angles that are tried is free
+    angle_deg   at which the tail as it is would come out; None if none of the angles that are tried is free
     """
 
     place: str
@@ -327,7 +327,7 @@ def longer_tails(hidden: Sequence[HiddenTail], most_names: int = 0) -> str:
 
 
 def hidden_tails_warning(array: Array) -> list[str]:
-    """Return the warning of tails that end under the sheet; [] where none does."""
+    """Return the warning of tails that end under the sheet; [] if none does."""
     hidden = hidden_tails(array)
     if not hidden:
         return []

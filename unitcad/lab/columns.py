@@ -63,9 +63,9 @@ def declared(texts: Iterable[str], field: str = "--column") -> dict[str, Declare
 
 
 def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]) -> tuple[int, float] | None:
-    """Return the index of a quantity's column and the factor to SI; None where the file has none.
+    """Return the index of a quantity's column and the factor to SI; None if the file has none.
 
-    Raises Refusal where several columns fit, and for a unit that is missing or of another quantity.
+    Raises Refusal if several columns fit, and for a unit that is missing or of another quantity.
     """
     channels = recording.channels
     if quantity in given:
@@ -109,6 +109,6 @@ def _unit(text: str, quantity: str) -> float | None:
     known, written = COLUMN_UNITS[quantity], plain(text)
     if (factor := known.get(text.strip(), known.get(written))) is not None:
         return factor
-    # Case alone may differ where it can't be a prefix's: mN and MN, mm and Mm are two units.
+    # Case alone may differ if it can't be a prefix's: mN and MN, mm and Mm are two units.
     alike = [unit for unit in known if unit.lower() == written.lower()]
     return known[alike[0]] if len(alike) == 1 and alike[0] in _ANY_CASE else None

@@ -79,7 +79,7 @@ def read_dynamic(
 ) -> DynamicCurve:
     """Return a file's storage and loss over frequency.
 
-    Raises Refusal for columns and units that are missing, and where the file does not say shear or tension.
+    Raises Refusal for columns and units that are missing, and if the file does not say shear or tension.
     """
     recording = open_recording(path, layout)
     wanted = {q: found for q in ("frequency", "storage", "loss") if (found := column_of(recording, q, given))}
@@ -111,7 +111,7 @@ def read_dynamic(
 def evaluate_dynamic(curve: DynamicCurve, frequency_hz: float, poisson_ratio: float = 0.5) -> DynamicResult:
     """Fit the law and evaluate it at a frequency, in terms of Young's modulus: 2 (1 + nu) times that of shear.
 
-    Raises Refusal where the law does not describe the data at all.
+    Raises Refusal if the law does not describe the data at all.
     """
     factor = 2.0 * (1.0 + poisson_ratio) if curve.deformation == "shear" else 1.0
     omega, storage, loss = 2.0 * np.pi * curve.frequency, factor * curve.storage, factor * curve.loss

@@ -104,7 +104,7 @@ class OwnUnit:
 
     @property
     def error(self) -> float:
-        """The standard error of ln level; 0 where no interval is given: it is then part of the discrepancy."""
+        """The standard error of ln level; 0 if no interval is given: it is then part of the discrepancy."""
         if self.level.low is None or self.level.high is None:
             return 0.0
         return float(np.log(self.level.high / self.level.low)) / (2 * _TWO_SIDED)
@@ -293,7 +293,7 @@ def _compared(lab: FitLab, moduli: Moduli) -> Compared:
 
 
 def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Campaigns:
-    """Return the paper's units, where they are wanted, and the lab's own after them."""
+    """Return the paper's units, if they are wanted, and the lab's own after them."""
     paper = measured_table(moduli)
     known = np.array([bool(np.all(np.isfinite(units.youngs_modulus))) for units in paper.inputs])
     kept = np.flatnonzero(known) if lab.settings.with_paper else []

@@ -23,7 +23,7 @@ from unitcad.spec.toml import text_of
 
 MEASURED = "measured.toml"
 OURS = re.compile(r"measured\.toml|measure\.(json|html)|record-\d+-(time|periods|spectrum)\.svg|decay-\d+\.svg")
-"""Names of the files that a run writes, and removes where a former run left more of them."""
+"""Names of the files that a run writes, and removes if a former run left more of them."""
 
 
 def write(result: Measured, folder: Path) -> None:

@@ -124,7 +124,7 @@ class Measured:
 
     @property
     def assumed(self) -> dict[str, Any]:
-        """The parameters of the chains that their sources do not state; none where no such chain was used."""
+        """The parameters of the chains that their sources do not state; none if no such chain was used."""
         return {name: value for chain in self.chains for name, value in chain.assumed.items()}
 
 

@@ -264,7 +264,7 @@ def _rate(
 ) -> tuple[float, Floats | None]:
     """Return the rate in Hz, and the times in s where they tell it.
 
-    Raises Refusal where the file says another rate than the campaign does.
+    Raises Refusal if the file says another rate than the campaign does.
     """
     if table.rate_hz is None:
         return _own_rate(recording, table, time, column, shown)
@@ -299,7 +299,7 @@ def _own_rate(
 
 LEAST_GAIN = 0.9
 HIGHEST_HZ = 500.0
-"""Where a record's spectrum ends, in Hz."""
+"""If a record's spectrum ends, in Hz."""
 SAME_LINE_HZ = 0.5
 MOST_SCATTER = MOST_DRIFT = 0.05
 LEAST_PERIODS, NO_PERIODS = 20, 5

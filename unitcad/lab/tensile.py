@@ -31,7 +31,7 @@ _FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
 
 @dataclass(frozen=True)
 class Specimen:
-    """A specimen and its machine: lengths mm, the cell's full scale N, the speed mm/min; None where not known.
+    """A specimen and its machine: lengths mm, the cell's full scale N, the speed mm/min; None if not known.
 
     `crosshead`: the strain is the crosshead's travel over the gauge length, not the specimen's own.
     """
@@ -81,7 +81,7 @@ def read_curve(
 ) -> TensileCurve:
     """Return a file's curve. What `specimen` gives goes before the file's header.
 
-    Raises Refusal where a column or a unit is missing or ambiguous, or where the points are no pull; UnitcadError for
+    Raises Refusal if a column or a unit is missing or ambiguous, or where the points are no pull; UnitcadError for
     a file that can't be read.
     """
     recording = open_recording(path, layout)
@@ -151,7 +151,7 @@ def header_of(path: Path) -> Specimen:
                 found["crosshead"] = True
             elif re.search("extensometer|video|dic", value, re.IGNORECASE):
                 found["crosshead"] = False
-    if length := found.pop("length_mm", None):  # a bare "Length" is the gauge length where no other line gives one
+    if length := found.pop("length_mm", None):  # a bare "Length" is the gauge length if no other line gives one
         found.setdefault("gauge_mm", length)
     return Specimen(**found)  # type: ignore[arg-type]
 
@@ -263,7 +263,7 @@ def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None
 
 
 def secant(strain: np.ndarray, stress: np.ndarray, at: float) -> float | None:
-    """Return stress over strain at a strain, Pa, interpolated; None where no points of the curve are near it."""
+    """Return stress over strain at a strain, Pa, interpolated; None if no points of the curve are near it."""
     if not strain[0] <= at <= strain[-1]:
         return None
     after = int(np.searchsorted(strain, at))
@@ -322,7 +322,7 @@ LEAST_OF_CELL, LATEST_START, MOST_BREAK, MOST_TOE = 1e-3, 0.02, 1.25, 0.02
 
 @dataclass(frozen=True)
 class MethodRow:
-    """One method over all specimens: the mean of logarithms (Pa) and each specimen's value; None where not usable."""
+    """One method over all specimens: the mean of logarithms (Pa) and each specimen's value; None if not usable."""
 
     method: str
     value: float | None
@@ -344,7 +344,7 @@ class TensileResult:
     """The modulus (Pa) at the strain of use, its range, every method, and the parts of the uncertainty.
 
     `scatter`, `geometry`: half-widths of the logarithm; scatter is None for one specimen. `spread`: the largest over
-    the least defensible value. `rate`: strain per second, None where not known.
+    the least defensible value. `rate`: strain per second, None if not known.
     """
 
     value: float
@@ -366,7 +366,7 @@ class TensileResult:
 def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: Material | None = None) -> TensileResult:
     """Evaluate the specimens of one material at a strain of use (low, high); `sheet` is compared with the break.
 
-    Raises Refusal where no curve spans the strain of use, where a file is given twice, and for specimens that differ so
+    Raises Refusal if no curve spans the strain of use, if a file is given twice, and for specimens that differ so
     much that they are not one silicone's.
     """
     known: dict[str, TensileCurve] = {}

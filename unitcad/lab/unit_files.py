@@ -34,7 +34,7 @@ class UnitNames(Protocol):
 
 
 def file_of(folder: Path, name: str, field: str) -> Path:
-    """Return the path of a file that a lab's file in `folder` names. Raises Refusal where there is none."""
+    """Return the path of a file that a lab's file in `folder` names. Raises Refusal if there is none."""
     path = folder / name
     if not path.is_file():
         raise Refusal(field, name, f"no such file in {files.seen_from(folder)}")
@@ -42,7 +42,7 @@ def file_of(folder: Path, name: str, field: str) -> Path:
 
 
 def source_file(unit: UnitNames, folder: Path, field: str) -> str | None:
-    """Return the name of the file that tells what a unit is; None for a template, or where nothing tells it.
+    """Return the name of the file that tells what a unit is; None for a template, or if nothing tells it.
 
     Raises Refusal for a template that is not known, a file that is not there, and a cast record that is not valid or
     has no such unit.
@@ -107,14 +107,14 @@ def _spec_with(field: str, base: str, changes: Mapping[str, Any], folder: Path, 
 
 
 def measured_walls(asked: Spec, built: Spec) -> str:
-    """Say which walls were measured, inside out; "" where none differs from what was asked."""
+    """Say which walls were measured, inside out; "" if none differs from what was asked."""
     if asked.layers == built.layers:
         return ""
     return "walls as measured, " + ", ".join(f"{layer.wall_mm:.3g}" for layer in built.layers) + " mm"
 
 
 def _cast(unit: UnitNames, folder: Path, field: str) -> tuple[CastRecord, CastUnit | None]:
-    """Return a cast record and the unit that is meant; None where nobody looked at any."""
+    """Return a cast record and the unit that is meant; None if nobody looked at any."""
     where, name = f"{field}.cast", str(unit.cast)
     path = file_of(folder, name, where)
     try:

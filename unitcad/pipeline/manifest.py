@@ -30,7 +30,7 @@ NO_KERNEL = "no B-rep kernel is installed for STEP"
 
 
 class BodyFile(TypedDict):
-    """A file that holds a body."""
+    """A file that contains a body."""
 
     path: str
     sha256: str
@@ -79,14 +79,14 @@ class MeshFindings(TypedDict):
 
 
 class ModelLevel(TypedDict):
-    """A model's level at the edge, None where it gives no number, and its mean error against the measured levels."""
+    """A model's level at the edge, None if it gives no number, and its mean error against the measured levels."""
 
     edge: float | None
     table_error: float | None
 
 
 class EstimateSummary(TypedDict):
-    """The estimate in short; `measured` is the paper's level of this unit, None where there is none.
+    """The summary of the estimate; `measured` is the paper's level of this unit, None if there is none.
 
     `answer` leads the estimate; `model` has the least error of those that give a level.
     """
@@ -183,7 +183,7 @@ def of_unit(
             "kernel": "manifold3d",
             "tolerance_mm": spec.output.tolerance_mm,
             "segments": moulds.segments,
-            "note": "volume_mm3 and bbox_mm are the mesh's: its corners may stand out by the tolerance",
+            "note": "volume_mm3 and bbox_mm are the mesh's: its corners may exceed the surface by the tolerance",
         },
         parts=[
             {
@@ -205,7 +205,7 @@ def of_unit(
 
 
 def _left_out(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
-    """Name what this variant does without, and why."""
+    """Name the outputs that this variant lacks, and why."""
     if not check or "moulds" not in only:
         yield "mould checks", NO_MOULDS if check else UNCHECKED
     if not check:
@@ -219,7 +219,7 @@ def _left_out(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
     yield from design.left_out(spec)
     for name in OUTPUTS:
         if name not in only:
-            # The page offers the command for what was not asked for (report/app/estimate.js).
+            # The page offers the command for outputs that were not asked for (report/app/estimate.js).
             yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
     if "step" not in spec.output.formats:
         yield "boundary representation", "no STEP asked for" if _has_step_kernel() else NO_KERNEL

@@ -271,7 +271,7 @@ class Live:
 
 
 async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaitable[bytes]]) -> Response:
-    """Parse a message, handle it, and answer with JSON: with the one fault where there is one."""
+    """Parse a message, handle it, and answer with JSON: with the one fault if there is one."""
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
         return PlainTextResponse("messages are application/json\n", 415)
     try:
@@ -318,7 +318,7 @@ def _plain(path: Path) -> str:
 
 
 def _within(root: Path, asked: str) -> Path | None:
-    """Return the regular file below a folder that a request's path means; None where it means none, or a way out."""
+    """Return the regular file below a folder that a request's path means; None if it means none, or a way out."""
     parts = PurePosixPath(asked).parts
     if (
         not parts

@@ -50,7 +50,7 @@ _TEXTS_OF_FILES = ("estimate.fit_source",)
 
 
 def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
-    """Return the form of a spec's plain data; `spec` is the effective one, None where the data is refused."""
+    """Return the form of a spec's plain data; `spec` is the effective one, None if the data is refused."""
     holds = to_data(spec) if spec else {}
     choices = choices_of(data)
     made = [Group("", "Unit", [*fields(AskedSpec, "", data, holds, choices, ("name", "design", "diameter_mm"))])]
@@ -105,7 +105,7 @@ def fields(
 
 
 def _numbers_of(kind: Any, value: Any) -> tuple[Any, ...]:
-    """Return the kinds of a list's entries where it has a fixed number of numbers; else none."""
+    """Return the kinds of a list's entries if it has a fixed number of numbers; else none."""
     if not isinstance(value, list | tuple):
         return ()
     tuples = (typing.get_args(one) for one in alternatives(kind) if typing.get_origin(one) is tuple)

@@ -85,7 +85,7 @@ class Gate:
             self._under_way -= 1
 
     def _refused(self, scope: Scope) -> tuple[int, str] | None:
-        """Return the status and the reason for which a request is refused by its head alone; None where it is not."""
+        """Return the status and the reason for which a request is refused by its head alone; None if it is not."""
         headers = [(name.lower(), value) for name, value in scope["headers"]]
         hosts = [value.decode("latin-1").lower() for name, value in headers if name == b"host"]
         if len(hosts) != 1 or not means(hosts[0], self.hosts):

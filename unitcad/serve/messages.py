@@ -141,7 +141,7 @@ class Group(Struct, frozen=True, omit_defaults=True):
 
 
 class Answer(Struct, kw_only=True, omit_defaults=True):
-    """What a question gets: the text after its edits, the faults, and what was asked for where there is none.
+    """What a question gets: the text after its edits, the faults, and what was asked for if there is none.
 
     `milliseconds` is the time that it took, `processor_ms` that of the processor.
     `groups` are the form's; `spec` the effective spec; `figures` are (name, value, unit), `drawings` (caption, SVG).

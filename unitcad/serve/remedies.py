@@ -29,9 +29,9 @@ Judge = Callable[[dict[str, Any]], Mapping[str, Any]]
 def remedied(
     faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[Edit], judge: Judge, whole: Judge
 ) -> list[Fault]:
-    """Return the faults of plain data, each with its remedies: what `judge` accepts, and where it can be `whole` too.
+    """Return the faults of plain data, each with its remedies: what `judge` accepts, and if it can be `whole` too.
 
-    `since` takes back what was changed since the data was accepted, newest first. Where one of these changes alone is
+    `since` takes back what was changed since the data was accepted, newest first. If one of these changes alone is
     to blame for a fault of another field, the fault stands `at` the changed one. `whole` also refuses what no tools can
     be made of.
     """
@@ -92,7 +92,7 @@ def _tried(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool,
         return whole_too
     if own and (nearest := _nearest(data, own, judge, whole)) is not None:
         return nearest
-    # Where nothing makes all of it accepted, or nothing says what was, it cures its own fault.
+    # If nothing makes all of it accepted, or nothing says what was, it cures its own fault.
     cures = not alone or not own or _accepted(_after(data, Edit(path=fault.field, value=fault.nearest)), judge)
     return fault.nearest if cures else None
 
@@ -175,7 +175,7 @@ def _is_float(value: object) -> TypeGuard[float]:
 
 
 def _after(data: Mapping[str, Any], edit: Edit) -> dict[str, Any]:
-    """Return plain data after an edit; unchanged where its path leads nowhere."""
+    """Return plain data after an edit; unchanged if its path leads nowhere."""
     changed = copy.deepcopy(dict(data))
     try:
         if edit.remove:

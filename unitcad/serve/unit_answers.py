@@ -59,7 +59,7 @@ def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
 
 
 def asked_toml(text: str, data: Mapping[str, Any], spec: Spec, trusted: Trusted) -> str:
-    """Return what a text asks for as TOML that names no file: the text itself where it names none."""
+    """Return what a text asks for as TOML that names no file: the text itself if it names none."""
     import tomlkit
 
     return tomlkit.dumps(with_files(data, trusted)) if files_named(data) else text
@@ -76,7 +76,7 @@ def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[
 
 
 def holds_code(spec: Spec) -> bool:
-    """Tell whether a spec holds code. Raises Refusal where it may not run."""
+    """Tell whether a spec holds code. Raises Refusal if it may not run."""
     code = spec.design_source is not None and not is_body_file(spec.design)
     if code and not is_allowed(spec.design, spec.design_source or ""):
         raise Refusal("design", spec.design, "code from a page does not run")

@@ -45,7 +45,7 @@ class BatchResult:
     def rows(self) -> list[dict[str, Any]]:
         """A row a variant, as in batch.json: what was swept, volumes in mm3, masses in g, edge levels.
 
-        Raises UnitcadError where the folder has gone, or has neither batch.json nor variants.parquet.
+        Raises UnitcadError if the folder has gone, or has neither batch.json nor variants.parquet.
         """
         table = read_batch(self.folder)
         if table is None:
@@ -73,7 +73,7 @@ def make(
 ) -> Summary:
     """Make a sweep's variants in `folder`: estimates alone as one table in this process, all else by `workers`.
 
-    Raises Refusal or UnitcadError where nothing can be run.
+    Raises Refusal or UnitcadError if nothing can be run.
     """
     if options.folders is False and workers.scheduler is not None and options.store is None and not options.shard:
         why = "results of a cluster go to folders here, or with --store to a store: name one, or leave it out"
@@ -123,8 +123,8 @@ def batch(
     `store` is a folder or an address (s3://bucket/path) that workers put content into; `folders` says whether each
     variant has a folder, by default below 1,000 variants. `tables` are any of csv, json, parquet; by default the
     first two, from 10,000 variants on the last one. `shard`, such as "3/16", makes one part of the sweep. The same call
-    again goes on where an earlier one ended. What becomes of a variant is in the result. Raises Refusal or UnitcadError
-    where nothing can be run.
+    again goes on if an earlier one ended. What becomes of a variant is in the result. Raises Refusal or UnitcadError
+    if nothing can be run.
     """
     check_number("jobs", jobs, 0, 1024, whole=True)
     check_number("timeout", timeout, 0.001, 1e9)

@@ -188,7 +188,7 @@ def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: boo
 
 
 def _write_page(folder: Path, asked: bool) -> None:
-    """Write a batch's page where it is asked for; one that is there is kept up."""
+    """Write a batch's page if it is asked for; one that is there is kept up."""
 
     if asked or (folder / PAGE).is_file():
         with progress(folder.name) as say:

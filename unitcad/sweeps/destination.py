@@ -1,4 +1,4 @@
-"""Where a batch's results go, as its parent sees it: folders on this disk, or a store that workers write to."""
+"""If a batch's results go, as its parent sees it: folders on this disk, or a store that workers write to."""
 
 from __future__ import annotations
 

@@ -230,7 +230,7 @@ def _block(
 def _merged(units: Units, same: np.ndarray) -> Iterator[tuple[np.ndarray, Units]]:
     """Yield rows of units and these units, neighbouring layers of one silicone as one: `variant_units.merged`.
 
-    `same` (rows, N - 1) tells where a layer is of the silicone of the one inside it.
+    `same` (rows, N - 1) tells if a layer is of the silicone of the one inside it.
     """
     assert units.section is not None
     for pattern in np.unique(same, axis=0):

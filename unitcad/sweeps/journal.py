@@ -100,7 +100,7 @@ class Journal:
         self.close()
 
     def own(self, index: int) -> JournalEntry | None:
-        """Return the last line of a variant as it was written; None where there is none."""
+        """Return the last line of a variant as it was written; None if there is none."""
         place = index - self._first
         if not 0 <= place < len(self._lines) or self._lines[place] == NOT_THERE:
             return None
@@ -132,7 +132,7 @@ class Journal:
     def _continues(self, path: Path) -> bool:
         """Check whether a journal is this batch's, of this version of the code; count the lines that are damaged.
 
-        Raises UnitcadError where the folder holds another batch.
+        Raises UnitcadError if the folder holds another batch.
         """
         if path.is_symlink() or not path.is_file():
             raise UnitcadError(f"{path}: is not a file; choose another folder with -o")
@@ -166,7 +166,7 @@ class Journal:
 
 
 def batch_in(out: Path) -> str | None:
-    """Return the identity of the batch whose journal is in a folder; None where there is none, or a damaged one."""
+    """Return the identity of the batch whose journal is in a folder; None if there is none, or a damaged one."""
     try:
         with open(out / JOURNAL, "rb") as file:
             head = _head(file.readline(LONGEST))
@@ -198,7 +198,7 @@ def _packed(data: dict[str, Any], seed: int) -> bytes:
 
 
 def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
-    """Return the data of a line; None where it is damaged or of another batch."""
+    """Return the data of a line; None if it is damaged or of another batch."""
     text, _, _ = line.rpartition(b', "crc": "')
     if line != text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed):
         return None
@@ -206,7 +206,7 @@ def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
 
 
 def _entry(line: bytes, seed: int) -> JournalEntry | None:
-    """Return the entry in a line; None where it is damaged, or holds something else."""
+    """Return the entry in a line; None if it is damaged, or holds something else."""
     data = _unpacked(line, seed)
     try:
         return None if data is None else convert(data, JournalEntry)
@@ -215,7 +215,7 @@ def _entry(line: bytes, seed: int) -> JournalEntry | None:
 
 
 def _head(line: bytes) -> dict[str, Any] | None:
-    """Return a journal's head; None where the line is none. Version 1 has no checksum."""
+    """Return a journal's head; None if the line is none. Version 1 has no checksum."""
     head = _unpacked(line, 0)
     if head is None:
         try:

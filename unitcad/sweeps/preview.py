@@ -31,7 +31,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     """Count variants, distinct geometries and parts, files and megabytes: of a shard its own, if one is asked for.
 
     Every variant that is looked at is validated; `refused` holds the first ones that are refused. Raises UnitcadError
-    where all are.
+    if all are.
     """
     only = checked_outputs(options.only)
     whole = counted(sweep, options.limit)

@@ -57,7 +57,7 @@ def pack(store: SharedStore, products: Sequence[Product]) -> list[RecordPlace]:
 def read_record(store: SharedStore, place: RecordPlace) -> tuple[Product, str]:
     """Return the product at a place, without its manifest as data, and the code that made it.
 
-    Raises MissingContent where it is not there or damaged, UnitcadError for a record that names a file outside its
+    Raises MissingContent if it is not there or damaged, UnitcadError for a record that names a file outside its
     folder, OSError where the store can't be reached.
     """
     packed = store.part(place.pack, place.start, place.end, place.sha256)
@@ -116,7 +116,7 @@ def known_bundle(store: SharedStore, geometry: str) -> Bundle | None:
 
 
 def offer_bundle(store: SharedStore, geometry: str, bundle: Bundle, *, anew: bool = False) -> bool:
-    """Write a geometry's bundle once its contents are there; False where another worker was first."""
+    """Write a geometry's bundle once its contents are there; False if another worker was first."""
     return store.enter(_key(geometry), vars(bundle), anew=anew)
 
 

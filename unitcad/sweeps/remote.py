@@ -21,7 +21,7 @@ class Receiver(Folders):
         return replace(task, known=self.known(task.geometry))
 
     def known(self, geometry: str) -> Bundle | None:
-        """Return the bundle of a geometry, or None where any of it is missing."""
+        """Return the bundle of a geometry, or None if any of it is missing."""
         bundle = self.store.peek(_key(geometry))
         if bundle is None or not all(map(self.store.has, bundle["files"].values())):
             return None

@@ -49,7 +49,7 @@ def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskS
 
 
 def _kept(out: Path) -> SharedStore | None:
-    """Return the store of a batch's earlier run; None where there is none, or it can't be reached."""
+    """Return the store of a batch's earlier run; None if there is none, or it can't be reached."""
     with contextlib.suppress(UnitcadError):
         return _store_of(out)
     return None
@@ -121,7 +121,7 @@ def export_variants(
 def stored_spec(batch: Path, folder: str) -> str:
     """Return the spec of a variant of a batch that has no folder for it, as text, from the batch's store.
 
-    Raises UnitcadError where no variant has a folder of that name, and for what the store has lost; OSError.
+    Raises UnitcadError if no variant has a folder of that name, and for what the store has lost; OSError.
     """
     if not (batch / JOURNAL).is_file():
         raise WrongArgument("folder", folder, f"{batch} is not the folder of a batch")

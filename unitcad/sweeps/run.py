@@ -62,7 +62,7 @@ def run(
     """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
 
     `executor`, of that many `workers`, is the caller's to shut down. With `remote` its workers don't share this disk:
-    results come back as messages. What an earlier run in `out` finished is not made again. Raises UnitcadError where
+    results come back as messages. What an earlier run in `out` finished is not made again. Raises UnitcadError if
     nothing can be run; whatever happens to a variant is in the summary.
     """
     head = batch_head(sweep, checked_outputs(options.only), options)
@@ -262,7 +262,7 @@ class _Batch:
                 outcomes = tasks.outcomes(future.result())
             except WorkerEnded as error:
                 self._lost(task, error)
-            except UnitcadError:  # with NoWorker: where no worker can start, none of the others can be made either
+            except UnitcadError:  # with NoWorker: if no worker can start, none of the others can be made either
                 raise
             except (Exception, CancelledError) as error:
                 self._lost(task, error)

@@ -129,7 +129,7 @@ def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | No
 
 
 def _record(folder: Path) -> ShardRecord | None:
-    """Return a shard's record; None where there is none yet, or a damaged one, which a merge names."""
+    """Return a shard's record; None if there is none yet, or a damaged one, which a merge names."""
     try:
         return _read(folder)
     except (UnitcadError, msgspec.MsgspecError):
@@ -144,7 +144,7 @@ def _read(folder: Path) -> ShardRecord:
 def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     """Return the records of all shards of one batch, in order.
 
-    Raises UnitcadError where one is missing, there twice, or of another batch.
+    Raises UnitcadError if one is missing, there twice, or of another batch.
     """
     if not folders:
         raise UnitcadError("there are no shards to merge: name their folders, or the folder that holds them")

@@ -1,4 +1,4 @@
-"""Where a batch's store is, as its folder notes it: by a way from the folder where both can be moved together."""
+"""If a batch's store is, as its folder notes it: by a way from the folder if both can be moved together."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def found_at(out: Path, address: str) -> str:
 
 
 def store_noted(out: Path) -> str | None:
-    """Return the address of the store that a batch's folder notes, None where it notes none. Raises UnitcadError."""
+    """Return the address of the store that a batch's folder notes, None if it notes none. Raises UnitcadError."""
     if not (out / ADDRESS).is_file():
         return None
     return found_at(out, str(files.read_json(out / ADDRESS)["store"]))

@@ -95,7 +95,7 @@ class SweepTable(Struct, frozen=True):
 
 
 class CaseKeys(Struct, frozen=True):
-    """Keys of a case that are no paths: its base where it is not the file's first one, a name for its folder."""
+    """Keys of a case that are no paths: its base if it is not the file's first one, a name for its folder."""
 
     base: str | None = None
     name: str | None = None

@@ -1,4 +1,4 @@
-"""The work of one task: some variants that share a geometry, one after the other. Runs where an executor puts it."""
+"""The work of one task: some variants that share a geometry, one after the other. Runs if an executor puts it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Task:
     """Variants of one geometry, and how to make them.
 
     With `store` (an address) results go there, and `specs` are the jobs' specs by `record_packs.packed_specs`; work is
-    then shared by `cache` where there is one, else by the store. With `out` and `cache` (folders that the worker
+    then shared by `cache` if there is one, else by the store. With `out` and `cache` (folders that the worker
     reaches) results go there. Without, they are in the outcomes, and `known` is what the caller has of this geometry.
     `allowed` is the code that the caller may run, and so may the worker.
     """
@@ -72,7 +72,7 @@ class Task:
 class VariantOutcome:
     """Outcome of one variant; `manifest` is the SHA-256 of its manifest.json.
 
-    `record` is where a store has the files. `product`, `contents` and `bundle` are set only where the caller places the
+    `record` is if a store has the files. `product`, `contents` and `bundle` are set only where the caller places the
     files.
     """
 

@@ -51,7 +51,7 @@ class SweptEstimate(Struct, frozen=True):
 
 
 def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
-    """Return the models' errors and the keys that each does not read; None where no variant has an estimate.
+    """Return the models' errors and the keys that each does not read; None if no variant has an estimate.
 
     A key is changed alone, from several variants, through several of its values, since a rule by name would have to
     know every model. A key that can't be changed alone, or whose levels are not known, is taken for read.

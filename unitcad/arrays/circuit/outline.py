@@ -41,7 +41,7 @@ _MOST_TURN = math.radians(170)
 def outline(array: Array, laid: Wiring | None = None) -> Profile:
     """Return the circuit's outline, counter-clockwise: pads and strips, inner corners of `circuit.corner_mm`.
 
-    `laid` is the array's wiring, where it is known. Raises Refusal as `wiring`, and for corners that would enclose a
+    `laid` is the array's wiring, if it is known. Raises Refusal as `wiring`, and for corners that would enclose a
     hole or reach into a unit's silicone beside its notch.
     """
     table = array.circuit or CircuitTable()
@@ -145,7 +145,7 @@ def _with_arcs(corners: np.ndarray) -> list[Vertex]:
     n = len(corners)
     ring = np.concatenate([corners, corners[:1]])
     sides = np.linalg.norm(np.diff(ring, axis=0), axis=1)
-    # Up to where a side is too long for an arc's; none has as many sides as half the finest circle.
+    # Up to if a side is too long for an arc's; none has as many sides as half the finest circle.
     long = np.append(np.flatnonzero(sides >= 2.5 * _CHORD), n)
     found: list[Vertex] = []
     at = 0

@@ -73,7 +73,7 @@ class Wiring:
 def wiring(array: Array) -> Wiring:
     """Return the common circuit of an array's motors.
 
-    Raises Refusal, with the nearest value that fits, where a row or the spine runs into a unit or a strap slot, where
+    Raises Refusal, with the nearest value that fits, if a row or the spine runs into a unit or a strap slot, if
     no gap is free, and where the circuit would be bent too much round the limb.
     """
     table = array.circuit or CircuitTable()
@@ -161,7 +161,7 @@ def _lines(pads: Sequence[CircuitPad], turned: bool) -> list[Line]:
 
 
 def _gaps(pads: Sequence[CircuitPad], table: CircuitTable) -> list[float]:
-    """Return where a straight spine could lie, the middle's nearest first: between columns, or through a single one."""
+    """Return if a straight spine could lie, the middle's nearest first: between columns, or through a single one."""
     columns = sorted({u for _, along in _lines(pads, table.rows == "y") for u in along})
     if len(columns) == 1:
         return columns

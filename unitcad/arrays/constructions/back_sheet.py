@@ -228,7 +228,7 @@ def slot_roof(spec: Spec) -> float:
 def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
     """Return tools and pours of an array whose silicone is drawn as `cast`, pour by pour.
 
-    Tools larger than the bed are cut. Raises Refusal where they can't be, and for lids.
+    Tools larger than the bed are cut. Raises Refusal if they can't be, and for lids.
     """
     if array.unit.moulds.pour == "injected":
         raise Refusal("moulds.pour", "injected", "a back sheet is struck off, its cups have no lids", "open")
@@ -567,7 +567,7 @@ def pieces(lay: Layout, seams: Sequence[Seam]) -> list[Piece]:
 def pry_slots(
     spec: Spec, lay: Layout, seams: Sequence[Seam], pins: Sequence[Point], hole: float
 ) -> tuple[tuple[PrySlot, ...], str]:
-    """Return the slots of a base, and why a piece of it can't be freed, "" where all can.
+    """Return the slots of a base, and why a piece of it can't be freed, "" if all can.
 
     A slot stands in the middle of the left and of the right edge. A piece that has neither of the two gets its own:
     at its left and right edge, or at the front and the back. `pins` that stand already have holes of the radius
@@ -614,7 +614,7 @@ def _at(
 
 
 def _depth(spec: Spec, lay: Layout, side: Side, middle: float) -> float:
-    """Return a slot's depth, mm: less where a filament's groove lies under it; 0 where it would be too little."""
+    """Return a slot's depth, mm: less if a filament's groove lies under it; 0 if it would be too little."""
     moulds, wall = spec.moulds, spec.moulds.least_wall_mm
     most = moulds.plate_mm
     if side == "front":

@@ -269,7 +269,7 @@ def _former(array: Array) -> Former:
 def _rows_that_fit(array: Array, length: float) -> int:
     """Return how many rows of a grid fit the printer's own bed along the limb, where its tools have a `length` beyond.
 
-    0 where none do, for other layouts, and where the file itself asks for a smaller bed.
+    0 if none do, for other layouts, and where the file itself asks for a smaller bed.
     """
     bed = array.unit.moulds.bed_y_mm
     own = float(printers(array.unit.printers)[array.unit.moulds.printer].bed_y_mm)
@@ -381,7 +381,7 @@ def _vents(former: Former) -> list[float]:
     """Return where across the top vents stand, mm: wherever a tilt brings the highest line, one is near to it."""
     count, places = 2, _spread(former, 2)
     limit = MESH_ROOM * deepest(former.spec, len(former.spec.layers) - 1)
-    # An odd number of vents puts one in the middle, where none stands nearer to the end.
+    # An odd number of vents puts one in the middle, if none stands nearer to the end.
     at_end = max(limit, _kept_at_end(former, [0.0]))
     while _kept_between(former, count) > limit or _kept_at_end(former, places) > at_end:
         count += 1

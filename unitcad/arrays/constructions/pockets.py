@@ -46,7 +46,7 @@ MARGIN = 1.0
 def tray_plan(array: Array, cast: Shape) -> Plan:
     """Return tray, blade and the one pour of an array whose sheet is drawn as `cast`.
 
-    A tray that is longer than the printer's bed is cut. Raises Refusal where it can't be.
+    A tray that is longer than the printer's bed is cut. Raises Refusal if it can't be.
     """
     sheet, spec = array.sheet, array.unit
     outer = _outer(array)
@@ -160,10 +160,10 @@ def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Le
 
 
 def unfit(unit: Spec, sheet: Sheet) -> str:
-    """Return why a sheet's pocket can't hold a unit, "" where it can: the unit is a disc of its diameter there.
+    """Return why a sheet's pocket can't hold a unit, "" if it can: the unit is a disc of its diameter there.
 
     Nothing but tails reaches beyond that disc, they do so under or over the sheet, and at the sheet the silicone
-    fills the disc's edge. Where a design can't be drawn, that is said when it is drawn.
+    fills the disc's edge. If a design can't be drawn, that is said when it is drawn.
     """
     if design_of(unit).tooling == "concentric":
         return ""  # rings of these radii: their tails leave where `level` looks

@@ -11,7 +11,7 @@ from unitcad.spec.asked import Table
 
 
 class Point(NamedTuple):
-    """A place's name and centre, mm; rows and columns are numbered from 0 where the kind has them."""
+    """A place's name and centre, mm; rows and columns are numbered from 0 if the kind has them."""
 
     name: str
     x: float
@@ -24,7 +24,7 @@ class Point(NamedTuple):
 class LayoutKind:
     """A kind by its name in a file.
 
-    points   from the table and the radius round which a ring is measured (mm, None where it is flat) to the points, the
+    points   from the table and the radius round which a ring is measured (mm, None if it is flat) to the points, the
              origin in their middle; raises Refusal for a table that gives none
     wider    from the table, the radius, the numbers of two points and the distance that they need (mm) to the refusal
              that names the value which would give it

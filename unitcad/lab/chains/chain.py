@@ -73,7 +73,7 @@ class LineFit:
     missing: float = 0.0
     clipped: float = float("inf")
     mains_hz: float = 0.0
-    """The multiple of the mains' frequency that the record can't tell from the line; 0 where there is none."""
+    """The multiple of the mains' frequency that the record can't tell from the line; 0 if there is none."""
     lines: tuple[Line, ...] = ()
     phase: Phase | None = field(default=None, compare=False, repr=False)
     blocks: tuple[complex, ...] = field(default=(), repr=False)
@@ -115,7 +115,7 @@ class Chain:
 
     `amplitude(x, rate, fit)` is the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit; `fit` is what
     the chain `line` says of them. It raises Refusal for a record that it can't take. `unfit(fits)` says why a chain
-    gives no amplitude of a record with such lines, empty where it does. `gain(hz)` is the chain's gain of an amplitude,
+    gives no amplitude of a record with such lines, empty if it does. `gain(hz)` is the chain's gain of an amplitude,
     None for a chain without filters.
     """
 

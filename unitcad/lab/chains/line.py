@@ -47,9 +47,9 @@ def fit_line(
     phase: Phase | None = None,
     span: tuple[float, float] | None = None,
 ) -> LineFit | None:
-    """Return the line of samples x (n) at `rate` in Hz; None where the band holds no line.
+    """Return the line of samples x (n) at `rate` in Hz; None if the band holds no line.
 
-    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude. Where
+    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude. If
     the line is there for less than about two thirds of the samples, it is fitted to the longest stretch that has it.
     """
     good = np.isfinite(x)
@@ -478,7 +478,7 @@ def running_part(
 ) -> tuple[int, int] | None:
     """Return the first sample of the longest stretch in which the line of a record runs, and the one after its last.
 
-    `x` has no offset; samples that are not `good` count for nothing. None where the line runs for most of the record,
+    `x` has no offset; samples that are not `good` count for nothing. None if the line runs for most of the record,
     or the rest is not silent.
     """
     most = BEYOND_LOUDEST * float(np.quantile(np.abs(x[good]), LOUDEST))
@@ -541,7 +541,7 @@ LEAST_BLOCKS = 6
 def noise_beside(residual: Floats, good: Bools, rate: float) -> float:
     """Return the standard deviation of the amplitude that the noise beside the line gives.
 
-    `residual` (n) is what the fit leaves, turned back by the line's phase and 0 where a sample was left out. The noise
+    `residual` (n) is what the fit leaves, turned back by the line's phase and 0 if a sample was left out. The noise
     N of the sum over n samples has the mean square of the sums at neighbouring frequencies; the amplitude is 2/n times
     its real part.
     """
@@ -643,7 +643,7 @@ def _with_lines(x: Floats, residual: Floats, time: Floats, use: Bools, fit: Line
 
 
 def _modulation(hertz: Floats, values: Floats, length_s: float) -> float:
-    """Return the standard deviation of an amplitude whose modulation the lines are, over its mean; 0 where they aren't.
+    """Return the standard deviation of an amplitude whose modulation the lines are, over its mean; 0 if they aren't.
 
     `hertz` and `values` have the strongest line first. The others are then pairs of equal strength as far below it as
     above, in phase with each other about its phase: of lines that have nothing to do with each other few are.

@@ -73,7 +73,7 @@ def chain(table: ChainTable) -> Chain:
 
 
 def _unfit(fits: list[LineFit]) -> str:
-    """Return why the filters, which have no robust step, give no amplitude; empty where they do."""
+    """Return why the filters, which have no robust step, give no amplitude; empty if they do."""
     missing, dropped = max(fit.missing for fit in fits), max(fit.dropped for fit in fits)
     if missing > MOST_MASKED:
         return f"{missing:.2%} of the samples are missing, which it does not leave out"

@@ -18,7 +18,7 @@ MOST_SCALES = 100
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
-    """Return the channels of a TDMS file, named group/channel. Raises Unreadable where it holds no numbers."""
+    """Return the channels of a TDMS file, named group/channel. Raises Unreadable if it holds no numbers."""
     from nptdms import TdmsFile
     from nptdms.log import log_manager
 
@@ -60,7 +60,7 @@ def read(path: Path, layout: Layout) -> list[Channel]:
 def _raw_bytes(path: Path, size: int) -> int | None:
     """Walk the segments' lead-ins; return the bytes of their raw data, None for raw data of DAQmx.
 
-    Raises Unreadable where a segment does not begin where the one before ends, or the last one ends elsewhere.
+    Raises Unreadable if a segment does not begin where the one before ends, or the last one ends elsewhere.
     """
     raw, at, plain = 0, 0, True
     with open(path, "rb") as file:

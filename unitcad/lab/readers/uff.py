@@ -39,7 +39,7 @@ def read(path: Path, layout: Layout) -> list[Channel]:
 
 
 def _expect_binary_whole(path: Path) -> None:
-    """Raise Unreadable where a binary data set does not end as many bytes behind its header as that states."""
+    """Raise Unreadable if a binary data set does not end as many bytes behind its header as that states."""
     content = path.read_bytes()
     for head in _BINARY.finditer(content):
         at = head.end()
@@ -55,7 +55,7 @@ _BINARY = re.compile(rb"^ {4}58b[ \d]{12}([ \d]{12})([ \d]{12})[^\n]*\n", re.MUL
 
 
 def _record(path: Path, one: dict[str, Any]) -> Channel:
-    """Return a data set's channel and samples. Raises Unreadable where its header and its data disagree."""
+    """Return a data set's channel and samples. Raises Unreadable if its header and its data disagree."""
     name = _label(one["ordinate_axis_lab"]) or _label(one["rsp_ent_name"]) or _label(one["id1"]) or "record"
     data = np.asarray(one["data"])
     where = f"{path.name}: data set {name!r}"

@@ -16,7 +16,7 @@ LIBRARY = "scipy"
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
-    """Return the channels of a WAV file. Raises Unreadable where its header contradicts itself or its length."""
+    """Return the channels of a WAV file. Raises Unreadable if its header contradicts itself or its length."""
 
     _expect_consistent(path)
     with warnings.catch_warnings():
