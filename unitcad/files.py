@@ -30,7 +30,7 @@ LARGEST_TABLE = 256_000_000
 _PIECE = 1 << 20
 TEMPORARY = ".tmp-"
 MARK, LOCK = "unitcad-scratch", "unitcad-lock"
-"""Files in every scratch folder: the mark has FORMAT, the folder's token, a name; the lock is taken while its maker lives.
+"""Files in every scratch folder: the mark has FORMAT, the folder's token, a name; its running maker has the lock.
 
 They are two files, since nobody can read a locked file on Windows.
 """

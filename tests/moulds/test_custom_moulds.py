@@ -161,7 +161,7 @@ def test_a_dome_has_no_opening_to_pour_into(tmp_path: Path) -> None:
     assert (
         "to pour silicone takes 2 mm2 and a circle of 0.4 mm: give it a flat top, such as a disc of 1.6 mm" in sentence
     )
-    assert sentence.endswith("--only unit makes the unit alone")
+    assert sentence.endswith("--only unit makes only the unit")
     for flat, fits in ((0.79, False), (0.8, True), (1.0, True)):
         code = DOME.replace("FLAT", f"({flat}, 4, 0), ")
         if not fits:

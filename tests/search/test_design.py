@@ -60,7 +60,7 @@ def test_the_answer_that_is_known(known: Inversion) -> None:
     of_others = [kind.most for kind in kinds(known.found, known.rows)[3:]]
     assert max(of_others) < 0.045
     assert all("gain nothing" in one["lengths_gain"] for one in best)
-    assert set(known.data["left_out"]) == {"ecoflex-00-30", "ecoflex-00-50"}
+    assert set(known.data["skipped"]) == {"ecoflex-00-30", "ecoflex-00-50"}
     assert [one["measured"]["level"] for one in best[:3]] == [0.0517, 0.04, 0.156]
     assert all(one["checks"] > 20 and one["relies_on"] == [] for one in best)
     assert best[0]["walls_mm"] == [1.25, 1.25]

@@ -162,14 +162,14 @@ def test_folders_that_are_not_ours(tmp_path: Path) -> None:
     assert unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0).returncode == 0
     other = unitcad("batch", "paper", "-o", tmp_path / "o")
     assert other.returncode == 2
-    assert "holds another batch (rings" in other.stderr
+    assert "has another batch (rings" in other.stderr
     # A variant's place taken by something else: that one fails, nothing is overwritten.
     folder = next((tmp_path / "o").glob("ring-*"))
     (folder / "spec.toml").write_text(to_toml(from_data(read("embedded"))))
     (folder / "manifest.json").unlink()
     again = unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0)
     assert again.returncode == 1
-    assert "holds the result of another spec" in again.stderr
+    assert "has the result of another spec" in again.stderr
 
 
 def test_progress_is_lines_for_machines_and_nothing_in_a_pipe(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
 from unitcad.serve.messages import Answer, Field, Group, Trusted
-from unitcad.serve.unit_answers import holds_code as unit_holds_code
+from unitcad.serve.unit_answers import has_code as unit_holds_code
 from unitcad.serve.unit_answers import printed_mm3, unit_procedure
 from unitcad.spec.custom_code import files_named
 from unitcad.spec.toml import from_json, read_toml, to_json
@@ -112,7 +112,7 @@ def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[
     yield from ((f"{field}.design", unit) for field, unit in found.items() if isinstance(unit, dict))
 
 
-def holds_code(array: Array) -> bool:
+def has_code(array: Array) -> bool:
     """Tell whether a unit of an array holds code. Raises Refusal if it may not run."""
     return any([unit_holds_code(unit) for unit in array.units])
 

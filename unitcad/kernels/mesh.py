@@ -186,7 +186,7 @@ def component(solid: Manifold, at: tuple[float, float, float]) -> Manifold:
     pieces = [(float((piece ^ probe).volume()), i, piece) for i, piece in enumerate(solid.decompose())]
     shared, _, held = max(pieces, default=(0.0, 0, Manifold()))
     if shared <= 0:
-        raise UnitcadError(f"manifold3d: no solid holds the point {at}")
+        raise UnitcadError(f"manifold3d: no solid is at the point {at}")
     return held
 
 

@@ -234,7 +234,7 @@ def component(solid: TopoDS_Shape, at: brep.Point) -> TopoDS_Shape:
     for piece in solids_in(solid):
         if BRepClass3d_SolidClassifier(piece, gp_Pnt(*at), 1e-7).State() == TopAbs_IN:
             return piece
-    raise UnitcadError(f"OCCT: no solid holds the point {at}")
+    raise UnitcadError(f"OCCT: no solid is at the point {at}")
 
 
 def below(solid: TopoDS_Shape, bottom: float) -> TopoDS_Shape:

@@ -1,4 +1,4 @@
-"""What `[recording]` is for one record: a campaign's own values for some of its files."""
+"""A campaign: its file, and the settings of [recording] for each record."""
 
 from __future__ import annotations
 
@@ -130,14 +130,14 @@ def read_campaign(path: Path) -> Campaign:
     for key, sensor in (("sensor", campaign.sensor), ("motor_sensor", campaign.motor_sensor)):
         if sensor is not None:
             to_si(sensor.unit, sensor.quantity, f"{key}.unit")
-    beside = "stands beside recording.motor_channel"
+    excess = "is not allowed together with recording.motor_channel"
     if campaign.blank is not None and campaign.blank.motor_records:
         records = list(campaign.blank.motor_records)
         if motor_channel is not None:
-            limit = f"{beside}: the channel of blank.records tells the motor's mains"
+            limit = f"{excess}: the channel of blank.records shows the motor's mains"
             raise Refusal("blank.motor_records", records, limit)
         if campaign.motor_sensor is None:
-            limit = "stands without [motor_sensor]: blank.records tells the mains of the one sensor"
+            limit = "needs [motor_sensor]: blank.records shows the mains of the one sensor"
             raise Refusal("blank.motor_records", records, limit)
     names = [unit.name for unit in campaign.unit]
     for i, unit in enumerate(campaign.unit):
@@ -153,7 +153,7 @@ def read_campaign(path: Path) -> Campaign:
             raise Refusal(f"{field}.point", distances, "has a distance twice; put its records together")
         if bool(unit.reference) == (motor_channel is not None):
             given = list(unit.reference)
-            limit = beside if given else "is required, or recording.motor_channel"
+            limit = excess if given else "is required, or recording.motor_channel"
             raise Refusal(f"{field}.reference", given or None, limit)
     return campaign
 
@@ -167,7 +167,7 @@ def blank_files(campaign: Campaign) -> Iterator[tuple[str, str]]:
 
 
 def check_files(campaign: Campaign, folder: Path) -> None:
-    """Check every name of a campaign whose files lie in or below `folder`, and read no record for it.
+    """Check every name of a campaign with files in or below `folder`, without reading a record.
 
     Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice in
     one unit by its path or its bytes, a [[recording.own]] of no record.
@@ -219,7 +219,7 @@ def own_keys(table: RecordingTable, name: str) -> Iterator[None]:
         key = refusal.field.removeprefix("recording.")
         if refusal.field == key:
             raise
-        field, limit = refusal.field, f"{refusal.limit}; [[recording.own]] sets it for some records alone"
+        field, limit = refusal.field, f"{refusal.limit}; [[recording.own]] sets it for some records only"
         for i, own in enumerate(table.own):
             if _matching(own, [name]) and key in _given(own):
                 field, limit = f"recording.own.{i}.{key}", refusal.limit
@@ -236,9 +236,9 @@ def _check_own(table: RecordingTable, names: list[str]) -> None:
         given = _given(own)
         if not given:
             keys = ", ".join(key for key in msgspec.structs.asdict(own) if key != "records")
-            raise Refusal(field, None, f"sets nothing beside records: {keys}")
+            raise Refusal(field, None, f"sets nothing for its records: {keys}")
         if "motor_channel" in given and table.motor_channel is None:
-            raise Refusal(f"{field}.motor_channel", given["motor_channel"], "stands without recording.motor_channel")
+            raise Refusal(f"{field}.motor_channel", given["motor_channel"], "needs recording.motor_channel")
         for k, pattern in enumerate(own.records):
             found = _matching(own, names, pattern)
             if not found:
@@ -252,7 +252,7 @@ def _check_own(table: RecordingTable, names: list[str]) -> None:
 
 
 def _given(own: OwnRecordingTable) -> dict[str, Any]:
-    """Return the keys that a table sets, beside the records."""
+    """Return the keys that a table sets, without the records."""
     return {key: value for key, value in msgspec.structs.asdict(own).items() if key != "records" and value is not None}
 
 

@@ -1,4 +1,4 @@
-"""A lab's units beside the paper's: models with a unit left out, by each source of moduli, and the fit."""
+"""A lab's units together with the paper's: leave-one-out errors by each source of moduli, and the fit."""
 
 from __future__ import annotations
 
@@ -161,9 +161,10 @@ def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, A
         hertz, said = hertz or measured_hz, f"{table.measured}, chain {chain}"
     assert level is not None
     if (level.low is None) != (level.high is None):
-        raise Refusal(f"{field}.{'low' if level.low is None else 'high'}", None, "is required beside the other end")
+        missing = "low" if level.low is None else "high"
+        raise Refusal(f"{field}.{missing}", None, "is required together with the other end")
     if level.low is not None and level.high is not None and not level.low <= level.value <= level.high:
-        raise Refusal(f"{field}.value", level.value, f"must lie from low {level.low:g} to high {level.high:g}")
+        raise Refusal(f"{field}.value", level.value, f"must be from low {level.low:g} to high {level.high:g}")
     walls = measured_walls(asked, built)
     return OwnUnit(table.name, asked, built, hertz, level, f"{said}, {walls}" if walls else said)
 
@@ -171,8 +172,8 @@ def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, A
 def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | None) -> tuple[LevelTable, float, str]:
     """Return level, frequency and chain of a unit's edge in a file of `unitcad measure`, by the file's first chain.
 
-    Raises Refusal for a level that was measured of another template, spec file, cast record or cavity. A campaign may
-    name a spec where the fit names the record of its casting; then nothing is compared.
+    Raises Refusal for a level that was measured of another template, spec file, cast record or cavity. If a campaign
+    names a spec and the fit a cast record, nothing is compared.
     """
     data = read_toml(path)
     chain, rows = data.get("chain"), data.get("level")
@@ -201,7 +202,7 @@ def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | 
 
 SOURCES: tuple[Moduli, ...] = get_args(Moduli)
 LEAST_ALONE = 4
-"""Units of a lab without the paper's: one is left out, two constants are fitted, one degree of freedom is left."""
+"""Units of a lab without the paper's: with one left out and two constants fitted, one degree of freedom remains."""
 _WIDEST = 10.0
 """Largest half-width of a range of ln constant that is written: beyond it the units say nothing of the constant."""
 _SIDES = 0.95
@@ -234,7 +235,7 @@ class Compared:
 
 @dataclass(frozen=True)
 class Fitted:
-    """The study of a lab: the chosen source of moduli, the others beside it, and what an estimate takes."""
+    """The study of a lab: the chosen source of moduli, the other sources, and the fit for an estimate."""
 
     lab: FitLab
     by_source: dict[str, Compared]

@@ -61,8 +61,8 @@ class Specimen:
 class TensileCurve:
     """One specimen's curve up to its largest stress: engineering strain rises, engineering stress in Pa; both (n,).
 
-    `rate`: strain per second at the start, None without a time. `skipped`: points left out since the strain had been
-    passed before; `lost`: rows left out since a number was missing. `sha256`: of the file; `path`: where it was read.
+    `rate`: strain per second at the start, None without a time. `skipped`: points whose strain had been passed before;
+    `lost`: rows without a number. `sha256`: of the file; `path`: of the file.
     """
 
     name: str
@@ -79,9 +79,9 @@ class TensileCurve:
 def read_curve(
     path: Path, given: Mapping[str, Declared], specimen: Specimen, layout: Layout = AS_FOUND
 ) -> TensileCurve:
-    """Return a file's curve. What `specimen` gives goes before the file's header.
+    """Return a file's curve. Values of `specimen` override the file's header.
 
-    Raises Refusal if a column or a unit is missing or ambiguous, or where the points are no pull; UnitcadError for
+    Raises Refusal if a column or a unit is missing or ambiguous, or if the points are no pull; UnitcadError for
     a file that can't be read.
     """
     recording = open_recording(path, layout)
@@ -103,14 +103,14 @@ def read_curve(
         strain = np.expm1(data["true_strain"])
     elif strain is None:
         if specimen.gauge_mm is None:
-            raise Refusal("--gauge-mm", None, f"{path.name} gives the travel alone: the gauge length is required")
+            raise Refusal("--gauge-mm", None, f"{path.name} gives only the travel: the gauge length is required")
         strain = (data["travel"] - data["travel"][0]) * 1e3 / specimen.gauge_mm
         specimen = replace(specimen, crosshead=specimen.crosshead is not False)
     if "true_stress" in data:
         stress = data["true_stress"] / (1.0 + strain)
     elif stress is None:
         if specimen.area is None:
-            raise Refusal("--width-mm", None, f"{path.name} gives the force alone: width and thickness are required")
+            raise Refusal("--width-mm", None, f"{path.name} gives only the force: width and thickness are required")
         stress = data["force"] / specimen.area
     # Up to the largest stress, without points whose strain had been passed before.
     if len(stress) == 0:
@@ -132,7 +132,7 @@ def read_curve(
 
 
 def header_of(path: Path) -> Specimen:
-    """Return what the lines "name;value" before the numbers say of specimen and machine."""
+    """Return specimen and machine from the lines "name;value" before the numbers."""
     found: dict[str, float | bool] = {}
     for name, value in _pairs(path):
         number = _NUMBER.match(value)
@@ -424,7 +424,7 @@ def quasistatic(result: TensileResult, frequency_hz: float) -> str:
     )
     return (
         f"quasi-static: {pulled}; at {frequency_hz:g} Hz and {50 * sum(result.used):.3g} % strain the rate is "
-        f"{motor:.3g} /s, where silicone is stiffer"
+        f"{motor:.3g} /s, at which silicone is stiffer"
     )
 
 
@@ -451,7 +451,7 @@ def _area_error(specimen: Specimen) -> float:
 def _doubts(
     curve: TensileCurve, used: tuple[float, float], toe: Toe | None, sheet: Material | None
 ) -> Iterator[tuple[str, str]]:
-    """Yield what is doubtful about one curve: a word that names it, and a message."""
+    """Yield the doubts about one curve: a word that names each, and a message."""
     middle, specimen = sum(used) / 2.0, curve.specimen
     if specimen.area and specimen.cell_n:
         force = float(np.interp(middle, curve.strain, curve.stress)) * specimen.area
@@ -459,13 +459,13 @@ def _doubts(
             below = f"below a thousandth of the cell's {specimen.cell_n:g} N"
             yield "force", f"{force:.2g} N at {100 * middle:.3g} %, {below}: use a smaller cell"
     if curve.strain[0] > LATEST_START:
-        yield "start", f"the first point lies at {100 * curve.strain[0]:.3g} % strain"
+        yield "start", f"the first point is at {100 * curve.strain[0]:.3g} % strain"
     if toe and abs(toe.origin) > MOST_TOE:
         yield "toe", f"the fitted curve begins at {100 * toe.origin:.3g} % strain (slack or offset)"
     if curve.lost:
-        yield "gaps", f"{curve.lost} rows lack a number and are left out"
+        yield "gaps", f"{curve.lost} rows lack a number and are skipped"
     if curve.skipped > 0.01 * len(curve.strain):
-        yield "cycles", f"{curve.skipped} points left out: the strain goes back, as in cycles; the first pull counts"
+        yield "cycles", f"{curve.skipped} points skipped: the strain goes back, as in cycles; the first pull counts"
     if sheet:
         at, expected = 100 * curve.strain[-1], float(sheet.elongation_pct)
         if not 1 / MOST_BREAK <= at / expected <= MOST_BREAK:

@@ -18,10 +18,8 @@ from unitcad.search.target_file import load_target
 
 
 def design(
-    target: Annotated[
-        str, typer.Argument(metavar="TARGET", help="A TOML file of what is wished for, or a shipped one's name.")
-    ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Where the result's folder goes.")] = Path("out"),
+    target: Annotated[str, typer.Argument(metavar="TARGET", help="A target file, or the name of a shipped one.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Parent of the result's folder.")] = Path("out"),
     explain: Annotated[
         str | None,
         typer.Option(metavar="NAME|SPEC", help="Say why a unit is not among the proposals; nothing is written."),
@@ -29,10 +27,10 @@ def design(
     no_check: Annotated[bool, typer.Option("--no-check", help="Draw no moulds: the best may not be castable.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """From a wish to designs: try everything at hand and rank it.
+    """Try all designs at hand for a target, and rank them.
 
-    Each proposal has its probability of meeting the level at the edge, with a range, and what no measurement covers.
-    The last line printed is the folder: the page design.html, ranking.csv, and specs to build.
+    Each proposal has its probability of meeting the level at the edge, with a range, and the inputs that no measurement
+    covers. The last line printed is the folder: the page design.html, ranking.csv, and specs to build.
     """
 
     wish = load_target(target)
@@ -67,6 +65,6 @@ def design(
         plain(f"   {design_text.level_line(one)}")
         for line in design_text.lines(one):
             plain(f"   - {line}")
-    for line in design_text.left_out_lines(data):
+    for line in design_text.skipped_lines(data):
         plain(line)
     typer.echo(str(folder))

@@ -30,7 +30,7 @@ def percent(level: float) -> str:
 
 
 def wish_line(wish: Mapping[str, Any]) -> str:
-    """Return what is asked for."""
+    """Return the target in words."""
     texts = {
         key: percent(value) if key in ("edge_min", "edge_max") else number(value, 4) for key, value in wish.items()
     }
@@ -51,21 +51,21 @@ def head_lines(data: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def left_out_lines(data: Mapping[str, Any]) -> list[str]:
-    """Return a line for each silicone that is left out, and for each candidate that can't be cast."""
+def skipped_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return a line for each silicone that is skipped, and for each candidate that can't be cast."""
     return [
-        *(f"left out, {name}: {why}" for name, why in data["left_out"].items()),
+        *(f"skipped, {name}: {why}" for name, why in data["skipped"].items()),
         *(f"can't be cast, {one['candidate']}: {'; '.join(one['failed'])}" for one in data["not_castable"]),
     ]
 
 
 def title(one: Mapping[str, Any]) -> str:
-    """Return a proposal's heading: its number, what it is, and whether its lengths were never measured."""
+    """Return a proposal's heading: its number, its kind, and whether its lengths were never measured."""
     return f"{one['rank']}. {one['label']}" + ("" if one["lengths_measured"] else " (not measured at these lengths)")
 
 
 def is_first_other(proposals: Sequence[Mapping[str, Any]], i: int) -> bool:
-    """Tell whether the heading `OTHERS` stands over a candidate."""
+    """Tell whether a candidate is under the heading `OTHERS`."""
     return proposals[i]["nearest_other"] and not any(one["nearest_other"] for one in proposals[:i])
 
 
@@ -88,7 +88,7 @@ def measured_words(measured: Mapping[str, Any]) -> str:
 
 
 def lines(one: Mapping[str, Any]) -> list[str]:
-    """Return a proposal's size, mass and hours, then what speaks for it and what is not known of it."""
+    """Return a proposal's size, mass and hours, then its reasons and its unknowns."""
     checks = "moulds not checked" if one["checks"] is None else f"moulds pass at {one['checks']} places"
     size = (
         f"{number(one['diameter_mm'], 3)} mm wide, {number(one['height_mm'], 3)} mm high, "

@@ -1,4 +1,4 @@
-"""What a target asks for, as limits on its candidates; if none meets them all, the nearest values that one meets."""
+"""Limits of a target on its candidates; if none meets them all, the nearest values that one meets."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PITCHES = np.unique(np.round([*np.arange(1.0, 100.0, 0.1), *np.arange(100.0, MO
 
 @dataclass(frozen=True)
 class Limit:
-    """A limit: the target's key and value, what it limits in words, the unit, each row's value, and who meets it.
+    """A limit: the target's key and value, the limited quantity, the unit, each row's value, and who meets it.
 
     is_least: `asked` is the least value that is allowed, otherwise the largest.
     """
@@ -37,7 +37,7 @@ class Limit:
 
     @property
     def far(self) -> np.ndarray:
-        """How far each row is from meeting it: |ln| of its value over what was asked."""
+        """Distance of each row from meeting it: |ln| of its value over the asked one."""
         with np.errstate(divide="ignore"):
             far = np.abs(np.log(self.values / self.asked))
         return np.where(self.met, 0.0, np.where(np.isnan(far), np.inf, far))
@@ -148,7 +148,7 @@ def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]])
 
 
 def _nearest(found: Candidates, far: np.ndarray, among: np.ndarray) -> int:
-    """Return the nearest row; of equals the one that relies least on what was not measured."""
+    """Return the nearest row; of equals the one with the fewest unmeasured inputs."""
     rows = np.flatnonzero(among)
     return int(rows[np.lexsort((rows, novelty(found)[rows], np.round(far[rows], 9)))[0]])
 
@@ -174,4 +174,4 @@ def label(found: Candidates, row: int) -> str:
 
 
 def _left_out(found: Candidates) -> str:
-    return f"; not tried, without a modulus: {some(found.left_out)}" if found.left_out else ""
+    return f"; not tried, without a modulus: {some(found.skipped)}" if found.skipped else ""

@@ -1,4 +1,4 @@
-"""From a target to proposals as JSON-ready data: the best of each kind, cast in thought, with what speaks for it."""
+"""From a target to proposals as JSON-ready data: the best of each kind, with moulds drawn, and with reasons."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
             ],
         },
         "models": models_block(target),
-        "left_out": found.left_out,
+        "skipped": found.skipped,
         "proposals": proposals,
         "not_castable": out,
     }
@@ -99,8 +99,8 @@ def models_block(target: Target) -> dict[str, Any]:
     slow = ", by the moduli of a slow pull" if target.asked.estimate.moduli == "quasi-static" else ""
     by = f"the paper's nine levels{slow}" if target.fit is None else f"the lab's fit {target.fit.name}"
     weights = {model: float(weight) for model, weight in zip(stack.models, stack.weights, strict=True)}
-    left_out = list(stack.left_out) if isinstance(stack, Stack) else [m for m in target.models if m not in weights]
-    return {"weights": weights, "without_weight": left_out, "by": by}
+    unweighted = list(stack.left_out) if isinstance(stack, Stack) else [m for m in target.models if m not in weights]
+    return {"weights": weights, "without_weight": unweighted, "by": by}
 
 
 def _chosen(
@@ -191,7 +191,7 @@ def _is_other(found: Candidates, probability: float, measured: Mapping[str, Any]
 def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[str, Any]]) -> list[Kind]:
     """Return the kinds in their order, those measured within the target first, the nearest others last.
 
-    A measured unit within the target stands for its kind if the kind's best is less probable than is asked for.
+    A measured unit within the target represents its kind if the kind's best is less probable than required.
     """
     made = []
     for kind in kinds(found, rows):
@@ -210,7 +210,7 @@ def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[
 def proposal(
     found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None, is_refined: bool
 ) -> dict[str, Any]:
-    """Return a candidate as data: what it is, its probability and range, its measurement, limits, unmeasured inputs."""
+    """Return a candidate as data: its kind, its probability and range, its measurement, limits, unmeasured inputs."""
     variant, lengths, wish = estimate_input(spec), found.lengths(row), found.target.wish
     low, middle, high = (float(end[row]) for end in found.range)
     by_model = probability_by_model(found.target, found.predictive)[row]
@@ -298,13 +298,13 @@ def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
 
 
 def _gain(kind: Kind, is_refined: bool) -> str:
-    """Say how the lengths change a kind's probability; `is_refined`: the proposal lies between the steps."""
+    """Say how the lengths change a kind's probability; `is_refined`: the proposal is between the steps."""
     if kind.rows.size < 2:
         return "its lengths are the only ones within the limits"
     of = f"{kind.rows.size} sets of lengths within the limits"
     if kind.most - kind.least < 1e-6:
         return f"lengths gain nothing: the probability is the same for all {of}"
-    between = "; this one lies between the steps" if is_refined else ""
+    between = "; this one is between the steps" if is_refined else ""
     return f"lengths change the probability from {kind.least:.2f} to {kind.most:.2f} over the {of}{between}"
 
 

@@ -53,7 +53,10 @@ def ordered(found: Candidates, rows: np.ndarray) -> np.ndarray:
 
 
 def kinds(found: Candidates, rows: np.ndarray) -> list[Kind]:
-    """Return the kinds among rows, the best first. In a kind, rows within `ALIKE` of the best stand by novelty."""
+    """Return the kinds among rows, the best first.
+
+    In a kind, rows within `ALIKE` of the best are ordered by novelty.
+    """
     by_kind: dict[object, list[int]] = {}
     for row in rows:
         by_kind.setdefault(found.kind(row), []).append(int(row))

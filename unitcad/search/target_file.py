@@ -1,4 +1,4 @@
-"""The file that says what is wished for, what is at hand and what may vary.
+"""The target file: the target, the things at hand, and the lengths that may vary.
 
 [target]
 edge_max = 0.06                     # of the motor's amplitude, at the unit's edge
@@ -204,7 +204,7 @@ def load_target(source: str | os.PathLike[str]) -> Target:
 
 
 def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path()) -> Target:
-    """Return the target of a file's data; `folder` is where its relative paths start. Raises as `load_target`."""
+    """Return the target of a file's data; its relative paths start at `folder`. Raises as `load_target`."""
     _check_percent(data)
     try:
         asked = convert(data, TargetFile)
@@ -287,7 +287,7 @@ def _check_spec(tables: Mapping[str, Mapping[str, Any]]) -> None:
             raise unknown_name(f"spec.{key}", "...", _SPEC_KEYS)
         for other, place in (("part", "at_hand.motors"), ("printer", "at_hand.printer")):
             if other in table:
-                raise Refusal(f"spec.{key}.{other}", table[other], f"stands in {place}")
+                raise Refusal(f"spec.{key}.{other}", table[other], f"is in {place}")
 
 
 def _entries(asked: TargetFile, data: Mapping[str, Any], fit_text: str) -> dict[str, Any]:

@@ -48,9 +48,9 @@ _SANDBOX = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a server works on: the first text and its file's name, where files go, what texts may name and start from.
+    """State of a server: the first text and its file's name, the folders of files, the files that texts may name.
 
-    `folder`: where specs are saved; `out`: where results go, whose files are served. `batch`: a folder of variants that
+    `folder`: for saved specs; `out`: for results, whose files are served. `batch`: a folder of variants that
     the page lists. `campaign`: a file that a room shows as a page of its own, and the module of that page.
     """
 
@@ -111,7 +111,7 @@ class Live:
         await asyncio.gather(self.jobs.close(), self.questions.close())
 
     async def page(self, request: Request) -> Response:
-        """Answer with the page, and let the browser keep what loads it again."""
+        """Answer with the page, with the cookie that loads it again."""
         setting = self.setting
         if setting.campaign and "token" in request.query_params:
             # Its page has no script that takes the token out of the address.
@@ -200,9 +200,9 @@ class Live:
         if all(value.is_integer() for value in values):
             values = [int(value) for value in values]  # a count of units takes no 3.0
         asked = f'base = "spec.toml"\n\n[sweep]\nmode = "product"\n{toml(sweep.key)} = {toml(values)}\n'
-        # A folder of its own, in which the sweep file stays beside the results.
+        # A folder of its own, which has the sweep file next to the results.
         arguments = ["batch", "{sweep}", "-o", f"{{folder}}/{RESULTS}", "--report", *code]
-        # The base leaves out what the text leaves out: defaults follow the key's values as they do on the page.
+        # The base has only the keys of the text: defaults follow the key's values as they do on the page.
         files, first = {"spec.toml": given["asked"], "sweep.toml": asked}, f"0 of {len(values)} variants"
         state = self.jobs.start("the sweep", arguments, files, sweep_folder(self.setting.out), first)
         return msgspec.json.encode(state)
@@ -313,7 +313,7 @@ def _json(content: bytes, status: int = 200) -> Response:
 
 
 def _plain(path: Path) -> str:
-    """Return a path for an argument in which braces stand for files."""
+    """Return a path for an argument in which braces are placeholders of files."""
     return str(path).replace("{", "{{").replace("}", "}}")
 
 

@@ -78,7 +78,7 @@ def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
 def _check_text(text: str, field: str) -> None:
     refused = invisible(text)
     if refused is not None:
-        limit = f"holds {refused!a}: control characters and those that turn the direction of text are refused"
+        limit = f"has {refused!a}: control characters and those that turn the direction of text are refused"
         raise Refusal(field, text, limit, without_invisible(text).strip() or None)
 
 

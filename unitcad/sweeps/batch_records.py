@@ -58,7 +58,7 @@ class Failure(Struct, frozen=True):
 
 
 class Summary(Struct):
-    """Outcome of a batch: variants by what became of them, geometries, seconds; `stopped` says why it ended early.
+    """Outcome of a batch: variants by outcome, geometries, seconds; `stopped` says why it ended early.
 
     `resumed` counts variants that an earlier run finished, and those that equal another one.
     """

@@ -41,7 +41,7 @@ BLOCK = 1 << 15
 FREE = re.compile(r"layers\.(\d+)\.material|estimate\.frequency_hz|name|casting\..+")
 """Paths that are validated one by one: no other value decides whether theirs is accepted, without a tail end width."""
 SILICONES = re.compile(r"materials(\.|$)|estimate\.moduli")
-"""Paths that decide what a silicone's name means: beside one of them a layer's material is not independent."""
+"""Paths that decide the meaning of a silicone's name: a layer's material is not independent of them."""
 FIELDS = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
 
 

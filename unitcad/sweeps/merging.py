@@ -27,8 +27,8 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     """Put the shards in `folders` together as one batch in `out`: its journal, its tables and, if wanted, its folders.
 
     The result is that of the same sweep without shards. Of `options` those of folders, tables and cache count. Raises
-    UnitcadError where shards are missing, not finished, or of different batches, and where their store has lost
-    something; nothing new is then left in `out`.
+    UnitcadError if shards are missing, unfinished, or of different batches, or if their store has lost content; `out`
+    is then unchanged.
     """
     start = time.perf_counter()
     shards = read_shards(folders)
@@ -101,7 +101,7 @@ def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping
     for folder, record in shards:
         store = stores[folder]
         missing = list[int]()
-        needed: dict[str, tuple[JournalEntry, int]] = {}  # of each pack: its first variant, and where its last one ends
+        needed: dict[str, tuple[JournalEntry, int]] = {}  # of each pack: its first variant, and the end of its last one
         with _opened(folder, record) as part:
             for index in record.indices:
                 entry = part.own(index)

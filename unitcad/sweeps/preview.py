@@ -30,7 +30,7 @@ ROW_BYTES = {"csv": 100, "json": 300, "parquet": 8}
 def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     """Count variants, distinct geometries and parts, files and megabytes: of a shard its own, if one is asked for.
 
-    Every variant that is looked at is validated; `refused` holds the first ones that are refused. Raises UnitcadError
+    Every counted variant is validated; `refused` has the first refusals. Raises UnitcadError
     if all are.
     """
     only = checked_outputs(options.only)
@@ -65,7 +65,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
         linked = (shared + own) * variants
         if folders_wanted(options, count):
             files, stored = each * variants, shared * number + own * variants
-        else:  # a store's: what a geometry's variants share, and packs of their records
+        else:  # a store's: the shared contents of a geometry, and packs of its records
             files, stored = (contents + 1) * number + variants / NEXT, shared * number + packed * variants
     rows = sum(ROW_BYTES[name] for name in tables) * count
     return Preview(

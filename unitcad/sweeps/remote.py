@@ -15,7 +15,7 @@ from unitcad.sweeps.task import Task, VariantOutcome
 
 
 class Receiver(Folders):
-    """Folders of what remote workers return: contents once each, and by geometry what need not be made again."""
+    """Folders of the results of remote workers: each content once, and the reusable files of each geometry."""
 
     def task(self, task: Task) -> Task:
         return replace(task, known=self.known(task.geometry))

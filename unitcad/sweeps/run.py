@@ -62,8 +62,8 @@ def run(
     """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
 
     `executor`, of that many `workers`, is the caller's to shut down. With `remote` its workers don't share this disk:
-    results come back as messages. What an earlier run in `out` finished is not made again. Raises UnitcadError if
-    nothing can be run; whatever happens to a variant is in the summary.
+    results come back as messages. Variants that an earlier run in `out` finished are not made again. Raises
+    UnitcadError if nothing can be run; the summary has the outcome of each variant.
     """
     head = batch_head(sweep, checked_outputs(options.only), options)
     count = counted(sweep, options.limit)
@@ -181,9 +181,9 @@ class _Batch:
             self._collect()
 
     def _to_make(self) -> Iterator[tuple[int, JournalEntry | None]]:
-        """Yield the variants that are not finished, with what the journal has of them.
+        """Yield the unfinished variants, with their entries of the journal.
 
-        What failed before comes last: a batch that stops at a failure has made all others by then.
+        Variants that failed before come last: a batch that stops at a failure has made all others by then.
         """
         failed: list[int] = []
         for index in self.indices:
@@ -201,7 +201,7 @@ class _Batch:
         """Bring up to STEP variants into the window; return whether more may follow.
 
         Those that are refused or equal to another one are noted at once. A shard fills the whole window, since it
-        chooses where in it to begin.
+        chooses its first variant in it.
         """
         for _ in range(WINDOW if self.options.shard else STEP):
             if self.waiting >= WINDOW or self.summary.stopped:
@@ -238,7 +238,7 @@ class _Batch:
             self.running[self.executor.submit(tasks.work, self.destination.task(task))] = task
 
     def _next(self) -> tuple[str, list[Job]] | None:
-        """Choose a variant to try again alone; else a geometry not yet made; else more of one that is."""
+        """Choose a variant to repeat by itself; else a geometry not yet made, else more of one that is."""
         if self.again:
             key, job = self.again.popleft()
             return key, [job]
@@ -254,7 +254,7 @@ class _Batch:
         return key, jobs
 
     def _collect(self, at_once: bool = False) -> None:
-        """Take up what is done; wait for the first, or with `at_once` for none."""
+        """Collect finished tasks; wait for the first, or with `at_once` for none."""
         for future in wait(list(self.running), 0 if at_once else None, return_when="FIRST_COMPLETED").done:
             task = self.running.pop(future)
             group = self.groups.get(task.geometry)
@@ -283,7 +283,7 @@ class _Batch:
             trim(self.options)
 
     def _lost(self, task: Task, error: BaseException) -> None:
-        """Handle a task whose worker ended: each of its variants is tried alone, to see which one ended it."""
+        """Handle a task whose worker ended: each of its variants is tried by itself, to find the one that ended it."""
         if isinstance(error, CancelledError):
             raise UnitcadError(f"lost the scheduler after {self.summary.done} variants; the same command resumes")
         self.lost = True
@@ -346,7 +346,7 @@ def count_entry(summary: Summary, status: str, entry: Callable[[], JournalEntry 
 
 
 def shard_record(out: Path, sweep: Sweep, head: BatchHead, options: BatchOptions, count: int) -> ShardRecord:
-    """Return what the folder of a shard says of it: the head is that of the batch without shards."""
+    """Return the head of a shard's journal: that of the batch without shards."""
     assert options.shard
     whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
     return ShardRecord(
@@ -362,7 +362,7 @@ def shard_record(out: Path, sweep: Sweep, head: BatchHead, options: BatchOptions
 
 
 def _turn(shard: Shard | None) -> float:
-    """Return where in the window a shard begins: shards that begin together then make different geometries."""
+    """Return a shard's first place in the window: shards that start together then make different geometries."""
     return (shard.number - 1) / shard.of if shard else 0.0
 
 

@@ -1,4 +1,4 @@
-"""What a signal chain gives to a campaign: an amplitude of samples, and what people are told beside it."""
+"""A signal chain: an amplitude of samples, with its gain and assumptions."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class Line:
 class LineFit:
     """A record's line: amplitude (peak) with its standard uncertainty, in the signal's unit.
 
-    `u_noise` is the part of `u` that the noise beside the line gives, `u_mains` the part that every repeat shares.
+    `u_noise` is the part of `u` from the noise next to the line, `u_mains` the part that every repeat shares.
     `value` is the complex amplitude against `phase`. `drift` is the range of the frequency over its mean, `snr` the
     amplitude over the residual's standard deviation, `scatter` the standard deviation of the amplitude of blocks over
-    their mean. `masked` is the part of the samples left out by their residual, `dropped` the same where one of them
-    lies further off than noise does, else 0; `missing` the part that are no numbers. `clipped` is the level at which
-    the signal is cut off over its true amplitude, infinite if it is not cut off. `lines` are the lines of a record that
-    has several near each other, the strongest first: `amplitude` is then none of theirs.
+    their mean. `masked` is the fraction of samples excluded by their residual, `dropped` the same if one of them
+    exceeds noise, otherwise 0; `missing` the fraction without numbers. `clipped` is the level at which the signal is
+    cut off over its true amplitude, infinite if it is not cut off. `lines` are the lines of a record with several near
+    each other, the strongest first: `amplitude` is then none of theirs.
     """
 
     amplitude: float
@@ -113,9 +113,9 @@ class ChainTable(Table, frozen=True, kw_only=True):
 class Chain:
     """A chain with its parameters set.
 
-    `amplitude(x, rate, fit)` is the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit; `fit` is what
-    the chain `line` says of them. It raises Refusal for a record that it can't take. `unfit(fits)` says why a chain
-    gives no amplitude of a record with such lines, empty if it does. `gain(hz)` is the chain's gain of an amplitude,
+    `amplitude(x, rate, fit)` is the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit; `fit` is the
+    result of the chain `line` for them. It raises Refusal for a record that it can't take. `unfit(fits)` is the reason
+    why a chain gives no amplitude for such lines, empty if it does. `gain(hz)` is the chain's gain of an amplitude,
     None for a chain without filters.
     """
 
@@ -131,7 +131,7 @@ class Chain:
 
     @property
     def assumed_text(self) -> str:
-        """What the chain assumes, as keys of [chain] with their values."""
+        """The chain's assumptions, as keys of [chain] with their values."""
         shown = {True: "true", False: "false"}
         return ", ".join(
             f"{key} {shown[value] if isinstance(value, bool) else f'{value:g}' if isinstance(value, float) else value}"

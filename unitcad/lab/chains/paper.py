@@ -1,7 +1,7 @@
-"""The chain `paper`: what the paper says of its own, a band-pass and a comb at 2 kHz; the rest is assumed, and named.
+"""The chain `paper`: the article's band-pass and comb at 2 kHz; other parameters are assumed, and named.
 
 It says: sampled at 2 kHz, Butterworth 40 to 200 Hz, 50 Hz comb, three repeats, divided by the motor's amplitude. It
-does not say the filter's order, the comb's Q, whether the filters run forwards alone, or peak or RMS.
+does not say the filter's order, the comb's Q, whether the filters run only forwards, or peak or RMS.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def gain(table: ChainTable, frequency_hz: float) -> float:
 def amplitude(table: ChainTable, x: Floats, rate: float) -> float:
     """Return the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit.
 
-    Samples of another rate than 2 kHz go through a polyphase filter. Raises Refusal for a record shorter than what is
-    trimmed, or without a sample.
+    Samples of another rate than 2 kHz go through a polyphase filter. Raises Refusal for a record shorter than the
+    trimmed part, or without a sample.
     """
 
     x = np.where(np.isfinite(x), x, 0.0)

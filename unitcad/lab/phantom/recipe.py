@@ -1,4 +1,4 @@
-"""What a phantom's TOML file may hold. Lengths in mm; layers from the skin down, on a stiff plate."""
+"""The TOML file of a phantom. Lengths in mm; layers from the skin down, on a stiff plate."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def phantoms() -> dict[str, Path]:
 
 
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
-    """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for what is not valid."""
+    """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for an invalid one."""
     path = named_file(os.fspath(source), phantoms(), "phantom", WrongArgument)
     return convert(read_toml(path), PhantomTable)
 
@@ -83,7 +83,7 @@ def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
 THINNER_DENSITY = 0.97
 """g/cm3 (assumed: a silicone oil)."""
 LOSS_RANGE = (0.5, 1.5)
-"""Range of an assumed loss factor, as factors: 0.1 to 0.3 where it is 0.2."""
+"""Range of an assumed loss factor, as factors: 0.1 to 0.3 for 0.2."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def modulus_by_table(silicone: str, thinner_pct: float, field: str) -> tuple[flo
 def stiffening(frequency_hz: float) -> float:
     """Return how much stiffer silicone may be at a frequency than at rest: the catalogue's fractional law of Ecoflex.
 
-    That the law holds with thinner is assumed; the moduli of the table were measured slowly.
+    The law is assumed to be valid with thinner; the moduli of the table were measured slowly.
     """
     material = materials()["ecoflex-00-30"]
     assert material.fractional_tau_us
