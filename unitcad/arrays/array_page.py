@@ -28,9 +28,9 @@ from unitcad.text import number
 CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg", "crosstalk-edge.svg"), "circuit.svg"
 MODELS = {
     "bush": "bush takes each layer for a bonded rubber bush, for a motor that moves sideways",
-    "crossings": "crossings weakens the motion at each boundary between two layers alone",
+    "crossings": "crossings weakens the motion only at each boundary between two layers",
 }
-"""What the models that an estimate's answer names are."""
+"""Descriptions of the models that an estimate's answer names."""
 LARGEST = 8_000_000
 """Bytes of a drawing or picture, at most."""
 SIDES = ("skin-side", "worn", "back")
@@ -38,8 +38,8 @@ WORDS = {
     "patch-skin-side.png": "The patch from the skin's side",
     "patch-back.png": "The patch from its back",
     "patch-worn.png": "The patch round its limb",
-    "tools.png": "Tools and what is cast, taken apart",
-    "crosstalk-patch.svg": "What reaches each unit from the others, on the patch",
+    "tools.png": "Tools and cast silicone, taken apart",
+    "crosstalk-patch.svg": "Vibration at each unit from all others, on the patch",
     "crosstalk.svg": "Crosstalk from each unit (row) to each other one (column)",
     "crosstalk-edge.svg": "The same, at the nearest edge of the other unit",
     "circuit.svg": "Outline of the circuit, pads and rows",
@@ -100,7 +100,7 @@ def _model(folder: Path, warn: Callable[[str], None]) -> dict[str, Any] | None:
 
 
 class _Shown:
-    """What the page shows of a folder's files; a file that is not there shows nothing, a damaged one is warned of."""
+    """Files of a folder for the page; a missing one shows nothing, a damaged one a warning."""
 
     def __init__(self, folder: Path, warn: Callable[[str], None]) -> None:
         self.folder, self.warn = folder, warn
@@ -151,15 +151,15 @@ def _worn(array: Mapping[str, Any]) -> str:
     between = f", {number(100 * flat, 2)} % between units that stay flat" if flat else ""
     if array["cast"] == "curved":
         return (
-            f"<p>Cast round the limb, where it lies unstretched. Laid flat for its circuit, the sheet's faces are "
-            f"stretched by {number(100 * bent['strain'], 2)} %{between}. At its edge a unit stands "
+            f"<p>Cast around the limb: worn, it is not stretched. Laid flat for its circuit, the sheet's faces are "
+            f"stretched by {number(100 * bent['strain'], 2)} %{between}. At its edge a unit is "
             f"{number(bent['sagitta_mm'], 2)} mm off the skin (computed).</p>"
         )
     return (
         f"<p>Cast flat and bent: the sheet's middle, at a radius of {number(bent['middle_radius_mm'], 4)} mm, keeps "
         f"its length. A whole turn is {number(bent['closed_length_mm'], 4)} mm, which leaves "
         f"{number(bent['between_ends_mm'], 3)} mm between the ends. The sheet's faces are stretched by "
-        f"{number(100 * bent['strain'], 2)} %{between}. At its edge a unit that stays flat stands "
+        f"{number(100 * bent['strain'], 2)} %{between}. At its edge a unit that stays flat is "
         f"{number(bent['sagitta_mm'], 2)} mm off the skin (computed).</p>"
     )
 
@@ -245,7 +245,7 @@ def _places(array: Mapping[str, Any]) -> str:
 
 
 def _tail_end(hidden: Mapping[str, Any] | None) -> str:
-    """Say if a tail ends: under the sheet it has to be made longer, or wires soldered on."""
+    """Return the end of a tail in words: under the sheet it has to be made longer, or wires soldered on."""
     if hidden is None:
         return "not under the sheet"
     blocked, turn = hidden["blocked_by"], hidden.get("angle_deg")
@@ -266,7 +266,7 @@ def _checks(manifest: ArrayManifest) -> str:
     every = Counter(each["code"] for each in findings)
     meaning = {code: check.demands for code, check in mould_checks().items()}
     rows = [(code, meaning.get(code, ""), f"{passed[code]} of {count}") for code, count in sorted(every.items())]
-    table = _table(("code", "what it demands", "passed"), rows)
+    table = _table(("code", "condition", "passed"), rows)
     broken = "".join(
         f"<li>{escape(each['code'])} {escape(each['where'])}: {each['value']:.3g} {escape(each['unit'])}, limit "
         f"{each['limit']:.3g}. {escape(each['advice'])}</li>"

@@ -1,6 +1,6 @@
-"""The requested array: the tables of an array file. Lengths in mm, the unit in each name.
+"""The tables of an array file as typed. Lengths in mm, the unit in each name.
 
-None means that the key is left out; `unitcad.arrays.array` has the same array with every value there. The keys of
+None means that the key is missing; `unitcad.arrays.array` has the same array with every value there. The keys of
 `[layout]` depend on its kind; each kind's file in `unitcad.arrays.layouts` has its table.
 """
 

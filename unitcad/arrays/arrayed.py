@@ -3,7 +3,7 @@
 array.toml  manifest.json  casting.md  casting.json  bom.csv  step1-section.svg
 patch/      the patch as it is worn: STL of the sheet, STEP and GLB of all
 moulds/     the tools of the sheet
-units/NAME/ a unit's own result, as `unitcad build` makes it: with moulds where units are cast apart
+units/NAME/ a unit's own result, as `unitcad build` makes it: with moulds if units are cast apart
 pictures/   patch, tools, pours
 steps/      the state of the moulds at each step of the procedure
 """
@@ -211,7 +211,7 @@ def unit_folders(array: Array) -> dict[str, Spec]:
 
 
 def _unit(array: Array, unit: Spec, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
-    """Return a unit's own result; where it is cast with the sheet, without moulds and casting."""
+    """Return a unit's own result; without moulds and casting if it is cast with the sheet."""
     apart = construction_of(array.construction, array.cast).own_tails
     wanted = [name for name in only if apart or name not in ("moulds", "casting")] or ["unit"]
     progress.prefix = "unit: "
@@ -335,7 +335,7 @@ def _manifest(
 
 
 def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
-    """Return what the manifest says of the array itself."""
+    """Return the manifest's block of the array itself."""
     folders_of = list(units)
     sheet = array.sheet
     return {

@@ -1,4 +1,4 @@
-"""What the page is told about an array: its form, the patch, its tools judged, its crosstalk."""
+"""Answers to the page about an array: its form, the patch, its tools judged, its crosstalk."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def judge(data: dict[str, Any]) -> Mapping[str, Any]:
 
 
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
-    """Return what `judge` does. Raises UnitcadError also for an array whose tools or circuit can't be made."""
+    """Return the result of `judge`. Raises UnitcadError also for an array whose tools or circuit can't be made."""
     return makeable_array(data).asked
 
 
 def asked_toml(text: str, data: Mapping[str, Any], array: Array, trusted: Trusted) -> str:
-    """Return what a text asks for as TOML that names no file: the text itself if it names none."""
+    """Return a text as TOML that names no file: the text itself if it names none."""
     return to_toml(array) if named_files(data) else text
 
 
@@ -113,7 +113,7 @@ def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[
 
 
 def has_code(array: Array) -> bool:
-    """Tell whether a unit of an array holds code. Raises Refusal if it may not run."""
+    """Tell whether a unit of an array has code. Raises Refusal if it may not run."""
     return any([unit_holds_code(unit) for unit in array.units])
 
 
@@ -145,7 +145,7 @@ def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
     there = isinstance(data.get("circuit"), dict)
     rows = [*fields(CircuitTable, "circuit", data, holds, choices)] if there else []
     made.append(Group("circuit", "Common circuit", rows, there, optional=True))
-    # What the array's tables leave out its unit has.
+    # The unit has the keys that the array's tables lack.
     return [*made, *table_groups(LAST_TABLES, data, array.asked["unit"] if array else {}, choices)]
 
 
@@ -180,7 +180,7 @@ def _tools(array: Array, answer: Answer) -> None:
 
 @lru_cache(maxsize=8)
 def _checked(unit: str, apart: bool) -> list[dict[str, Any]]:
-    """Return what the mould checks find on a unit, given as JSON: with its moulds where it is cast `apart`."""
+    """Return the findings of the mould checks on a unit, given as JSON: with its moulds if it is cast `apart`."""
     return [dict(finding.as_dict()) for finding in (check_moulds if apart else check_unit)(MouldSet(from_json(unit)))]
 
 
@@ -194,7 +194,7 @@ def _crosstalk(array: Array, answer: Answer) -> None:
     data = crosstalk(array)
     answer.lines = crosstalk_lines(data)
     answer.drawings = [
-        ("What reaches each unit from the others, on the patch", patch_map_svg(array, data)),
+        ("Vibration at each unit from all others, on the patch", patch_map_svg(array, data)),
         ("Crosstalk from each unit (row) to each other one (column)", heat_map_svg(data)),
     ]
 

@@ -64,19 +64,19 @@ def tail_half_width(unit: Spec) -> float:
 
 
 def tail_length(unit: Spec) -> float:
-    """Return how far a unit's tail or wires stand out of it, mm."""
+    """Return the length of a unit's tail or wires outside it, mm."""
     return unit.fpcb.tail_length_mm if unit.fpcb else unit.wires.length_mm if unit.wires else 0.0
 
 
 def angles(points: Sequence[Point], units: Sequence[Spec], asked: Mapping[int, float], sheet: Sheet) -> list[float]:
-    """Return each unit's angle, degrees: what was `asked` for, by its number, else the nearest free way.
+    """Return each unit's angle, degrees: the `asked` one, by its number, or the nearest free way.
 
     Raises Blocked for the first unit whose tail finds none.
     """
     try:
         return _laid(points, units, asked, sheet, out=True)
     except Blocked:
-        # A tail that was turned to come out may stand in the way of another.
+        # A tail that was turned to come out may block another.
         return _laid(points, units, asked, sheet, out=False)
 
 
@@ -149,7 +149,7 @@ def in_the_way(
     laid: Sequence[Sequence[Tail]],
     slots: Sequence[Box],
 ) -> str:
-    """Return what a unit's tails run into; "" for nothing."""
+    """Return the obstacle of a unit's tails; "" for none."""
     for tail in drawn:
         start, end = (tail.x0, tail.y0), (tail.x1, tail.y1)
         for j in near:
@@ -199,7 +199,7 @@ def ends_hidden(unit: Spec, drawn: Sequence[Tail], sheet: Sheet) -> bool:
     """Tell whether a unit's tails end under the sheet."""
     exit = dimensions(unit).exit
     if exit is None or exit.high > sheet.low + EPS:
-        return False  # the tail lies on the sheet
+        return False  # the tail is on the sheet
     return any(_way_out(start, along, sheet, EPS) > 0 for tail in drawn for start, along in _end(tail))
 
 
@@ -247,10 +247,10 @@ MOST_NAMES = 12
 class HiddenTail:
     """A tail, or a bundle of wires, whose end the sheet covers.
 
-    short_mm    from its end to if all of its width is out, along it
+    short_mm    from its end to the place at which all of its width is out, along it
     length_mm   of the tail that would come out, beyond the unit's edge
     field       the spec's key of that length
-    blocked_by  what stands in the straight way there; "" where it is free
+    blocked_by  the obstacle of the straight way there; "" if it is free
     angle_deg   at which the tail as it is would come out; None if none of the angles that are tried is free
     """
 
@@ -263,7 +263,7 @@ class HiddenTail:
 
 
 def hidden_tails(array: Array) -> tuple[HiddenTail, ...]:
-    """Return the tails that end under the sheet, in the order of places; () where the sheet covers none."""
+    """Return the tails that end under the sheet, in the order of places; () if the sheet covers none."""
     if not construction_of(array.construction, array.cast).own_tails:
         return ()
     points = [Point(place.name, place.x, place.y) for place in array.places]

@@ -24,7 +24,7 @@ class GridTable(Table, frozen=True, kw_only=True):
     rows: Annotated[Count, Meta(description="number of rows")]
     pitch_mm: Annotated[
         float | tuple[Pitch, Pitch], Meta(description="distance between neighbours: one number, or [x, y]")
-    ]  # a Pitch beside the tuple crashes msgspec 0.22: `_OnePitch` has its limits
+    ]  # a Pitch next to the tuple crashes msgspec 0.22: `_OnePitch` has its limits
 
     @property
     def pitches(self) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from unitcad.spec.asked import Table
 
 
 class HexTable(Table, frozen=True, kw_only=True):
-    """Rings round the middle unit; `pitch_mm` from each unit to its six neighbours. Rows lie along x."""
+    """Rings round the middle unit; `pitch_mm` from each unit to its six neighbours. Rows run along x."""
 
     kind: Literal["hex"] = "hex"
     rings: Annotated[

@@ -55,7 +55,7 @@ def named(row: int, column: int) -> str:
 
 
 def needs(distance: float, pair: tuple[Point, Point]) -> str:
-    """Say how near two points are and what they need (mm)."""
+    """Return the distance of two points and the one that they need (mm), in words."""
     one, other = pair
     there = ((one.x - other.x) ** 2 + (one.y - other.y) ** 2) ** 0.5
-    return f"{one.name} and {other.name} stand {there:.4g} mm apart and need {distance:.4g} mm"
+    return f"{one.name} and {other.name} are {there:.4g} mm apart and need {distance:.4g} mm"

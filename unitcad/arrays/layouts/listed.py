@@ -32,7 +32,7 @@ def points(table: ListTable, radius: float | None) -> tuple[Point, ...]:
 
 
 def wider(table: ListTable, radius: float | None, pair: tuple[Point, Point], distance: float) -> Refusal:
-    """Refuse the later point; the nearest accepted one lies on the line from the other through it."""
+    """Refuse the later point; the nearest accepted one is on the line from the other through it."""
     one, other = sorted(pair, key=lambda point: point.column)
     away = math.hypot(other.x - one.x, other.y - one.y)
     ux, uy = ((other.x - one.x) / away, (other.y - one.y) / away) if away else (1.0, 0.0)

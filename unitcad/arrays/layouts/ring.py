@@ -1,4 +1,4 @@
-"""Bands round a limb: units at equal distances round it, one band beside the other along it."""
+"""Bands round a limb: units at equal distances round it, one band next to the other along it."""
 
 from __future__ import annotations
 
