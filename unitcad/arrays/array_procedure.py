@@ -563,7 +563,7 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
             "Wires on hidden tails",
             f"{counted(len(hidden), 'tail')} would end under the sheet, {where_they_end(hidden)}. Nothing can be "
             "joined to them once the units are in. Solder wires to the end of each now, longer than this way by the "
-            "length for the connector, and try the motor again. They leave between sheet and skin. Longer tails need none "
+            "connector's length, and try the motor again. They leave between sheet and skin. Longer tails need none "
             f"if the way is free. {longer_tails(hidden)}",
             minutes=SOLDER_MIN * len(hidden),
             needs=("soldering iron and solder",),
