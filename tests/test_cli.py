@@ -225,7 +225,7 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     assert lines[1] == "assumed: motor.thickness_mm = 2 (2 to 2.65); measure the motor before you print"
     assert duration(procedure["earliest_finish_min"]) in lines[2]
     assert lines[3] == "to mix: 2 g of ecoflex-00-10, 4 g of dragon-skin-30"
-    assert f"{len(manifest['laws'])} of {len(manifest['laws'])} mould checks passed" in lines[4]
+    assert f"{len(manifest['mould_checks'])} of {len(manifest['mould_checks'])} mould checks passed" in lines[4]
     assert lines[5] == manifest["estimate"]["answer"]
     assert lines[6] == f"open {folder / 'report.html'}"
     assert (folder / "report.html").is_file()

@@ -84,7 +84,7 @@ def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:
     manifest = json.loads((folder / "manifest.json").read_text())
     assert set(manifest["files"]) == there - {"manifest.json"}
     assert [place["name"] for place in manifest["array"]["places"]] == ["A1", "A2"]
-    assert all(finding["ok"] for finding in manifest["laws"])
+    assert all(finding["ok"] for finding in manifest["mould_checks"])
     assert manifest["check"]["findings"] == []
 
 
@@ -179,7 +179,7 @@ def test_the_procedure_says_how_to_print_the_tray(mixed: tuple[Array, dict[str, 
 
 def test_the_page_says_what_each_mould_check_demands(folder: Path, tmp_path: Path) -> None:
     page = write_report(shutil.copytree(folder, tmp_path / folder.name)).read_text("utf-8")
-    codes = {finding["code"] for finding in json.loads((folder / "manifest.json").read_bytes())["laws"]}
+    codes = {finding["code"] for finding in json.loads((folder / "manifest.json").read_bytes())["mould_checks"]}
     assert codes
     for code in codes:
         assert f"<td>{code}</td><td>{escape(mould_checks()[code].demands)}</td>" in page

@@ -23,7 +23,7 @@ VARIANTS = 12
 
 
 def _entry(index: int, tries: int = 0) -> JournalEntry:
-    row = {"name": f"n{index}", "diameter_mm": 14.0 + index / 7, "laws": tries}
+    row = {"name": f"n{index}", "diameter_mm": 14.0 + index / 7, "mould_checks": tries}
     return JournalEntry(index=index, status="ok", values={"a": index}, row=row)
 
 
@@ -89,7 +89,11 @@ def _block(content: bytes, dice: random.Random, byte: bytes) -> bytes:
 
 def _changed_value(content: bytes, dice: random.Random) -> bytes:
     """A line that is still JSON and says something else."""
-    return _lines(content, dice, lambda lines, at: lines.__setitem__(at, lines[at].replace(b'"laws": 0', b'"laws": 7')))
+    return _lines(
+        content,
+        dice,
+        lambda lines, at: lines.__setitem__(at, lines[at].replace(b'"mould_checks": 0', b'"mould_checks": 7')),
+    )
 
 
 RANDOM = {

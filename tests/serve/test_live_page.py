@@ -309,7 +309,7 @@ def test_save_and_build_from_the_page(running: Any, tmp_path: Path) -> None:
         visit.close()
     manifests = list((tmp_path / "out").glob("*/manifest.json"))
     assert len(manifests) == 1
-    assert all(check["ok"] for check in json.loads(manifests[0].read_text())["laws"])
+    assert all(check["ok"] for check in json.loads(manifests[0].read_text())["mould_checks"])
 
 
 def test_the_file_s_name_follows_the_template_unless_a_person_named_it(live: Live) -> None:

@@ -97,12 +97,12 @@ def test_the_table_has_a_row_a_variant_with_what_was_swept_and_what_came_out(tmp
     assert [row["layer1_mass_g"] for row in listed["variants"]] == [float(row["layer1_mass_g"]) for row in table]
 
 
-def test_laws_and_checks_are_in_the_table(tmp_path: Path) -> None:
+def test_mould_checks_and_mesh_checks_are_in_the_table(tmp_path: Path) -> None:
     sweep = load_sweep("all-materials").overridden(['output.formats=["stl"]'])
     run(sweep, tmp_path / "o", BatchOptions(("unit", "moulds"), limit=2), SerialExecutor(), workers=1)
     for row in rows(tmp_path / "o"):
-        assert row["laws_held"] == row["laws"] > 20
-        assert row["laws_broken"] == ""
+        assert row["mould_checks_passed"] == row["mould_checks"] > 20
+        assert row["mould_checks_failed"] == ""
         assert row["check_errors"] == 0
 
 
@@ -241,7 +241,7 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: P
     manifest = json.loads((folder / "manifest.json").read_text())
     assert [part["name"] for part in manifest["parts"]] == ["layer1", "motor"]
     assert manifest["check"]["errors"] == 0
-    assert {left["what"] for left in manifest["left_out"]} >= {"moulds", "casting", "estimate"}
+    assert {left["output"] for left in manifest["skipped"]} >= {"moulds", "casting", "estimate"}
     (tmp_path / "tub.py").unlink()
     again = [folder / "spec.toml", "-o", tmp_path / "out", "--formats", "stl,3mf", "--only", "unit"]
     refused = unitcad("build", *again)

@@ -53,7 +53,7 @@ class BuildResult(Built):
         bodies = notebook.table(("body", "made", "material", "volume, mm³"), rows, str(self.folder))
         broken = [
             (finding["code"], finding["where"], finding["value"], finding["limit"])
-            for finding in self.manifest["laws"]
+            for finding in self.manifest["mould_checks"]
             if not finding["ok"]
         ]
         checks = notebook.table(("mould check", "place", "value", "limit"), broken, "broken") if broken else ""
@@ -63,7 +63,7 @@ class BuildResult(Built):
     @property
     def _counts(self) -> list[tuple[str, int]]:
         """The numbers of bodies, files, broken mould checks and errors in meshes."""
-        broken = sum(not finding["ok"] for finding in self.manifest["laws"])
+        broken = sum(not finding["ok"] for finding in self.manifest["mould_checks"])
         return [
             ("bodies", len(self.manifest["parts"])),
             ("files", len(self.manifest["files"])),

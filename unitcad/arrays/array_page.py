@@ -48,7 +48,7 @@ ARRAY_FILE = "array.toml"
 
 
 class ArrayManifest(Manifest):
-    """An array's manifest: `laws`, `check` and `parts` are those of its tools and sheet and of its units.
+    """An array's manifest: `mould_checks`, `check` and `parts` are those of its tools and sheet and of its units.
 
     `array` has construction, layout, sheet, and the places with the folder of their unit's own result.
     """
@@ -165,7 +165,7 @@ def _worn(array: Mapping[str, Any]) -> str:
 
 
 def _chips(manifest: ArrayManifest) -> str:
-    findings, check = manifest["laws"], manifest["check"]
+    findings, check = manifest["mould_checks"], manifest["check"]
     passed = sum(each["ok"] for each in findings)
     good = passed == len(findings) and not check["errors"]
     chips = [f"{passed} of {len(findings)} mould checks passed"] if findings else ["not checked"]
@@ -259,7 +259,7 @@ def _tail_end(hidden: Mapping[str, Any] | None) -> str:
 
 
 def _checks(manifest: ArrayManifest) -> str:
-    findings = manifest["laws"]
+    findings = manifest["mould_checks"]
     if not findings:
         return ""
     passed = Counter(each["code"] for each in findings if each["ok"])

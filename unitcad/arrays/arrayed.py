@@ -63,10 +63,10 @@ from unitcad.pipeline.manifest import (
     UNCHECKED,
     BodyFile,
     Geometry,
-    LeftOut,
     Manifest,
     MeshFinding,
     PartRecord,
+    Skipped,
     counted,
     printed_mm3,
 )
@@ -197,7 +197,7 @@ class Arrayed(Compound):
         more, lacking = extras(array, only)
         own |= more
         manifest = _manifest(array, moulds, only, check, shape, units, parts, drawn, own, warned)
-        manifest["left_out"] += [LeftOut(what=what, why=why) for what, why in lacking.items()]
+        manifest["skipped"] += [Skipped(output=output, reason=reason) for output, reason in lacking.items()]
         return finished(manifest, own, shared, store)
 
 
@@ -301,7 +301,9 @@ def _manifest(
     every = [*parts]
     for folder, product in units.items():
         manifest = product.manifest
-        findings += [FindingRecord(**{**each, "where": f"{folder}: {each['where']}"}) for each in manifest["laws"]]
+        findings += [
+            FindingRecord(**{**each, "where": f"{folder}: {each['where']}"}) for each in manifest["mould_checks"]
+        ]
         meshes += [
             MeshFinding(**{**each, "path": f"{folder}/{each['path']}"}) for each in manifest["check"]["findings"]
         ]
@@ -322,12 +324,12 @@ def _manifest(
             {**step, "material": moulds.plan.steps[step["index"] - 1].material}
             for step in (shape["steps"] if shape else [])
         ],
-        laws=findings,
+        mould_checks=findings,
         estimate=first["estimate"],
         check=counted(meshes),
         pictures=drawn,
         casting=sorted(path for path in own if path in CASTING) or None,
-        left_out=list(_left_out(array, only, check, first["left_out"])),
+        skipped=list(_skipped(array, only, check, first["skipped"])),
         versions={"unitcad": __version__, **kernel_versions(array.unit.output.formats)},
         files={},
         array=_record(array, units),
@@ -376,11 +378,11 @@ def _under(folder: str, part: PartRecord) -> PartRecord:
     return {**part, "name": f"{folder}: {part['name']}", "files": files}
 
 
-def _left_out(array: Array, only: Sequence[str], check: bool, of_unit: list[LeftOut]) -> Iterator[LeftOut]:
+def _skipped(array: Array, only: Sequence[str], check: bool, of_unit: list[Skipped]) -> Iterator[Skipped]:
     if not check:
-        yield LeftOut(what="mould checks", why=UNCHECKED)
-        yield LeftOut(what="mesh checks", why=UNCHECKED)
+        yield Skipped(output="mould checks", reason=UNCHECKED)
+        yield Skipped(output="mesh checks", reason=UNCHECKED)
     for name in OUTPUTS:
         if name not in only:
-            yield LeftOut(what=name, why="not asked for (--only)")
-    yield from (each for each in of_unit if each["why"] == NO_KERNEL)
+            yield Skipped(output=name, reason="not asked for (--only)")
+    yield from (each for each in of_unit if each["reason"] == NO_KERNEL)

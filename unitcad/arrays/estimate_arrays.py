@@ -38,7 +38,7 @@ def array_summary(array: Array, folder: Path, manifest: Manifest) -> Iterator[st
         lines = in_short(json.loads((folder / "casting.json").read_bytes()))
         yield from (line for line in lines if line not in told)
         yield from _more_cavities(array)
-    if checks := manifest["laws"]:
+    if checks := manifest["mould_checks"]:
         check, passed = manifest["check"], sum(entry["ok"] for entry in checks)
         files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"

@@ -220,7 +220,7 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, prog
         "air_ring_mm": round(moulds.dimensions.air_ring, 9),
         "parts": list(parts.values()),
         "steps": _pours(moulds, store) if pours else [],
-        "laws": findings,
+        "mould_checks": findings,
         "strains": strained,
         "check": meshes,
         "files": made,
@@ -324,9 +324,9 @@ def _mesh_checks(moulds: MouldSet, parts: dict[str, PartRecord], store: Store, p
 def mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
     """Return the geometry's mould findings, and its strains against this variant's silicones, by code."""
     if not shape["strains"]:
-        return shape["laws"]
+        return shape["mould_checks"]
     strained = strain_findings(spec, [Strain(**strain) for strain in shape["strains"]])
-    return sorted([*shape["laws"], *_dicts(strained)], key=lambda finding: finding["code"])
+    return sorted([*shape["mould_checks"], *_dicts(strained)], key=lambda finding: finding["code"])
 
 
 _ESTIMATES: dict[Hashable, tuple[dict[str, Any], bytes]] = {}

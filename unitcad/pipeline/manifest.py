@@ -98,11 +98,11 @@ class EstimateSummary(TypedDict):
     frequency_hz: float | None
 
 
-class LeftOut(TypedDict):
-    """Something that a variant does without."""
+class Skipped(TypedDict):
+    """An output that a variant lacks, and why."""
 
-    what: str
-    why: str
+    output: str
+    reason: str
 
 
 class FileRecord(TypedDict):
@@ -113,7 +113,7 @@ class FileRecord(TypedDict):
 
 
 class Manifest(TypedDict):
-    """A variant's manifest; `laws` are the findings of the mould checks."""
+    """A variant's manifest; `mould_checks` are the findings of the mould checks."""
 
     name: str
     design: str
@@ -126,19 +126,19 @@ class Manifest(TypedDict):
     mesh: dict[str, Any]
     parts: list[PartRecord]
     steps: list[PourRecord]
-    laws: list[FindingRecord]
+    mould_checks: list[FindingRecord]
     estimate: EstimateSummary | None
     check: MeshFindings
     pictures: list[str]
     casting: list[str] | None
-    left_out: list[LeftOut]
+    skipped: list[Skipped]
     versions: dict[str, str]
     files: dict[str, FileRecord]
 
 
 def failed_codes(manifest: Manifest) -> list[str]:
     """Return the codes of the mould checks and mesh rules that a variant fails, each once, the mould checks first."""
-    moulds = {finding["code"] for finding in manifest["laws"] if not finding["ok"]}
+    moulds = {finding["code"] for finding in manifest["mould_checks"] if not finding["ok"]}
     meshes = {finding["code"] for finding in manifest["check"]["findings"] if finding["severity"] == "error"}
     return [*sorted(moulds), *sorted(meshes)]
 
@@ -153,7 +153,7 @@ class Geometry(TypedDict):
     air_ring_mm: float
     parts: list[PartRecord]
     steps: list[PourRecord]
-    laws: list[FindingRecord]
+    mould_checks: list[FindingRecord]
     strains: list[dict[str, Any]]
     check: list[MeshFinding]
     files: dict[str, str]
@@ -193,18 +193,18 @@ def of_unit(
             for part in shape["parts"]
         ],
         steps=[{**step, "material": spec.layers[step["index"] - 1].material} for step in shape["steps"]],
-        laws=findings,
+        mould_checks=findings,
         estimate=EstimateSummary(**summary(estimate)) if estimate else None,
         check=counted(shape["check"]),
         pictures=pictures,
         casting=sorted(CASTING) if "casting" in only else None,
-        left_out=[LeftOut(what=what, why=why) for what, why in _left_out(spec, only, check)],
+        skipped=[Skipped(output=output, reason=reason) for output, reason in _skipped(spec, only, check)],
         versions={"unitcad": __version__, **kernel_versions(spec.output.formats)},
         files={},
     )
 
 
-def _left_out(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
+def _skipped(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
     """Name the outputs that this variant lacks, and why."""
     if not check or "moulds" not in only:
         yield "mould checks", NO_MOULDS if check else UNCHECKED
@@ -263,9 +263,9 @@ def row(unit: Spec, manifest: Manifest) -> dict[str, Any]:
             total += mass
     if total:
         columns["silicone_mass_g"] = float(f"{total:.6g}")
-    findings, check = manifest["laws"], manifest["check"]
-    columns["laws_held"], columns["laws"] = sum(finding["ok"] for finding in findings), len(findings)
-    columns["laws_broken"] = " ".join(sorted({finding["code"] for finding in findings if not finding["ok"]}))
+    findings, check = manifest["mould_checks"], manifest["check"]
+    columns["mould_checks_passed"], columns["mould_checks"] = sum(finding["ok"] for finding in findings), len(findings)
+    columns["mould_checks_failed"] = " ".join(sorted({finding["code"] for finding in findings if not finding["ok"]}))
     columns["check_errors"], columns["check_warnings"] = check["errors"], check["warnings"]
     for model, level in (manifest["estimate"] or {"models": {}})["models"].items():
         columns[f"edge_{model}"] = level["edge"]

@@ -162,7 +162,7 @@ def earlier(folder: Path, wanted: Subject) -> Earlier:
     try:
         manifest = files.read_json(folder / "manifest.json", links=False)
         outputs = tuple(name for name in manifest["outputs"] if isinstance(name, str))
-        return Earlier(formats, outputs, all(entry["why"] != UNCHECKED for entry in manifest["left_out"]))
+        return Earlier(formats, outputs, all(entry["reason"] != UNCHECKED for entry in manifest["skipped"]))
     except (UnitcadError, KeyError, TypeError):
         return Earlier(formats)
 

@@ -271,7 +271,7 @@ def _finished(folder: Path, spec: Subject, task: Task, damaged: str) -> Manifest
             files.read_json(folder / "timings.json", links=False).get("code") == task.code
             and set(manifest["outputs"]) == set(spec.outputs(task.only))
             and set(formats) == set(spec.formats)
-            and task.check != any(left["why"] == UNCHECKED for left in manifest["left_out"])
+            and task.check != any(left["reason"] == UNCHECKED for left in manifest["skipped"])
         )
     except (UnitcadError, KeyError, TypeError, AttributeError):
         return None
