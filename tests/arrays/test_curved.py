@@ -54,7 +54,7 @@ HEX = {
     "unit": "encapsulating",
     "layout": {"kind": "hex", "rings": 1, "pitch_mm": 20},
     "circuit": {"row_width_mm": 2},
-    "body": {"radius_mm": 45, "cast": "curved"},
+    "limb": {"radius_mm": 45, "cast": "curved"},
 }
 SLOTS = {
     "name": "slots",
@@ -62,7 +62,7 @@ SLOTS = {
     "unit": {"like": "three-layer"},
     "layout": {"kind": "list", "points_mm": [[-12, -3], [13, 4]]},
     "sheet": {"strap_slot_mm": [3, 8]},
-    "body": {"radius_mm": 61.7, "cast": "curved"},
+    "limb": {"radius_mm": 61.7, "cast": "curved"},
 }
 
 
@@ -74,12 +74,12 @@ def test_every_mould_check_holds_on_other_layouts(data: dict[str, object]) -> No
 
 
 def test_air_leaves_a_narrow_sheet_whose_round_corners_hold_vents_off_its_ends() -> None:
-    found = list(air.findings(sleeve("layout.columns=1", "layout.rows=1", "body.radius_mm=86")))
+    found = list(air.findings(sleeve("layout.columns=1", "layout.rows=1", "limb.radius_mm=86")))
     assert [f for f in found if not f.ok] == []
 
 
 def test_vents_that_stand_aside_on_a_large_limb_begin_in_the_sheet() -> None:
-    moulds = sleeve("layout.columns=2", "layout.rows=1", "body.radius_mm=220")
+    moulds = sleeve("layout.columns=2", "layout.rows=1", "limb.radius_mm=220")
     found = [f for check in (balance, air) for f in check.findings(moulds)]
     assert [f for f in found if not f.ok] == []
 
@@ -216,9 +216,9 @@ def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap() -> None:
 @pytest.mark.parametrize(
     ("override", "field"),
     [
-        ("body.radius_mm=20", "body.radius_mm"),
-        ("body.radius_mm=27", "body.radius_mm"),
-        ("unit=single-encapsulating", "body.cast"),
+        ("limb.radius_mm=20", "limb.radius_mm"),
+        ("limb.radius_mm=27", "limb.radius_mm"),
+        ("unit=single-encapsulating", "limb.cast"),
         ("unit=embedded", "unit.design"),
         ("sheet.thickness_mm=4", "sheet.thickness_mm"),
         ("moulds.bed_z_mm=20", "moulds.bed_z_mm"),
@@ -334,8 +334,8 @@ def printing_of(moulds: PatchMoulds) -> tuple[str, ...]:
 def test_pockets_are_cast_flat() -> None:
     asked = load_array("forearm-pockets").asked
     with pytest.raises(Refusal) as refused:
-        load_array({**asked, "body": {"radius_mm": 40.0, "cast": "curved"}})
-    assert (refused.value.field, refused.value.nearest) == ("body.cast", "flat")
+        load_array({**asked, "limb": {"radius_mm": 40.0, "cast": "curved"}})
+    assert (refused.value.field, refused.value.nearest) == ("limb.cast", "flat")
 
 
 @pytest.mark.parametrize(

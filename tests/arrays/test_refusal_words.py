@@ -18,7 +18,7 @@ def refusal_of(source: Any, changes: list[str]) -> Refusal:
 
 
 def test_a_distance_just_too_small_is_told_with_enough_digits() -> None:
-    refused = refusal_of("sleeve-curved", ["body.radius_mm=34.4"])
+    refused = refusal_of("sleeve-curved", ["limb.radius_mm=34.4"])
     assert "are 3.9957 mm apart and need 4 mm" in refused.limit
 
 

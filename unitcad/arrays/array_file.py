@@ -253,9 +253,9 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
     except UnknownKey as key:
         limit = key.limit.replace("`unitcad schema`", "`unitcad schema array`")
         raise UnknownKey(key.field, key.value, limit, key.nearest) from None
-    way = construction_of(asked.array, asked.body.cast)
-    if way.cast == "curved" and asked.body.radius_mm is None:
-        raise Refusal("body.radius_mm", None, "a curved mould needs the radius of the limb that it goes round", 40.0)
+    way = construction_of(asked.array, asked.limb.cast)
+    if way.cast == "curved" and asked.limb.radius_mm is None:
+        raise Refusal("limb.radius_mm", None, "a curved mould needs the radius of the limb that it goes round", 40.0)
     cavities = asked.moulds.cavities
     if not way.own_tails and cavities != (1, 1):
         limit = "all units are cast in one pour, so their moulds have no cavities side by side: leave it out"
@@ -263,7 +263,7 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
     if asked.circuit is not None and way.own_tails:
         limit = "its units are held with their own circuits; [circuit] is one for all, laid into notches"
         raise Refusal("array", asked.array, limit, "back-sheet")
-    points = _points(kind, table, asked.body.radius_mm)
+    points = _points(kind, table, asked.limb.radius_mm)
     if len(points) > MOST_PLACES:
         raise Refusal("layout", len(points), f"an array has at most {MOST_PLACES} units")
     places = places_of(asked, points)
@@ -289,8 +289,8 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
     return Array(
         name=asked.name,
         construction=asked.array,
-        cast=asked.body.cast,
-        radius_mm=asked.body.radius_mm,
+        cast=asked.limb.cast,
+        radius_mm=asked.limb.radius_mm,
         layout=dict(asked.layout),
         places=tuple(
             Placed(name=p.name, x=p.x, y=p.y, angle_deg=angle, unit=each)
@@ -326,8 +326,8 @@ def _check_closes(asked: AskedArray, table: Any, sheet: Sheet, middle: float, ap
         needed = max(length - (table.count - 1) * closed / table.count, apart)
         fits = int(closed / needed + 1e-9)
         raise Refusal("layout.count", table.count, limit, fits if fits > 1 else None)
-    radius = asked.body.radius_mm or 0.0
-    raise Refusal("body.radius_mm", radius, limit, up(length / (2 * math.pi) - (middle - radius)))
+    radius = asked.limb.radius_mm or 0.0
+    raise Refusal("limb.radius_mm", radius, limit, up(length / (2 * math.pi) - (middle - radius)))
 
 
 def with_formats(array: Array, formats: Iterable[str]) -> Array:

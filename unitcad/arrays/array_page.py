@@ -33,11 +33,11 @@ MODELS = {
 """Descriptions of the models that an estimate's answer names."""
 LARGEST = 8_000_000
 """Bytes of a drawing or picture, at most."""
-SIDES = ("skin-side", "worn", "back")
+SIDES = ("skin-side", "bent", "back")
 WORDS = {
     "patch-skin-side.png": "The patch from the skin's side",
     "patch-back.png": "The patch from its back",
-    "patch-worn.png": "The patch round its limb",
+    "patch-bent.png": "The patch round its limb",
     "tools.png": "Tools and cast silicone, taken apart",
     "crosstalk-patch.svg": "Vibration at each unit from all others, on the patch",
     "crosstalk.svg": "Crosstalk from each unit (row) to each other one (column)",
@@ -236,24 +236,24 @@ def _places(array: Mapping[str, Any]) -> str:
         [p["name"], number(p["x_mm"], 4), number(p["y_mm"], 4), p["unit"].rpartition("/")[2]] for p in array["places"]
     ]
     if array["construction"] == "pockets":
-        hidden = {tail["place"]: tail for tail in array.get("hidden_tails", [])}
+        covered = {tail["place"]: tail for tail in array.get("covered_tails", [])}
         note += " The angle is that of the tail, counter-clockwise from x."
         head += ["tail's angle, degrees", "tail's end"]
         for row, place in zip(rows, array["places"], strict=True):
-            row += [number(place["angle_deg"], 4), _tail_end(hidden.get(place["name"]))]
+            row += [number(place["angle_deg"], 4), _tail_end(covered.get(place["name"]))]
     return f'<p class="note">{note}</p>' + _table(head, rows)
 
 
-def _tail_end(hidden: Mapping[str, Any] | None) -> str:
+def _tail_end(covered: Mapping[str, Any] | None) -> str:
     """Return the end of a tail in words: under the sheet it has to be made longer, or wires soldered on."""
-    if hidden is None:
+    if covered is None:
         return "not under the sheet"
-    blocked, turn = hidden["blocked_by"], hidden.get("angle_deg")
-    longer = f"{hidden['field']} = {number(hidden['length_mm'])} reaches the edge"
+    blocked, turn = covered["blocked_by"], covered.get("angle_deg")
+    longer = f"{covered['field']} = {number(covered['length_mm'])} reaches the edge"
     if turn is not None:
         blocked, longer = "", f"with angle_deg = {number(turn)} it comes out"
     return (
-        f"under the sheet, {number(hidden['short_mm'], 2)} mm before its edge along the tail: "
+        f"under the sheet, {number(covered['short_mm'], 2)} mm before its edge along the tail: "
         f"{f'{blocked} is in the way: solder wires on' if blocked else f'{longer}, or solder wires on'}"
     )
 

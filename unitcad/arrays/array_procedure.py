@@ -15,7 +15,7 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.constructions.pockets import hold_strain
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds
-from unitcad.arrays.tails import hidden_tails, longer_tails, where_they_end
+from unitcad.arrays.tails import covered_tails, longer_tails, where_they_end
 from unitcad.casting.bill import Item, bill, consumed, injecting, motor_name, mould_plates
 from unitcad.casting.figures import (
     LAY_IN_MIN,
@@ -352,10 +352,10 @@ def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
 
 def _wires(array: Array) -> Iterator[Item]:
     """List the wires of the tails that end under the sheet, two for each: a motor has two poles."""
-    if hidden := hidden_tails(array):
-        longest = number(max(tail.short_mm for tail in hidden), 2)
+    if covered := covered_tails(array):
+        longest = number(max(tail.short_mm for tail in covered), 2)
         note = f"thin and insulated, two for each tail that ends under the sheet, at least {longest} mm and a connector"
-        yield Item("lead wire", 2 * len(hidden), "piece", "bought", note)
+        yield Item("lead wire", 2 * len(covered), "piece", "bought", note)
 
 
 def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
@@ -558,14 +558,14 @@ def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
 
 def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
     """Say how the units go in, and which way each one's tail points."""
-    if hidden := hidden_tails(array):
+    if covered := covered_tails(array):
         yield BenchStep(
-            "Wires on hidden tails",
-            f"{counted(len(hidden), 'tail')} would end under the sheet, {where_they_end(hidden)}. Nothing can be "
+            "Wires on covered tails",
+            f"{counted(len(covered), 'tail')} would end under the sheet, {where_they_end(covered)}. Nothing can be "
             "joined to them once the units are in. Solder wires to the end of each now, longer than this way by the "
             "connector's length, and try the motor again. They leave between sheet and skin. Longer tails need none "
-            f"if the way is free. {longer_tails(hidden)}",
-            minutes=SOLDER_MIN * len(hidden),
+            f"if the way is free. {longer_tails(covered)}",
+            minutes=SOLDER_MIN * len(covered),
             needs=("soldering iron and solder",),
         )
     strains = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units}

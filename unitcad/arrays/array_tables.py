@@ -34,7 +34,7 @@ class PlaceTable(Table, frozen=True, kw_only=True):
     ] = None
 
 
-class BodyTable(Table, frozen=True, kw_only=True):
+class LimbTable(Table, frozen=True, kw_only=True):
     """The limb that wears the array."""
 
     radius_mm: Annotated[
@@ -102,7 +102,7 @@ class AskedArray(Table, frozen=True, kw_only=True):
     unit: Annotated[Name | dict[str, Any], Meta(description=_UNIT)]
     layout: Annotated[dict[str, Any], Meta(description="kind, and the keys of that kind")]
     place: tuple[PlaceTable, ...] = ()
-    body: BodyTable = BodyTable()
+    limb: LimbTable = LimbTable()
     sheet: SheetTable = SheetTable()
     circuit: CircuitTable | None = None
     moulds: MouldsTable = MouldsTable()

@@ -42,7 +42,7 @@ from unitcad.arrays.limb import bending_record
 from unitcad.arrays.offers import offered
 from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_parts
 from unitcad.arrays.patch_pictures import picture_names, pictures
-from unitcad.arrays.tails import hidden_tails, hidden_tails_warning
+from unitcad.arrays.tails import covered_tails, covered_tails_warning
 from unitcad.cache import Store, digest
 from unitcad.casting.pictures import pictures as bench_pictures
 from unitcad.casting.procedure import Procedure
@@ -178,7 +178,7 @@ class Arrayed(Compound):
             parts, shared = [*parts, *made], shared | files
         drawn: list[str] = []
         tracks = crowded_tracks(array) if has_circuit(array) else []
-        warned = [*hidden_tails_warning(array), *tracks, *shallow_grooves(moulds), *play_missing(moulds)]
+        warned = [*covered_tails_warning(array), *tracks, *shallow_grooves(moulds), *play_missing(moulds)]
         if {"unit", "moulds"} & set(only):
             progress("pictures")
             shown = _pictures(moulds, store)
@@ -366,7 +366,7 @@ def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
             }
             for p in array.places
         ],
-        "hidden_tails": [asdict(tail) for tail in hidden_tails(array)],
+        "covered_tails": [asdict(tail) for tail in covered_tails(array)],
     }
 
 

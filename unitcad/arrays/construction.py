@@ -66,7 +66,7 @@ def constructions() -> dict[str, Construction]:
 def construction_of(name: Name, cast: Cast) -> Construction:
     """Return a construction cast flat, or curved. Raises Refusal for one that is cast flat only."""
     if (name, cast) not in _found():
-        raise Refusal("body.cast", cast, f"{name} are cast flat and bent; a back sheet can be cast curved", "flat")
+        raise Refusal("limb.cast", cast, f"{name} are cast flat and bent; a back sheet can be cast curved", "flat")
     return _found()[name, cast]
 
 

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_of, array_templates, expanded, makeable_array, to_toml
 from unitcad.arrays.array_procedure import array_procedure
-from unitcad.arrays.array_tables import AskedArray, BodyTable, CircuitTable, SheetTable
+from unitcad.arrays.array_tables import AskedArray, CircuitTable, LimbTable, SheetTable
 from unitcad.arrays.array_view import patch_model, tools_model
 from unitcad.arrays.arrayed import unit_folders
 from unitcad.arrays.crosstalk import crosstalk, crosstalk_lines
@@ -141,7 +141,7 @@ def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
     if table is not None:
         made.append(Group("layout", "Layout", [*_with_kinds(fields(table, "layout", data, holds, choices), choices)]))
     made.append(Group("sheet", "Sheet", [*fields(SheetTable, "sheet", data, holds, choices)]))
-    made.append(Group("body", "Body", [*fields(BodyTable, "body", data, holds, choices)]))
+    made.append(Group("limb", "Limb", [*fields(LimbTable, "limb", data, holds, choices)]))
     there = isinstance(data.get("circuit"), dict)
     rows = [*fields(CircuitTable, "circuit", data, holds, choices)] if there else []
     made.append(Group("circuit", "Common circuit", rows, there, optional=True))

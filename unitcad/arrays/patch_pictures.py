@@ -20,7 +20,7 @@ FINEST = 2.0
 """Length of an edge, at most, before it is mapped, mm: a long one would cut across the arc."""
 
 
-def worn(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
+def bent(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
     """Return the mesh of a cast solid around the limb: vertices (n, 3) in mm and faces (m, 3).
 
     x becomes the angle x over the middle's radius, z the distance from the limb's axis, which is y: the sheet's middle
@@ -54,7 +54,7 @@ def limb(array: Array) -> Manifold:
 SIZE = (960, 640)
 """Of a picture, px."""
 FOLDER = "pictures"
-WORN = f"{FOLDER}/patch-worn.png"
+WORN = f"{FOLDER}/patch-bent.png"
 GAP = 8.0
 """Between two pieces taken apart, mm."""
 _Eye = tuple[float, float, float]
@@ -99,7 +99,7 @@ def _worn(moulds: PatchMoulds) -> Iterator[Surface]:
     array = moulds.arranged
     yield Surface(*arrays(limb(array)), SKIN)
     for body in patch_bodies(array):
-        yield Surface(*worn(array, moulds.mesh(body)), body.colour)
+        yield Surface(*bent(array, moulds.mesh(body)), body.colour)
 
 
 def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:

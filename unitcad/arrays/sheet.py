@@ -66,10 +66,10 @@ BUCKLES = "assumed: a sheet stretched further buckles, and squeezes the unit out
 
 def middle_radius(asked: AskedArray, way: Construction, units: list[Spec]) -> float | None:
     """Return the radius of the sheet's middle round the limb, mm; None if the array is worn flat."""
-    if asked.body.radius_mm is None:
+    if asked.limb.radius_mm is None:
         return None
-    level = way.level(_distinct(units), _thickness(asked, way, _distinct(units)), asked.body.radius_mm)
-    return asked.body.radius_mm + (mm(level.low) + mm(level.high)) / 2
+    level = way.level(_distinct(units), _thickness(asked, way, _distinct(units)), asked.limb.radius_mm)
+    return asked.limb.radius_mm + (mm(level.low) + mm(level.high)) / 2
 
 
 def _distinct(units: list[Spec]) -> tuple[Spec, ...]:
@@ -80,7 +80,7 @@ def _thickness(asked: AskedArray, way: Construction, units: tuple[Spec, ...]) ->
     """Return the sheet's thickness; if none is asked for, the construction's, or as much as there is room for."""
     if asked.sheet.thickness_mm is not None:
         return asked.sheet.thickness_mm
-    most = down(way.level(units, way.thickness_mm, asked.body.radius_mm).most)
+    most = down(way.level(units, way.thickness_mm, asked.limb.radius_mm).most)
     return min(way.thickness_mm, most) if most >= LEAST_THICKNESS else way.thickness_mm
 
 
@@ -92,7 +92,7 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
     material = table.material or distinct[0].layers[-1].material
     catalogue.choose("sheet.material", material, known)
     hold = HOLD_MM if table.hold_mm is None else table.hold_mm
-    level = way.level(distinct, thickness, asked.body.radius_mm)
+    level = way.level(distinct, thickness, asked.limb.radius_mm)
     if thickness > level.most + 1e-9:
         limit = f"between the units' tails and backs there is room for a sheet of {level.most:.4g} mm"
         raise Refusal(
@@ -222,7 +222,7 @@ def _of_layout(asked: AskedArray, axis: int, span: float) -> tuple[str, float, f
         return "layout.points_mm", round(span, 3), 0.0
     if layout["kind"] == "ring":
         if axis == 0:
-            return "body.radius_mm", asked.body.radius_mm or 0.0, 2 * math.pi * (1 - 1 / layout["count"])
+            return "limb.radius_mm", asked.limb.radius_mm or 0.0, 2 * math.pi * (1 - 1 / layout["count"])
         pitch, field = layout["band_pitch_mm"], "layout.band_pitch_mm"
     else:
         pitch, field = layout["pitch_mm"], "layout.pitch_mm"

@@ -108,9 +108,9 @@ def _laid(
                 break
             drawn = tails(units[i], points[i].x, points[i].y, angle, i)
             why = in_the_way(drawn, i, points, radii, near[i], laid, slots)
-            if not why and (free is None or not ends_hidden(units[i], drawn, sheet)):
+            if not why and (free is None or not ends_covered(units[i], drawn, sheet)):
                 free = angle, drawn
-                if not (out and ends_hidden(units[i], drawn, sheet)):
+                if not (out and ends_covered(units[i], drawn, sheet)):
                     break
         if free is None:
             longest = _longest(i, candidates(points[i]), points, units, radii, near[i], laid, slots)
@@ -195,7 +195,7 @@ def _longest(
     return low / 10
 
 
-def ends_hidden(unit: Spec, drawn: Sequence[Tail], sheet: Sheet) -> bool:
+def ends_covered(unit: Spec, drawn: Sequence[Tail], sheet: Sheet) -> bool:
     """Tell whether a unit's tails end under the sheet."""
     exit = dimensions(unit).exit
     if exit is None or exit.high > sheet.low + EPS:
@@ -244,7 +244,7 @@ MOST_NAMES = 12
 
 
 @dataclass(frozen=True)
-class HiddenTail:
+class CoveredTail:
     """A tail, or a bundle of wires, whose end the sheet covers.
 
     short_mm    from its end to the place at which all of its width is out, along it
@@ -262,7 +262,7 @@ class HiddenTail:
     angle_deg: float | None
 
 
-def hidden_tails(array: Array) -> tuple[HiddenTail, ...]:
+def covered_tails(array: Array) -> tuple[CoveredTail, ...]:
     """Return the tails that end under the sheet, in the order of places; () if the sheet covers none."""
     if not construction_of(array.construction, array.cast).own_tails:
         return ()
@@ -271,7 +271,7 @@ def hidden_tails(array: Array) -> tuple[HiddenTail, ...]:
     laid = [_tails(place, i) for i, place in enumerate(array.places)]
     found = []
     for i, place in enumerate(array.places):
-        if not ends_hidden(place.unit, laid[i], array.sheet):
+        if not ends_covered(place.unit, laid[i], array.sheet):
             continue
         short = to_edge(laid[i], array.sheet)
         length = tail_length(place.unit) + short
@@ -284,38 +284,38 @@ def hidden_tails(array: Array) -> tuple[HiddenTail, ...]:
         def free(angle: float, place: Placed = place, i: int = i, near: Sequence[int] = near) -> bool:
             """Tell whether the tail as it is comes out at an angle."""
             turned = tails(place.unit, place.x, place.y, angle, i)
-            if ends_hidden(place.unit, turned, array.sheet):
+            if ends_covered(place.unit, turned, array.sheet):
                 return False
             return not in_the_way(turned, i, points, radii, near, laid, array.sheet.strap_slots)
 
         turn = next((angle for angle in candidates(points[i]) if free(angle)), None)
-        found.append(HiddenTail(place.name, round(short, 2), _typed(length), field, blocked, turn))
+        found.append(CoveredTail(place.name, round(short, 2), _typed(length), field, blocked, turn))
     return tuple(found)
 
 
-def where_they_end(hidden: Sequence[HiddenTail], most_names: int = 0) -> str:
+def where_they_end(covered: Sequence[CoveredTail], most_names: int = 0) -> str:
     """Say how far before the sheet's edge tails end, measured along them, the farthest last."""
 
-    def short(tail: HiddenTail) -> float:
+    def short(tail: CoveredTail) -> float:
         return float(number(tail.short_mm, 2))
 
-    groups = groupby(sorted(hidden, key=short), key=short)
+    groups = groupby(sorted(covered, key=short), key=short)
     first, *others = (f"{number(way)} mm%s at {_names(same, most_names)}" for way, same in groups)
     return listed([first % " before its edge, measured along the tail,", *(other % "" for other in others)])
 
 
-def longer_tails(hidden: Sequence[HiddenTail], most_names: int = 0) -> str:
+def longer_tails(covered: Sequence[CoveredTail], most_names: int = 0) -> str:
     """Say which tails would come out turned, which if they were longer, and which have no straight way there."""
 
-    def wanted(tail: HiddenTail) -> tuple[str, float]:
+    def wanted(tail: CoveredTail) -> tuple[str, float]:
         return tail.field, tail.length_mm
 
-    turned = [(tail.angle_deg, tail) for tail in hidden if tail.angle_deg is not None]
+    turned = [(tail.angle_deg, tail) for tail in covered if tail.angle_deg is not None]
     said = [
         f"With angle_deg = {number(angle)} {_names((tail for _, tail in same), most_names)} would come out as it is."
         for angle, same in groupby(sorted(turned, key=lambda pair: pair[0]), key=lambda pair: pair[0])
     ]
-    straight = [tail for tail in hidden if tail.angle_deg is None]
+    straight = [tail for tail in covered if tail.angle_deg is None]
     free = sorted((tail for tail in straight if not tail.blocked_by), key=wanted)
     said += [
         f"With {field} = {number(length)} {_names(same, most_names)} would reach the edge."
@@ -326,13 +326,13 @@ def longer_tails(hidden: Sequence[HiddenTail], most_names: int = 0) -> str:
     return " ".join(said)
 
 
-def hidden_tails_warning(array: Array) -> list[str]:
+def covered_tails_warning(array: Array) -> list[str]:
     """Return the warning of tails that end under the sheet; [] if none does."""
-    hidden = hidden_tails(array)
-    if not hidden:
+    covered = covered_tails(array)
+    if not covered:
         return []
     return [
-        f"tails end under the sheet, {where_they_end(hidden, MOST_NAMES)}. {longer_tails(hidden, MOST_NAMES)} "
+        f"tails end under the sheet, {where_they_end(covered, MOST_NAMES)}. {longer_tails(covered, MOST_NAMES)} "
         "Solder wires to a tail that stays under the sheet before its unit goes in"
     ]
 
@@ -346,7 +346,7 @@ def _typed(length: float) -> float:
     return math.ceil(length * 10 - 1e-3) / 10
 
 
-def _names(tails: Iterable[HiddenTail], most: int) -> str:
+def _names(tails: Iterable[CoveredTail], most: int) -> str:
     """Return the tails' places in words; with a `most` only so many, and the number of the others."""
     names = [tail.place for tail in tails]
     return listed([*names[:most], f"{len(names) - most} others"] if 0 < most < len(names) else names)

@@ -222,7 +222,7 @@ def _check_bend(array: Array, pads: Sequence[CircuitPad], thickness: float, tabl
                     f"between two pads {pitch:.4g} mm apart, which stay flat, the circuit would be bent to a radius of "
                     f"{bend:.3g} mm; {LEAST_BEND:g} times its thickness is {least:.3g} mm"
                 )
-                raise Refusal("body.radius_mm", array.radius_mm, limit, up(least * pitch / free) if free else None)
+                raise Refusal("limb.radius_mm", array.radius_mm, limit, up(least * pitch / free) if free else None)
 
 
 TRACK_MM = GAP_MM = 0.1

@@ -62,8 +62,8 @@ def check_limb(array: Array, apart: float, middle: Callable[[float], float]) -> 
     radii = (tenth * _STEP for tenth in range(math.ceil(radius / _STEP + 1e-9), round(LARGEST / _STEP) + 1))
     fits = next((each for each in radii if not _too_small(array, each, apart, middle(each))), None)
     if fits is None or middle(fits) > _largest_middle(array) or array.layout["kind"] == "ring":
-        raise Refusal("body.cast", "curved", f"{why}; cast it flat and bend it", "flat")
-    raise Refusal("body.radius_mm", radius, why, round(fits, 1))
+        raise Refusal("limb.cast", "curved", f"{why}; cast it flat and bend it", "flat")
+    raise Refusal("limb.radius_mm", radius, why, round(fits, 1))
 
 
 def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) -> None:
@@ -82,7 +82,7 @@ def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) 
     fits = math.floor(min(radius, largest) / _STEP)
     while middle(fits * _STEP) > largest:
         fits -= 1
-    raise Refusal("body.radius_mm", radius, why, round(fits * _STEP, 1))
+    raise Refusal("limb.radius_mm", radius, why, round(fits * _STEP, 1))
 
 
 def _largest_middle(array: Array) -> float:
@@ -467,7 +467,7 @@ def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Le
     dims = dimensions(spec)
     if len(spec.layers) < 2:
         limit = "in a curved mould the inner layers are laid in; units of one layer are cast flat and bent"
-        raise Refusal("body.cast", "curved", limit, "flat")
+        raise Refusal("limb.cast", "curved", limit, "flat")
     top = math.hypot(limb + flat.high, dims.radii[-2]) - limb
     # Next to its unit a notch stays under the sheet.
     roof = math.hypot(limb + core_top(spec), dims.outer_radius + BEYOND) - limb
