@@ -169,7 +169,7 @@ def test_help_and_version() -> None:
         (["build", "encapsulatin"], "SPEC = 'encapsulatin'"),
         (["build", "encapsulating", "--only", "units"], "--only = 'units'"),
         (["build", "encapsulating", "--set", "x"], "--set = 'x'"),
-        (["batch", "papr"], "SWEEP = 'papr'"),
+        (["batch", "publishd"], "SWEEP = 'publishd'"),
     ],
 )
 def test_a_refused_argument_is_called_as_in_the_help(words: list[str], field: str, tmp_path: Path) -> None:

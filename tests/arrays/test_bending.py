@@ -11,7 +11,8 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.crosstalk import pairs
 from unitcad.arrays.limb import bending
 from unitcad.arrays.patch import patch_moulds
-from unitcad.arrays.patch_pictures import FINEST, bent, picture_names, wrapped
+from unitcad.arrays.patch_pictures import FINEST, picture_names, wrapped
+from unitcad.arrays.patch_pictures import bent as bent_mesh
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
 from unitcad.shape import box
@@ -77,13 +78,13 @@ def test_a_sheet_longer_than_its_way_round_is_refused(template: str, overrides: 
     assert bent.ends > -1e-2
 
 
-def test_the_worn_sheet_has_the_flat_ones_volume() -> None:
+def test_the_bent_sheet_has_the_flat_ones_volume() -> None:
     """Pappus: round its own middle a plate keeps its volume. The ends meet but for what is left between them."""
     moulds = patch_moulds(load_array("wrist-band"))
     array, drawn = moulds.arranged, moulds.arranged.sheet
     x0, y0, x1, y1 = drawn.outline
     plate = realise(box(x0, x1, y0, y1, drawn.low, drawn.high), 24)
-    vertices, faces = bent(array, plate)
+    vertices, faces = bent_mesh(array, plate)
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
     bent = bending(array)

@@ -37,14 +37,14 @@ def test_tails_of_the_template_come_out_where_a_quarter_turn_lets_them() -> None
 
 def test_a_tail_that_comes_out_at_another_angle_is_told_it() -> None:
     array = load_array("forearm-pockets", {"place": TURNED})
-    hidden = {tail.place: tail for tail in covered_tails(array)}
+    covered = {tail.place: tail for tail in covered_tails(array)}
     # The ends lie at 20 + 7 + 10 = 37 mm, the sheet's edge at 38.
-    found = [(hidden[name].short_mm, hidden[name].length_mm, hidden[name].angle_deg) for name in ("A3", "C1", "C3")]
+    found = [(covered[name].short_mm, covered[name].length_mm, covered[name].angle_deg) for name in ("A3", "C1", "C3")]
     assert found == [(1.0, 11.0, 90.0), (1.0, 11.0, 270.0), (1.0, 11.0, 270.0)]
     (said,) = covered_tails_warning(array)
     assert "With angle_deg = 90 A3 would come out as it is. With angle_deg = 270 C1 and C3 would" in said
     assert "fpcb.tail_length_mm" not in said
-    turned = [{**place, "angle_deg": hidden[place["at"]].angle_deg} for place in TURNED]
+    turned = [{**place, "angle_deg": covered[place["at"]].angle_deg} for place in TURNED]
     assert {tail.place for tail in covered_tails(load_array("forearm-pockets", {"place": turned}))} == {
         "B1",
         "B2",
@@ -85,30 +85,30 @@ def test_nothing_is_hidden_by_a_sheet_under_the_tails_or_where_one_circuit_serve
 
 def test_a_warning_names_some_places_and_counts_the_others() -> None:
     array = load_array("hex-19", ["layout.rings=4"])
-    hidden, (said,) = covered_tails(array), covered_tails_warning(array)
-    stopped = sum(bool(tail.blocked_by) for tail in hidden)
+    covered, (said,) = covered_tails(array), covered_tails_warning(array)
+    stopped = sum(bool(tail.blocked_by) for tail in covered)
     assert stopped > MOST_NAMES
     assert f"and {stopped - MOST_NAMES} others." in said
 
 
 def test_procedure_manifest_and_page_say_what_to_do(tmp_path: Path) -> None:
     array = load_array("forearm-pockets", SIDES)
-    hidden = covered_tails(array)
-    assert hidden
+    covered = covered_tails(array)
+    assert covered
     spec = MouldSet(array.unit)
     unit = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
     made = pocket_procedure(patch_moulds(array), 1000.0, 1000.0, {"units/encapsulating": unit})
     wires, units_in = made.assembly
     assert (wires.title, units_in.title) == ("Wires on covered tails", "Units in")
-    assert all(tail.place in wires.text for tail in hidden)
+    assert all(tail.place in wires.text for tail in covered)
     (bought,) = [item for item in made.bill if item.item == "lead wire"]
-    assert bought.quantity == 2 * len(hidden)
+    assert bought.quantity == 2 * len(covered)
     assert broken_rules(made) == []
     built = build_array(array, tmp_path, only=["unit"], check=False)
     (warned,) = [line for line in built.manifest["warnings"] if line.startswith("tails end under the sheet")]
     page = write_report(built.folder).read_text("utf-8")
     assert "<h2>Warnings</h2>" in page
     assert warned.split(":")[0] in page
-    assert page.count("reaches the edge, or solder wires on") + page.count("solder wires on</td>") >= len(hidden)
+    assert page.count("reaches the edge, or solder wires on") + page.count("solder wires on</td>") >= len(covered)
     told = json.loads((built.folder / "manifest.json").read_bytes())["array"]["covered_tails"]
-    assert [(tail["place"], tail["short_mm"]) for tail in told] == [(tail.place, tail.short_mm) for tail in hidden]
+    assert [(tail["place"], tail["short_mm"]) for tail in told] == [(tail.place, tail.short_mm) for tail in covered]

@@ -160,7 +160,7 @@ def test_folders_that_are_not_ours(tmp_path: Path) -> None:
         assert message in done.stderr
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["letter"]
     assert unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0).returncode == 0
-    other = unitcad("batch", "paper", "-o", tmp_path / "o")
+    other = unitcad("batch", "published", "-o", tmp_path / "o")
     assert other.returncode == 2
     assert "has another batch (rings" in other.stderr
     # A variant's place taken by something else: that one fails, nothing is overwritten.

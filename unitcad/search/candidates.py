@@ -203,7 +203,7 @@ def _lengths(target: Target) -> Iterator[Lengths]:
 
 def _diameters(target: Target, motor: str, walls: tuple[float, ...]) -> tuple[float, ...]:
     """Return the diameters to try; default: the measured units', or the least that motor, clearance and walls fit."""
-    vary, most = target.asked.vary, target.wish.diameter_max_mm
+    vary, most = target.asked.vary, target.goals.diameter_max_mm
     if vary.diameter_mm:
         return grid(vary.diameter_mm, vary.diameter_step_mm)
     table = target.entries.get("motor", {})
@@ -301,9 +301,9 @@ def tabulate(
 
 def probability_by_model(target: Target, predictive: Predictive) -> np.ndarray:
     """Return the probability of meeting the level by each model, shape (..., models)."""
-    wish = target.wish
-    below = predictive.each_at_most(wish.edge_max) if wish.edge_max is not None else np.ones(predictive.centre.shape)
-    return below - predictive.each_at_most(wish.edge_min) if wish.edge_min is not None else below
+    goals = target.goals
+    below = predictive.each_at_most(goals.edge_max) if goals.edge_max is not None else np.ones(predictive.centre.shape)
+    return below - predictive.each_at_most(goals.edge_min) if goals.edge_min is not None else below
 
 
 def _units(made: Sequence[Geometry], own: Sequence[Sequence[SiliconeLayer]]) -> tuple[Units, np.ndarray]:
@@ -364,7 +364,7 @@ def _bench_hours(made: Sequence[Geometry]) -> np.ndarray:
 
 def _crosstalk(target: Target, made: Sequence[Geometry]) -> np.ndarray:
     """Return the ratio of each geometry at the pitch, or at touching units, without its range; NaN without a pitch."""
-    pitch, known = target.wish.pitch_mm, dict[tuple[str, float], float]()
+    pitch, known = target.goals.pitch_mm, dict[tuple[str, float], float]()
     ratios = np.full(len(made), np.nan)
     for i, one in enumerate(made if pitch is not None else ()):
         key = one.lengths.motor, one.lengths.diameter

@@ -33,13 +33,13 @@ def design(
     covers. The last line printed is the folder: the page design.html, ranking.csv, and specs to build.
     """
 
-    wish = load_target(target)
+    asked = load_target(target)
     if explain is None:
         design_files.check_out(out)
     with progress("design") as stage:
-        made = invert(wish, check=not no_check, say=stage)
+        made = invert(asked, check=not no_check, say=stage)
         if explain is None:
-            folder = design_files.folder_of(wish.name, out)
+            folder = design_files.folder_of(asked.name, out)
             found = design_files.contents(made, seen_from(folder), stage)
             design_files.write(folder, found)
     if explain is not None:
@@ -55,7 +55,7 @@ def design(
         print_json({"folder": str(folder), **data})
         return
     plain, bold = partial(console().print, soft_wrap=True), partial(console().print, soft_wrap=True, style="bold")
-    bold(f"{data['name']}: {design_text.wish_line(data['wish'])}")
+    bold(f"{data['name']}: {design_text.target_line(data['target'])}")
     for line in design_text.head_lines(data):
         plain(f"  {line}")
     for i, one in enumerate(data["proposals"]):

@@ -147,7 +147,7 @@ def front_charts(made: Inversion) -> dict[str, str]:
 
 def page(data: Mapping[str, Any], charts: Mapping[str, str]) -> str:
     """Return the result as Markdown."""
-    made = [f"# {markdown(data['name'])}: {design_text.wish_line(data['wish'])}", ""]
+    made = [f"# {markdown(data['name'])}: {design_text.target_line(data['target'])}", ""]
     made += [f"{'; '.join(design_text.head_lines(data))}.", ""]
     for i, one in enumerate(data["proposals"]):
         if design_text.is_first_other(data["proposals"], i):
@@ -171,7 +171,7 @@ def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequ
     proposals = zip(data["proposals"], sections, strict=True)
     body = [
         f'<div class="top"><div><h1>{escape(data["name"])}</h1>',
-        f'<p class="line">{escape(design_text.wish_line(data["wish"]))}</p></div></div>',
+        f'<p class="line">{escape(design_text.target_line(data["target"]))}</p></div></div>',
         f"<section><h2>Proposals</h2>{_table(data['proposals'])}",
         f'<p class="note">Levels in per cent of the motor; mm: diameter x height. The {models}. The probability is '
         "that of meeting the level; it counts the models' errors on measured units, not that a unit has never been "

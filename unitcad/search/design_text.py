@@ -7,11 +7,11 @@ from typing import Any
 
 from unitcad.text import listed, number
 
-OTHERS = "Nearest others: measured outside the wish, or below the probability that is asked for"
+OTHERS = "Nearest others: measured outside the target, or below the probability that is asked for"
 """The heading over the candidates that are no proposals."""
 _APART = 0.1
 """Models whose probabilities differ by more are named one by one."""
-_WISHES = {
+_GOALS = {
     "edge_min": "at least {} of the motor's amplitude at the edge",
     "edge_max": "at most {} of the motor's amplitude at the edge",
     "diameter_max_mm": "diameter at most {} mm",
@@ -29,12 +29,12 @@ def percent(level: float) -> str:
     return f"{number(100 * level, 2)} %"
 
 
-def wish_line(wish: Mapping[str, Any]) -> str:
+def target_line(goals: Mapping[str, Any]) -> str:
     """Return the target in words."""
     texts = {
-        key: percent(value) if key in ("edge_min", "edge_max") else number(value, 4) for key, value in wish.items()
+        key: percent(value) if key in ("edge_min", "edge_max") else number(value, 4) for key, value in goals.items()
     }
-    return ", ".join(text.format(texts[key]) for key, text in _WISHES.items() if key in wish)
+    return ", ".join(text.format(texts[key]) for key, text in _GOALS.items() if key in goals)
 
 
 def head_lines(data: Mapping[str, Any]) -> list[str]:
@@ -84,7 +84,7 @@ def measured_words(measured: Mapping[str, Any]) -> str:
     """Return a unit's measurement, by whom, and whether it is within the target."""
     level, second = percent(measured["level"]), measured.get("also")
     also = f", also printed as {percent(second)}" if second and percent(second) != level else ""
-    return f"measured {level} ({measured['by']}{also}): {'meets' if measured['meets'] else 'outside'} the wish"
+    return f"measured {level} ({measured['by']}{also}): {'meets' if measured['meets'] else 'outside'} the target"
 
 
 def lines(one: Mapping[str, Any]) -> list[str]:

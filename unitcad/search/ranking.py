@@ -105,7 +105,7 @@ def measurement(target: Target, variant: EstimateInput) -> dict[str, Any] | None
         by = "the paper" if len(variant.layers) > 1 else "the paper, of which design is not said"
     else:
         return None
-    least, most = target.wish.edge_min or 0.0, target.wish.edge_max or np.inf
+    least, most = target.goals.edge_min or 0.0, target.goals.edge_max or np.inf
     return {"level": level, "also": also, "by": by, "meets": bool(least <= level <= most)}
 
 

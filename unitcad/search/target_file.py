@@ -164,7 +164,7 @@ class TargetFile(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class Target:
-    """A validated wish.
+    """A validated target.
 
     `materials`: the silicones at hand, `designs` those to try; `entries`: the tables that a spec of it carries, its own
     catalogue entries among them.
@@ -179,7 +179,7 @@ class Target:
     fit: LabFit | None = None
 
     @property
-    def wish(self) -> TargetTable:
+    def goals(self) -> TargetTable:
         """The table `target`."""
         return self.asked.target
 
@@ -262,12 +262,14 @@ def _check_percent(data: Mapping[str, Any]) -> None:
             raise Refusal(f"target.{key}", value, "is a fraction of the motor's amplitude, at most 2", value / 100)
 
 
-def _check_target(wish: TargetTable) -> None:
-    if wish.edge_max is None and wish.edge_min is None:
+def _check_target(goals: TargetTable) -> None:
+    if goals.edge_max is None and goals.edge_min is None:
         raise Refusal("target.edge_max", None, "is required, or edge_min for a unit that amplifies")
-    if wish.edge_max is not None and wish.edge_min is not None and wish.edge_min >= wish.edge_max:
-        raise Refusal("target.edge_min", wish.edge_min, f"must be below edge_max, {wish.edge_max:g}", wish.edge_max / 2)
-    if wish.crosstalk_ratio_max is not None and wish.pitch_mm is None:
+    if goals.edge_max is not None and goals.edge_min is not None and goals.edge_min >= goals.edge_max:
+        raise Refusal(
+            "target.edge_min", goals.edge_min, f"must be below edge_max, {goals.edge_max:g}", goals.edge_max / 2
+        )
+    if goals.crosstalk_ratio_max is not None and goals.pitch_mm is None:
         raise Refusal("target.pitch_mm", None, "is required with crosstalk_ratio_max")
 
 

@@ -57,7 +57,7 @@ class Ask(Message, frozen=True, kw_only=True):
 
 
 class Save(Message, frozen=True, kw_only=True):
-    """A wish to write the text as a file in the folder; `replace`: a file that is there."""
+    """A request to write the text as a file in the folder; `replace`: a file that is there."""
 
     text: Text
     name: FileName
@@ -65,13 +65,13 @@ class Save(Message, frozen=True, kw_only=True):
 
 
 class Build(Message, frozen=True, kw_only=True):
-    """A wish for the full build of the text."""
+    """A request for the full build of the text."""
 
     text: Text
 
 
 class Sweep(Message, frozen=True, kw_only=True):
-    """A wish for a batch: the values of one key from `low` to `high`, `count` of them."""
+    """A request for a batch: the values of one key from `low` to `high`, `count` of them."""
 
     text: Text
     key: Path
@@ -81,7 +81,7 @@ class Sweep(Message, frozen=True, kw_only=True):
 
 
 class Cancel(Message, frozen=True, kw_only=True):
-    """A wish that a job end."""
+    """A request that a job end."""
 
     job: JobId
 
