@@ -11,9 +11,9 @@ from scipy.io import wavfile
 from unitcad.errors import Refusal
 from unitcad.lab import measured_files
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, UnitTable, read_campaign
+from unitcad.lab.chains.bandpass import chain as bandpass_chain
 from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.chains.line import FALSE_ALARM, Mains, fit_line, most_of_noise
-from unitcad.lab.chains.paper import chain as paper_chain
 from unitcad.lab.measured_files import charts_of
 from unitcad.lab.measuring import Measured, measure
 from unitcad.lab.readers import expect_ending
@@ -35,7 +35,9 @@ def line(size: float, hertz: float, seed: int = 1) -> np.ndarray:
 
 def record(folder: Path, x: np.ndarray, band: tuple[float, float] = BAND) -> RecordResult:
     wavfile.write(folder / "a.wav", RATE, x.astype("<f4"))
-    campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),), chain=ChainTable(use=("line", "paper")))
+    campaign = Campaign(
+        name="t", sensor=SENSOR, unit=(UnitTable(name="a"),), chain=ChainTable(use=("line", "bandpass"))
+    )
     return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), band, "a.wav")
 
 
@@ -102,7 +104,7 @@ def test_noise_alone_is_called_a_drop_out_in_one_record_of_a_thousand_at_most() 
 
 def test_the_paper_takes_clean_records_and_no_drop_out(tmp_path: Path) -> None:
     """The first seeds whose noise has a sample that the fit leaves out are among them."""
-    chain = paper_chain(ChainTable())
+    chain = bandpass_chain(ChainTable())
     left_out = 0
     for seed in range(120):
         fit = fit_line(line(100, 122.3, seed), RATE)
@@ -137,7 +139,7 @@ def test_a_line_outside_the_search_is_named(tmp_path: Path) -> None:
     assert "strongest line outside" not in said(record(tmp_path, noise(1.0), near))["L111"]
 
 
-HEAD = 'name = "t"\n[sensor]\nquantity = "displacement"\nunit = "um"\n[chain]\nuse = ["line", "paper"]\n'
+HEAD = 'name = "t"\n[sensor]\nquantity = "displacement"\nunit = "um"\n[chain]\nuse = ["line", "bandpass"]\n'
 UNIT = '[[unit]]\nname = "a"\nreference = ["m0.wav", "m1.wav", "m2.wav"]\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
 
 
@@ -171,7 +173,7 @@ def test_charts_say_what_is_shaded_and_a_single_place_has_a_wide_axis(tmp_path: 
     assert ">10</text>" in charts["decay-01.svg"]
     assert "0.025" not in charts["decay-01.svg"]
     spectrum = charts["record-01-spectrum.svg"]
-    assert "pass band of paper" in spectrum
+    assert "pass band of bandpass" in spectrum
     drawn = [float(pair.split(",")[0]) for pair in spectrum.split('points="')[1].split('"')[0].split()]
     assert min(drawn) < 72 + 3
     assert max(drawn) > 760 - 210 - 3

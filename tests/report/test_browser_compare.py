@@ -155,7 +155,7 @@ def test_side_by_side_fits_390_pixels(running: Any, walls: Path, dark: bool) -> 
 def test_a_batch_of_estimates_alone_can_be_compared_too(running: Any, tmp_path: Path) -> None:
     columns = ["status", "name", "layers.0.wall_mm", "edge_bush"]
     rows = [["", "ok", "u", 1.0, 0.1], ["", "ok", "u", 1.2, 0.08], ["", "refused", "u", 99, None]]
-    table = {"estimate": {"typical_error": {"bush": 1.25}, "not_read": {}}}
+    table = {"estimate": {"typical_error": {"bush": 1.25}, "insensitive": {}}}
     page = table_page(tmp_path, columns, rows, swept=["layers.0.wall_mm"], **table)
     seen = Visit(running, page)
     assert "1 failed" in seen.page.inner_text("header")

@@ -169,7 +169,7 @@ def test_a_batch_is_listed_as_it_lists_itself(built: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    "estimate", [{"typical_error": 3, "not_read": {}}, {"typical_error": {}}, {"not_read": None}, 7]
+    "estimate", [{"typical_error": 3, "insensitive": {}}, {"typical_error": {}}, {"insensitive": None}, 7]
 )
 def test_a_batch_with_senseless_errors_is_damaged(sweep: Path, tmp_path: Path, estimate: object) -> None:
     shutil.copytree(sweep, tmp_path / "s", ignore=shutil.ignore_patterns("report.html"))
@@ -177,7 +177,7 @@ def test_a_batch_with_senseless_errors_is_damaged(sweep: Path, tmp_path: Path, e
     file.write_text(json.dumps({"columns": ["name"], "variants": [{"name": "u"}], "estimate": estimate}))
     data, _, damaged = page.page_data(tmp_path / "s")
     assert "is not a result of unitcad" in damaged["batch.json"]
-    assert data["estimate"]["not_read"] == {}
+    assert data["estimate"]["insensitive"] == {}
     file.write_text(json.dumps({"columns": ["name"], "variants": [{"name": "u"}]}))
     assert "batch.json" not in page.page_data(tmp_path / "s")[2]
 

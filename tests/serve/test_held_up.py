@@ -21,9 +21,9 @@ pytest.importorskip("uvicorn", reason="the extra serve is not installed")
 import uvicorn
 
 from unitcad.files import TEMPORARY, scratch
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.connections import Connection
-from unitcad.serve.gate import Gate, Limits
-from unitcad.serve.keys import Keys
+from unitcad.serve.request_guard import Limits, RequestGuard
 
 TOKEN = "a-token-of-the-lab"
 HEAD = f"GET / HTTP/1.1\r\nHost: x:1\r\nX-Unitcad-Token: {TOKEN}\r\n\r\n".encode()
@@ -35,14 +35,14 @@ class Quick(Connection):
     write_s = 0.3
 
 
-def behind_a_gate(app: Any, client: Any) -> None:
-    """Run a client, given a function that connects it, of an app behind a gate that lets one request in."""
+def behind_a_guard(app: Any, client: Any) -> None:
+    """Run a client, given a function that connects it, of an app behind a guard that lets one request in."""
 
     async def both() -> None:
         listening = socket.create_server(("127.0.0.1", 0))
-        gate = Gate(app, TOKEN, frozenset({"x:1"}), "cookie", Keys(TOKEN), Limits(requests=1))
+        guard = RequestGuard(app, TOKEN, frozenset({"x:1"}), "cookie", AccessKeys(TOKEN), Limits(requests=1))
         config = uvicorn.Config(
-            gate, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_graceful_shutdown=1
+            guard, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_graceful_shutdown=1
         )
         server = uvicorn.Server(config)
         running = asyncio.create_task(server.serve(sockets=[listening]))
@@ -85,7 +85,7 @@ def test_an_answer_that_nobody_reads_frees_its_place() -> None:
             assert begun.wait(10)
             answered(connect)
 
-    behind_a_gate(app, client)
+    behind_a_guard(app, client)
 
 
 def test_an_asker_who_leaves_ends_the_work_for_the_answer() -> None:
@@ -108,7 +108,7 @@ def test_an_asker_who_leaves_ends_the_work_for_the_answer() -> None:
         assert ended.wait(10)
         answered(connect)
 
-    behind_a_gate(app, client)
+    behind_a_guard(app, client)
 
 
 def test_an_address_is_bounded_without_a_token(server: Server) -> None:
@@ -146,7 +146,7 @@ def test_a_job_whose_files_cannot_be_written_leaves_nothing(tmp_path: Path, monk
         raise OSError(28, "No space left on device")
 
     out = tmp_path / "out"
-    jobs = Jobs(out, Keys(TOKEN))
+    jobs = Jobs(out, AccessKeys(TOKEN))
     monkeypatch.setattr(Path, "write_text", full)
     for place in (sweep_folder, build_folder):
         with pytest.raises(OSError, match="No space"):

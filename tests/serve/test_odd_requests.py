@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from running import Server, serving
 
-from unitcad.serve.keys import Keys
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.validation import templates
 
 TOKEN = "a-token-of-the-lab"
@@ -72,7 +72,7 @@ def status(server: Server, head: str, body: bytes = b"") -> int:
 
 
 def test_odd_addresses_and_headers_are_no_fault_of_the_server(own: Server) -> None:
-    key = Keys(TOKEN).address("x.json").partition("/")[0]
+    key = AccessKeys(TOKEN).address("x.json").partition("/")[0]
     targets = [(route + path, "") for route, path in itertools.product(READ, PATHS)]
     targets += [(route + query, "") for route, query in itertools.product(READ, QUERIES)]
     targets += [(route, header) for route, header in itertools.product(READ, HEADERS)]

@@ -50,7 +50,7 @@ class SensorTable(Table, frozen=True, kw_only=True):
     ] = None
 
 
-class OwnRecordingTable(Table, frozen=True, kw_only=True):
+class RecordingOverride(Table, frozen=True, kw_only=True):
     """Settings of some records; they override [recording]."""
 
     records: Annotated[Records, Meta(description="names of records, or patterns such as motor-*.mat")]
@@ -75,7 +75,7 @@ class RecordingTable(Table, frozen=True, kw_only=True):
     delimiter: Annotated[Delimiter, Meta(description="sign between two columns; default: found in the file")] = ""
     decimal: Annotated[DecimalSign, Meta(description="decimal sign; default: found in the file")] = ""
     skip_lines: Annotated[SkippedLines, Meta(description="lines to skip at the beginning of each file")] = 0
-    own: Annotated[tuple[OwnRecordingTable, ...], Meta(max_length=100)] = ()
+    override: Annotated[tuple[RecordingOverride, ...], Meta(max_length=100)] = ()
 
 
 class BlankTable(Table, frozen=True, kw_only=True):
@@ -170,7 +170,7 @@ def check_files(campaign: Campaign, folder: Path) -> None:
     """Check every name of a campaign with files in or below `folder`, without reading a record.
 
     Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice in
-    one unit by its path or its bytes, a [[recording.own]] of no record.
+    one unit by its path or its bytes, a [[recording.override]] of no record.
     """
     names = []
     for field, name in blank_files(campaign):
@@ -199,38 +199,38 @@ def check_files(campaign: Campaign, folder: Path) -> None:
 
 
 _TIME_KEYS = ("rate_hz", "time_column", "time_unit")
-"""Keys that say the same of a record: one of them in `[[recording.own]]` sets aside those of `[recording]`."""
+"""Keys that say the same of a record: one of them in `[[recording.override]]` sets aside those of `[recording]`."""
 
 
 def recording_of(table: RecordingTable, name: str) -> RecordingTable:
-    """Return how the record of that name is read: `table` with the values of the [[recording.own]] that names it."""
-    given = next((_given(one) for one in table.own if _matching(one, [name])), {})
+    """Return the settings of a record: `table` with the values of the [[recording.override]] that names it."""
+    given = next((_given(one) for one in table.override if _matching(one, [name])), {})
     if "rate_hz" in given or "time_column" in given:
         given = dict.fromkeys(_TIME_KEYS) | given
-    return msgspec.structs.replace(table, own=(), **given) if given else table
+    return msgspec.structs.replace(table, override=(), **given) if given else table
 
 
 @contextmanager
 def own_keys(table: RecordingTable, name: str) -> Iterator[None]:
-    """Let a refusal of a key of `[recording]` name the [[recording.own]] that set it for the record, or that could."""
+    """Let a refusal of a key of `[recording]` name the [[recording.override]] of the record, or the one to add."""
     try:
         yield
     except Refusal as refusal:
         key = refusal.field.removeprefix("recording.")
         if refusal.field == key:
             raise
-        field, limit = refusal.field, f"{refusal.limit}; [[recording.own]] sets it for some records only"
-        for i, own in enumerate(table.own):
+        field, limit = refusal.field, f"{refusal.limit}; [[recording.override]] sets it for some records only"
+        for i, own in enumerate(table.override):
             if _matching(own, [name]) and key in _given(own):
-                field, limit = f"recording.own.{i}.{key}", refusal.limit
+                field, limit = f"recording.override.{i}.{key}", refusal.limit
         raise type(refusal)(field, refusal.value, limit, refusal.nearest) from None
 
 
 def _check_own(table: RecordingTable, names: list[str]) -> None:
-    """Refuse a [[recording.own]] that sets nothing, that names no record of the campaign, or one of another's."""
+    """Refuse a [[recording.override]] that sets nothing, that names no record of the campaign, or one of another's."""
     taken: dict[str, int] = {}
-    for i, own in enumerate(table.own):
-        field = f"recording.own.{i}"
+    for i, own in enumerate(table.override):
+        field = f"recording.override.{i}"
         if not own.records:
             raise Refusal(f"{field}.records", [], "names no record")
         given = _given(own)
@@ -247,16 +247,16 @@ def _check_own(table: RecordingTable, names: list[str]) -> None:
                 raise Refusal(f"{field}.records.{k}", pattern, limit, close[0] if close else None)
             for name in found:
                 if taken.setdefault(name, i) != i:
-                    limit = f"names {name}, which recording.own.{taken[name]} does too"
+                    limit = f"names {name}, which recording.override.{taken[name]} does too"
                     raise Refusal(f"{field}.records.{k}", pattern, limit)
 
 
-def _given(own: OwnRecordingTable) -> dict[str, Any]:
+def _given(own: RecordingOverride) -> dict[str, Any]:
     """Return the keys that a table sets, without the records."""
     return {key: value for key, value in msgspec.structs.asdict(own).items() if key != "records" and value is not None}
 
 
-def _matching(own: OwnRecordingTable, names: list[str], *patterns: str) -> list[str]:
+def _matching(own: RecordingOverride, names: list[str], *patterns: str) -> list[str]:
     """Return the names that a table's records name, or some of its patterns do."""
     patterns = patterns or own.records
     return [name for name in names if any(one == name or fnmatchcase(name, one) for one in patterns)]

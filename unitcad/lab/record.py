@@ -65,7 +65,7 @@ RULES = {
             clipped. Fix: Repeat.""",
             """L114 warning: not fit for a chain
             The chain gives no amplitude of a record with drop-outs, missing samples or too few samples.
-            Example: The chain paper and a spike. Fix: Use the chain line.""",
+            Example: The chain bandpass and a spike. Fix: Use the chain line.""",
             """L115 warning: chains disagree
             The intervals of two chains do not overlap. Example: Hum that one chain does not remove.
             Fix: Look at the spectra of the records.""",

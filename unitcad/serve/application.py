@@ -22,12 +22,12 @@ from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.report.page import page_data
 from unitcad.rooms import stored_spec
-from unitcad.serve.gate import Gate, Limits
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
-from unitcad.serve.keys import Keys
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
+from unitcad.serve.request_guard import Limits, RequestGuard
 from unitcad.text import toml
 from unitcad.workers import NoWorker, WorkerEnded
 
@@ -67,7 +67,7 @@ class Setting:
     campaign: tuple[Path, str] | None = None
 
 
-def application(live: Live, limits: Limits = Limits()) -> Gate:  # noqa: B008  # frozen
+def application(live: Live, limits: Limits = Limits()) -> RequestGuard:  # noqa: B008  # frozen
     """Return the ASGI application of a live page."""
     setting = live.setting
     routes = [
@@ -82,7 +82,7 @@ def application(live: Live, limits: Limits = Limits()) -> Gate:  # noqa: B008  #
         Route("/cancel", live.cancel, methods=["POST"]),
     ]
     inner = Starlette(routes=routes, lifespan=live.lifespan)
-    return Gate(inner, setting.token, setting.hosts, live.cookie, live.keys, limits)
+    return RequestGuard(inner, setting.token, setting.hosts, live.cookie, live.keys, limits)
 
 
 class Live:
@@ -91,7 +91,7 @@ class Live:
     def __init__(self, setting: Setting) -> None:
         self.setting = setting
         self.cookie = f"unitcad-{setting.port}"
-        self.keys = Keys(setting.token)
+        self.keys = AccessKeys(setting.token)
         self.questions = Questions(setting.text, setting.trusted)
         self.jobs = Jobs(setting.out, self.keys)
         self._saving = asyncio.Lock()

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from unitcad.errors import UnitcadError
 from unitcad.files import scratch
-from unitcad.serve.keys import Keys
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.messages import JobState
 from unitcad.workers import STAGES, Call, Pool, run_here
 
@@ -54,7 +54,7 @@ class Job:
 class Jobs:
     """The jobs of a server; results go below `out`, whose files have addresses of `keys`."""
 
-    def __init__(self, out: Path, keys: Keys) -> None:
+    def __init__(self, out: Path, keys: AccessKeys) -> None:
         self.out, self.keys = out, keys
         self.known: dict[str, Job] = {}
         self.pool: Pool | None = None

@@ -12,14 +12,14 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import ADDRESS, STORE
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import JournalEntry, Summary
+from unitcad.sweeps.insensitive_keys import swept_estimate
+from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Journal
 from unitcad.sweeps.result_folders import folders_wanted, lost, make_folders
 from unitcad.sweeps.results import columns_of, write_results
 from unitcad.sweeps.run import count_entry
 from unitcad.sweeps.shards import ShardRecord, read_shards, shard_folders
 from unitcad.sweeps.store_address import found_at, note_store
-from unitcad.sweeps.unread_keys import swept_estimate
-from unitcad.sweeps.unread_keys import warnings as unread_warnings
 from unitcad.text import some
 
 
@@ -67,7 +67,7 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
             finally:
                 cache.close()
         found = swept_estimate(first.sweep, first.variants) if "estimate" in first.head.outputs else None
-        summary.warnings += unread_warnings(found)
+        summary.warnings += insensitive_warnings(found)
         write_results(
             out, columns_of(first.sweep, journal), journal.entries, first.head, found, options.tables, first.variants
         )

@@ -11,12 +11,12 @@ from unitcad.pipeline.plan import body_key, checked_outputs, groups
 from unitcad.pipeline.subjects import subject
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import Preview, RefusedVariant
+from unitcad.sweeps.insensitive_keys import swept_estimate
+from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.result_folders import folders_wanted
 from unitcad.sweeps.results import tables_of
 from unitcad.sweeps.run import NEXT, counted
 from unitcad.sweeps.sweep import Sweep
-from unitcad.sweeps.unread_keys import swept_estimate
-from unitcad.sweeps.unread_keys import warnings as unread_warnings
 
 LOOKED_AT = 20_000
 """Variants whose geometry is worked out; of a larger sweep the rest is estimated in proportion."""
@@ -78,7 +78,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
         linked_mb=round((linked + rows) / 1e6, 3),
         refused_count=round(len(refused) * share),
         refused=refused[:MOST_REFUSED],
-        warnings=unread_warnings(swept_estimate(sweep, whole)) if "estimate" in only else [],
+        warnings=insensitive_warnings(swept_estimate(sweep, whole)) if "estimate" in only else [],
     )
 
 

@@ -15,10 +15,10 @@ from msgspec import to_builtins
 from unitcad import files
 from unitcad.report.batch_table import CSV, JSON, PARQUET
 from unitcad.sweeps.batch_records import BatchHead, JournalEntry, Summary, Values
+from unitcad.sweeps.insensitive_keys import SweptEstimate
 from unitcad.sweeps.journal import Journal
 from unitcad.sweeps.parquet_table import can_write, write_parquet
 from unitcad.sweeps.sweep import Sweep
-from unitcad.sweeps.unread_keys import SweptEstimate
 from unitcad.text import cell
 
 TABLES = {"csv": CSV, "json": JSON, "parquet": PARQUET}

@@ -24,6 +24,8 @@ from unitcad.sweeps import task as tasks
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import BatchHead, Failure, JournalEntry, Summary
 from unitcad.sweeps.destination import Destination, InStore
+from unitcad.sweeps.insensitive_keys import swept_estimate
+from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import JOURNAL, Journal
 from unitcad.sweeps.result_folders import destination_of, folders_wanted, make_folders
 from unitcad.sweeps.results import columns_of, write_results, write_timings
@@ -31,8 +33,6 @@ from unitcad.sweeps.shards import Shard, ShardRecord, write_shard
 from unitcad.sweeps.store_address import noted
 from unitcad.sweeps.sweep import MOST, Sweep
 from unitcad.sweeps.task import Job, Task, VariantOutcome
-from unitcad.sweeps.unread_keys import swept_estimate
-from unitcad.sweeps.unread_keys import warnings as unread_warnings
 from unitcad.workers import WorkerEnded
 
 WINDOW = 2048
@@ -93,7 +93,7 @@ def run(
             make_folders(out, journal.entries(), destination.store, cache)
         estimated = "estimate" in head.outputs and not options.shard  # of a shard nothing can be said
         found = swept_estimate(sweep, summary.variants) if estimated else None
-        summary.warnings += unread_warnings(found)
+        summary.warnings += insensitive_warnings(found)
         columns = columns_of(sweep, journal)
         write_results(out, columns, journal.entries, head, found, options.tables, count)  # those of a shard are parts
         summary.seconds = round(time.perf_counter() - start, 3)

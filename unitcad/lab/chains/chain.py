@@ -92,7 +92,7 @@ class ChainTable(Table, frozen=True, kw_only=True):
         Meta(
             min_length=1,
             max_length=8,
-            description="signal chains, line or paper; the first one's levels are the result",
+            description="signal chains, line or bandpass; the first one's levels are the result",
         ),
     ] = ("line",)
     mains_hz: Annotated[float, Meta(ge=40, le=400, description="frequency of the mains")] = 50.0
@@ -100,12 +100,12 @@ class ChainTable(Table, frozen=True, kw_only=True):
         60.0,
         250.0,
     )
-    order: Annotated[int, Meta(ge=1, le=10, description="order of the band-pass (chain paper)")] = 4
-    q: Annotated[float, Meta(ge=1, le=1000, description="quality of the comb filter (chain paper)")] = 30.0
-    zero_phase: Annotated[bool, Meta(description="whether filters run forwards and backwards (chain paper)")] = True
-    measure: Annotated[Literal["rms", "peak"], Meta(description="amplitude as rms or peak (chain paper)")] = "rms"
+    order: Annotated[int, Meta(ge=1, le=10, description="order of the band-pass (chain bandpass)")] = 4
+    q: Annotated[float, Meta(ge=1, le=1000, description="quality of the comb filter (chain bandpass)")] = 30.0
+    zero_phase: Annotated[bool, Meta(description="whether filters run forwards and backwards (chain bandpass)")] = True
+    measure: Annotated[Literal["rms", "peak"], Meta(description="amplitude as rms or peak (chain bandpass)")] = "rms"
     trim_s: Annotated[
-        float, Meta(ge=0, le=1000, description="seconds cut from both ends after filtering (chain paper)")
+        float, Meta(ge=0, le=1000, description="seconds cut from both ends after filtering (chain bandpass)")
     ] = 0.25
 
 

@@ -10,7 +10,7 @@ import hmac
 from pathlib import PurePosixPath
 
 
-class Keys:
+class AccessKeys:
     """The cookie and the folders' keys of a server with a token."""
 
     def __init__(self, token: str) -> None:

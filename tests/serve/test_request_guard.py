@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from running import Server, serving
 
-from unitcad.serve.gate import BODY_S, LARGEST_BODY
-from unitcad.serve.keys import Keys
+from unitcad.serve.access_keys import AccessKeys
+from unitcad.serve.request_guard import BODY_S, LARGEST_BODY
 from unitcad.validation import templates
 
 HOSTS = ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "0.0.0.0", "[::]"]
@@ -120,7 +120,7 @@ def test_a_folder_s_key_opens_its_files_alone(tmp_path: Path, text: str) -> None
         (tmp_path / "out" / file).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "out" / file).write_text("{}")
     with serving(tmp_path, "embedded", environment={"UNITCAD_TOKEN": "a-token-of-the-lab"}) as own:
-        address = Keys("a-token-of-the-lab").address("one/report.html")
+        address = AccessKeys("a-token-of-the-lab").address("one/report.html")
         key = address.partition("/")[0]
         for file in ("one/report.html", "one/deep/base.stl"):
             status, _, headers = own.send(f"/files/{key}/{file}", headers=OPENED)
@@ -173,7 +173,7 @@ def test_no_path_leads_out_of_the_folder(tmp_path: Path, path: str) -> None:
 
 
 def test_paths_are_refused_by_the_server(server: Server) -> None:
-    key = Keys(server.token).address("x.html").partition("/")[0]
+    key = AccessKeys(server.token).address("x.html").partition("/")[0]
     for path in [*PATHS, *(f"{key}/{path}" for path in PATHS)]:
         line = f"GET /files/{path} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nX-Unitcad-Token: {server.token}\r\n\r\n"
         answer = server.raw(line.encode("latin-1"))

@@ -46,7 +46,7 @@ class SweptEstimate(Struct, frozen=True):
     """
 
     typical_error: dict[str, float]
-    not_read: dict[str, list[str]]
+    insensitive: dict[str, list[str]]
     not_measured: dict[str, float]
 
 
@@ -101,12 +101,12 @@ def warnings(found: SweptEstimate | None) -> list[str]:
     if found is None:
         return []
     by_keys: dict[tuple[str, ...], list[str]] = {}
-    for model, paths in found.not_read.items():
+    for model, paths in found.insensitive.items():
         if paths:
             by_keys.setdefault(tuple(paths), []).append(model)
     lines = []
     for paths, models in by_keys.items():
-        every = len(models) == len(found.not_read) and len(models) > 1
+        every = len(models) == len(found.insensitive) and len(models) > 1
         who = "no model of the edge level reads" if every else f"{listed(models)} {_do(models)} not read"
         lines.append(
             f"{who} {listed(paths)}: {'the' if every else 'their' if len(models) > 1 else 'its'} level stays the same"

@@ -1,4 +1,4 @@
-"""`[[recording.own]]`: values of `[recording]` that some records of a campaign have for themselves."""
+"""`[[recording.override]]`: values of `[recording]` that some records of a campaign have for themselves."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def campaign(folder: Path, recording: str) -> Measured:
 
 
 BASE = '[recording]\ntime_column = "clock"\ntime_unit = "ms"\nchannel = "laser"\n'
-OWN = '[[recording.own]]\nrecords = ["m*.mat"]\nrate_hz = 5000\nchannel = "disp"\n'
+OWN = '[[recording.override]]\nrecords = ["m*.mat"]\nrate_hz = 5000\nchannel = "disp"\n'
 
 
 def test_records_of_two_loggers_are_one_campaign(folder: Path) -> None:
@@ -52,7 +52,7 @@ def test_records_of_two_loggers_are_one_campaign(folder: Path) -> None:
 
 
 def test_the_reverse_gives_the_same(folder: Path) -> None:
-    own = '[[recording.own]]\nrecords = ["e1.csv", "e[23].csv"]\n' + BASE.removeprefix("[recording]\n")
+    own = '[[recording.override]]\nrecords = ["e1.csv", "e[23].csv"]\n' + BASE.removeprefix("[recording]\n")
     other = campaign(folder, '[recording]\nrate_hz = 5000\nchannel = "disp"\n' + own)
     assert other.levels == campaign(folder, BASE + OWN).levels
 
@@ -61,7 +61,7 @@ def test_a_motor_off_record_may_have_its_own(folder: Path) -> None:
     time = np.arange(8000) / 4000
     hum = np.column_stack([0 * time, 3 * np.cos(2 * np.pi * 50 * time)]).astype("<f4")
     wavfile.write(folder / "off.wav", 4000, hum)
-    own = '[[recording.own]]\nrecords = ["off.wav"]\nchannel = 2\nrate_hz = 4000\n'
+    own = '[[recording.override]]\nrecords = ["off.wav"]\nchannel = 2\nrate_hz = 4000\n'
     result = campaign(folder, BASE + OWN + own + '[blank]\nrecords = ["off.wav"]\n')
     assert dict(result.mains)[1] == pytest.approx(3.0, rel=1e-3)
 
@@ -69,24 +69,28 @@ def test_a_motor_off_record_may_have_its_own(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("own", "field", "nearest"),
     [
-        ('records = ["m?.mta"]\nrate_hz = 5000\n', "recording.own.0.records.0", "m3.mat"),
-        ('records = ["m1.mat"]\n', "recording.own.0", None),
-        ("records = []\nrate_hz = 5000\n", "recording.own.0.records", None),
-        ('records = ["m*.mat"]\nmotor_channel = 2\n', "recording.own.0.motor_channel", None),
-        (OWN[18:] + '[[recording.own]]\nrecords = ["m2.mat"]\nchannel = 2\n', "recording.own.1.records.0", None),
-        ('records = ["m*.mat"]\nrate_hz = 5000\nchannel = "dsp"\n', "recording.own.0.channel", "disp"),
+        ('records = ["m?.mta"]\nrate_hz = 5000\n', "recording.override.0.records.0", "m3.mat"),
+        ('records = ["m1.mat"]\n', "recording.override.0", None),
+        ("records = []\nrate_hz = 5000\n", "recording.override.0.records", None),
+        ('records = ["m*.mat"]\nmotor_channel = 2\n', "recording.override.0.motor_channel", None),
+        (
+            OWN[23:] + '[[recording.override]]\nrecords = ["m2.mat"]\nchannel = 2\n',
+            "recording.override.1.records.0",
+            None,
+        ),
+        ('records = ["m*.mat"]\nrate_hz = 5000\nchannel = "dsp"\n', "recording.override.0.channel", "disp"),
     ],
 )  # fmt: skip
 def test_what_can_not_be_meant_is_refused(folder: Path, own: str, field: str, nearest: str | None) -> None:
     with pytest.raises(Refusal) as refusal:
-        campaign(folder, f"{BASE}[[recording.own]]\n{own}")
+        campaign(folder, f"{BASE}[[recording.override]]\n{own}")
     assert (refusal.value.field, refusal.value.nearest) == (field, nearest)
 
 
 def test_only_what_is_given_changes() -> None:
     base = {"delimiter": ";", "skip_lines": 3, "time_column": 1, "time_unit": "ms"}
     table = convert(
-        {**base, "own": [{"records": ["a"], "decimal": ","}, {"records": ["b"], "rate_hz": 10}]}, RecordingTable
+        {**base, "override": [{"records": ["a"], "decimal": ","}, {"records": ["b"], "rate_hz": 10}]}, RecordingTable
     )
     a, b = recording_of(table, "a"), recording_of(table, "b")
     assert (a.decimal, a.delimiter, a.skip_lines, a.time_column, a.time_unit) == (",", ";", 3, 1, "ms")

@@ -1,4 +1,4 @@
-"""The chain `paper`: the article's band-pass and comb at 2 kHz; other parameters are assumed, and named.
+"""The chain `bandpass`: the article's band-pass and comb at 2 kHz; other parameters are assumed, and named.
 
 It says: sampled at 2 kHz, Butterworth 40 to 200 Hz, 50 Hz comb, three repeats, divided by the motor's amplitude. It
 does not say the filter's order, the comb's Q, whether the filters run only forwards, or peak or RMS.
@@ -47,7 +47,7 @@ def amplitude(table: ChainTable, x: Floats, rate: float) -> float:
     trim = round(table.trim_s * RATE_HZ)
     if len(x) < 2 * trim + 200:
         limit = f"leaves less than 0.1 s of a record of {len(x) / RATE_HZ:.2g} s"
-        raise Refusal("paper.trim_s", table.trim_s, limit)
+        raise Refusal("chain.trim_s", table.trim_s, limit)
     band, comb = _filters(table)
     x = x - x.mean()
     if table.zero_phase:
@@ -62,7 +62,7 @@ def amplitude(table: ChainTable, x: Floats, rate: float) -> float:
 def chain(table: ChainTable) -> Chain:
     """Return the chain with a campaign's parameters."""
     return Chain(
-        "paper",
+        "bandpass",
         lambda x, rate, fit: amplitude(table, x, rate),
         unfit=_unfit,
         gain=lambda hertz: gain(table, hertz),

@@ -15,8 +15,8 @@ from urllib.parse import parse_qs
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.addresses import means
-from unitcad.serve.keys import Keys
 
 TOKEN_HEADER = b"x-unitcad-token"
 FILES = "/files/"
@@ -47,7 +47,7 @@ class Limits:
     requests: int = MOST_REQUESTS
 
 
-class Gate:
+class RequestGuard:
     """ASGI middleware in front of `app`: passes a request on, its body whole, or refuses it with one line.
 
     `hosts` are the values of Host that mean this server (`addresses.hosts`). A request carries the token in a header,
@@ -56,7 +56,7 @@ class Gate:
     """
 
     def __init__(
-        self, app: ASGIApp, token: str, hosts: frozenset[str], cookie: str, keys: Keys, limits: Limits
+        self, app: ASGIApp, token: str, hosts: frozenset[str], cookie: str, keys: AccessKeys, limits: Limits
     ) -> None:
         self.app, self.token, self.hosts, self.limits = app, token.encode(), hosts, limits
         self.cookie, self.keys = cookie.encode(), keys
