@@ -31,7 +31,7 @@ SHOWN = {"unit": "unit and section", "moulds": "moulds judged", "estimate": "est
 NUMBERS = {
     "forearm-pockets": ("layout.pitch_mm", 20.0, 24.0),
     "forearm-patch": ("sheet.margin_mm", 3.0, 5.0),
-    "sleeve-curved": ("body.radius_mm", 40.0, 44.0),
+    "sleeve-curved": ("limb.radius_mm", 40.0, 44.0),
 }
 """What is typed, and from where to where, in what is no unit's spec."""
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "how-to" / "live-page.md"

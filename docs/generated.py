@@ -115,7 +115,7 @@ def _command(command: Any, words: str) -> list[str]:
 def keys_of_file(name: str, model: type[Struct]) -> str:
     """Return the tables and keys of a kind of file."""
     lines = [
-        f"# Keys of a {name.replace('-', ' ')} file",
+        f"# Keys of the {name.replace('-', ' ')} file",
         "",
         f"`unitcad schema {name}` prints the JSON Schema of the file for an editor. Lengths are in mm.",
         "Unknown keys, wrong types, NaN and infinity are refused.",
@@ -142,7 +142,7 @@ def tables(model: type[Struct], path: str = "") -> Iterator[tuple[str, type[Stru
             yield from tables(table, inner)
         elif table := table_in(entry_in(field.type)):
             yield f"[[{inner}]]", table
-            yield from ((f"[{below}]", one) for below, one in list(tables(table, inner))[1:])
+            yield from list(tables(table, inner))[1:]
         elif kind := named_in(field.type):
             deeper = named_in(kind)
             if table := table_in(deeper or kind):
@@ -152,12 +152,19 @@ def tables(model: type[Struct], path: str = "") -> Iterator[tuple[str, type[Stru
 def _keys(table: type[Struct]) -> list[str]:
     rows = ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
     for key, field in fields_of(table).items():
-        inner = table_in(field.type) or table_in(entry_in(field.type))
-        if inner and field.name in ("like", *(() if typing.get_origin(inner) else ())):
-            continue
         default = "required" if field.required else _default(field)
-        rows.append(f"| `{key}` | {_values(field.type)} | {default} | {meaning(field.type)} |")
+        text = meaning(field.type)
+        if not text and (inner := table_in(field.type) or table_in(entry_in(field.type)) or _named(field.type)):
+            text = inspect.cleandoc(inner.__doc__ or "").partition("\n")[0].rstrip(".")
+        if not text and typing.get_origin(field.type) is not typing.Literal:
+            raise ValueError(f"{table.__name__}.{key} has no description")
+        rows.append(f"| `{key}` | {_values(field.type)} | {default} | {text[:1].upper()}{text[1:]} |")
     return [*rows, ""]
+
+
+def _named(kind: Any) -> type[Struct] | None:
+    """Return the table of any name that a kind allows, such as an entry of [materials]."""
+    return table_in(kind) or (_named(inner) if (inner := named_in(kind)) else None)
 
 
 def _default(field: Any) -> str:
@@ -196,6 +203,8 @@ def _range(kind: Any, number: type) -> str:
         return name
     if high is None:
         return f"{name} from {low:g}"
+    if low == high:
+        return f"{low:g}"
     return f"{low:g} to {high:g}" if number is float else f"{low:g} to {high:g}, whole"
 
 

@@ -156,7 +156,7 @@ def test_a_step_body_s_facets_lie_within_the_stated_tolerance(tmp_path: Path) ->
 def test_a_body_that_meets_the_motor_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "body.stl").write_bytes(stl_of(hexagon(6.5, 3.25)))
     done = build(load(spec_of(tmp_path, "body.stl", layers=1)), tmp_path / "out", only=("unit",))
-    (finding,) = [finding for finding in done.manifest["laws"] if not finding["ok"]]
+    (finding,) = [finding for finding in done.manifest["mould_checks"] if not finding["ok"]]
     assert (finding["code"], finding["where"]) == ("C200", "unit: layer1 and motor")
     assert finding["value"] == pytest.approx(math.pi * 3.5**2 * 2, rel=1e-3)
 

@@ -153,7 +153,7 @@ def test_help_and_version() -> None:
         (["build", "encapsulatin"], "SPEC = 'encapsulatin'"),
         (["build", "encapsulating", "--only", "units"], "--only = 'units'"),
         (["build", "encapsulating", "--set", "x"], "--set = 'x'"),
-        (["batch", "papr"], "SWEEP = 'papr'"),
+        (["batch", "publishd"], "SWEEP = 'publishd'"),
     ],
 )
 def test_a_refused_argument_is_called_as_in_the_help(words: list[str], field: str, tmp_path: Path) -> None:
@@ -201,7 +201,7 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     assert lines[1] == "assumed: motor.thickness_mm = 2 (2 to 2.65); measure the motor before you print"
     assert duration(procedure["earliest_finish_min"]) in lines[2]
     assert lines[3] == "to mix: 2 g of ecoflex-00-10, 4 g of dragon-skin-30"
-    assert f"{len(manifest['laws'])} of {len(manifest['laws'])} mould checks passed" in lines[4]
+    assert f"{len(manifest['mould_checks'])} of {len(manifest['mould_checks'])} mould checks passed" in lines[4]
     assert lines[5] == manifest["estimate"]["answer"]
     assert lines[6] == f"open {folder / 'report.html'}"
     assert (folder / "report.html").is_file()

@@ -144,7 +144,7 @@ def test_a_component_is_the_piece_that_holds_the_point():
         assert reference.volume == pytest.approx(math.pi * (1 + i), rel=1e-9)
         assert_mesh_within_bound(Component(three, (3 * i, 0, 0.5)), 64, reference)
     for realise in (lambda shape: mesh.realise(shape, 64), lambda shape: occt.solids([shape])):
-        with pytest.raises(UnitcadError, match="no solid holds the point"):
+        with pytest.raises(UnitcadError, match="no solid is at the point"):
             realise(Component(three, (1.5, 0, 0.5)))
 
 

@@ -55,7 +55,7 @@ def test_every_template_builds_and_passes_all_checks(name: str, tmp_path: Path) 
     built = build(_mesh_only(name), tmp_path)
     assert built.ok
     assert built.manifest["check"]["findings"] == []
-    assert {finding["code"] for finding in built.manifest["laws"]} >= {"C000", "C100", "C200", "C210"}
+    assert {finding["code"] for finding in built.manifest["mould_checks"]} >= {"C000", "C100", "C200", "C210"}
     on_disk = {str(f.relative_to(built.folder)) for f in built.folder.rglob("*") if f.is_file()}
     assert {"spec.toml", "manifest.json", "timings.json", "section.svg", "unit.3mf", "moulds/moulds.3mf"} <= on_disk
     for part in built.manifest["parts"]:
@@ -197,8 +197,8 @@ def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tm
 )
 def test_what_a_variant_lacks_is_left_out_and_listed(name: str, what: str, tmp_path: Path) -> None:
     built = build(load(name, ['output.formats=["stl"]']), tmp_path, only=["unit", "moulds"], check=False)
-    assert what in {entry["what"] for entry in built.manifest["left_out"]}
-    assert all(entry["why"] for entry in built.manifest["left_out"])
+    assert what in {entry["output"] for entry in built.manifest["skipped"]}
+    assert all(entry["reason"] for entry in built.manifest["skipped"])
 
 
 def test_materials_share_geometry() -> None:

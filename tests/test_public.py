@@ -317,11 +317,11 @@ def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
         (lambda: unitcad.build("embedded", only="units"), "^only = 'units': not known"),
         (lambda: unitcad.build("embedded", only=[3]), "^only = 3: takes a text or a list of"),  # type: ignore[list-item]
         (lambda: unitcad.estimate("embedded", models=3), "^models = 3: takes a text or"),  # type: ignore[arg-type]
-        (lambda: batch("papr"), "^sweep = 'papr': not known"),
+        (lambda: batch("publishd"), "^sweep = 'publishd': not known"),
         (lambda: batch(None), "^sweep: takes a path, not NoneType$"),  # type: ignore[arg-type]
-        (lambda: batch("paper", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
-        (lambda: batch("paper", limit=0), "^limit = 0: must be a whole number from 1 "),
-        (lambda: batch("paper", jobs=0, timeout=3), "^timeout = 3: only a worker process"),
+        (lambda: batch("published", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
+        (lambda: batch("published", limit=0), "^limit = 0: must be a whole number from 1 "),
+        (lambda: batch("published", jobs=0, timeout=3), "^timeout = 3: only a worker process"),
         (lambda: unitcad.check("a.stl", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
         (lambda: unitcad.check("a.stl", timeout=True), "^timeout = true: must be a number"),
         (lambda: unitcad.check(["a.stl"]), r'^files = \["a.stl"\]: takes a path, not list$'),  # type: ignore[arg-type]

@@ -19,8 +19,8 @@ from urllib.request import url2pathname
 from unitcad.text import some, toml
 
 NEAREST = "; nearest accepted: "
-"""What a refusal's sentence names the nearest accepted value after."""
-UNIT_ALONE = "; --only unit makes the unit alone"
+"""The words before the nearest accepted value in a refusal."""
+UNIT_ALONE = "; --only unit makes only the unit"
 """How a refusal of moulds ends that leaves the unit possible."""
 
 
@@ -34,7 +34,7 @@ class UnitcadError(Exception):
         return {"message": str(self)}
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Come back from a worker as it was, whatever arguments the class takes."""
+        """Unpickle as it was, for any arguments of the class."""
         return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
 
@@ -89,7 +89,7 @@ class Refusal(UnitcadError):
     """A value that is refused: its field, the value, the limit that it breaks and the nearest accepted value.
 
     `nearest` is a value that may be typed in `field`'s place and that meets this limit (it may then meet another one).
-    `value` is None for a field that is missing. `file` and `line` are where the value stands, `others` are further
+    `value` is None for a field that is missing. `file` and `line` are the place of the value, `others` are further
     faults of the same data; `unitcad.validation.load` fills them in.
     """
 
@@ -142,7 +142,7 @@ def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusa
 def unknown_key(field: str, value: object, known: Iterable[str], lists: str = "") -> UnknownKey:
     """Return a refusal of a key that no table has; `field` is its whole path, `known` the keys of that table.
 
-    The limit names the most similar keys first, and the command `lists`, which prints all, where it leaves any out.
+    The limit names the most similar keys first, and the command `lists`, which prints all, if it omits any.
     """
 
     table, _, key = field.rpartition(".")
@@ -161,14 +161,14 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
 
 
 def misfit(error: Exception) -> str:
-    """Say where data differs from what this program writes, from msgspec's error about it."""
-    # msgspec gives the place in its sentence alone. For what a person types `unitcad.spec.convert` walks the types
+    """Return the difference of data from this program's format, from msgspec's error."""
+    # msgspec gives the place only in its sentence. For typed files `unitcad.spec.convert` walks the types
     # instead; here the data is this program's own, and a sentence that reads otherwise only loses its detail.
-    what, _, place = str(error).partition(" - at `$")
-    if (byte := re.search(r"byte (\d+)", what)) or not re.match("Expected|Object|Invalid", what):
+    message, _, place = str(error).partition(" - at `$")
+    if (byte := re.search(r"byte (\d+)", message)) or not re.match("Expected|Object|Invalid", message):
         return f"it is not JSON{f' (byte {byte[1]})' if byte else ''}"
     place = place.rstrip("`").lstrip(".").replace("[...]", ".*") or "its top level"
-    if key := re.search(r"(missing|unknown)[^`]*`([^`]*)`", what):
+    if key := re.search(r"(missing|unknown)[^`]*`([^`]*)`", message):
         return f"{place} {'lacks the' if key[1] == 'missing' else 'has an unknown'} key {key[2]!r}"
     return f"{place} has a value of the wrong kind"
 
@@ -182,7 +182,7 @@ def shown(value: object) -> str:
 
 
 def _plain(value: object) -> bool | int | float | str | None:
-    """Return a value as JSON has it, and short: numbers that JSON lacks and whatever is long become text."""
+    """Return a value for JSON, shortened: long values and numbers that JSON lacks become text."""
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**_LONGEST:

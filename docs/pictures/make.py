@@ -106,7 +106,7 @@ def arrays() -> dict[str, bytes]:
             for kind, files in drawn.items()
             for name, path in ARRAY_PICTURES.items()
         },
-        "array-band-worn.png": band["pictures/patch-worn.png"],
+        "array-band-bent.png": band["pictures/patch-bent.png"],
         "array-band-tools.png": band["pictures/tools.png"],
         "array-curved-tools.png": sleeve["pictures/tools.png"],
         "array-curved-pour2.png": sleeve["pictures/pour2.png"],

@@ -73,7 +73,7 @@ def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:
     manifest = json.loads((folder / "manifest.json").read_text())
     assert set(manifest["files"]) == there - {"manifest.json"}
     assert [place["name"] for place in manifest["array"]["places"]] == ["A1", "A2"]
-    assert all(finding["ok"] for finding in manifest["laws"])
+    assert all(finding["ok"] for finding in manifest["mould_checks"])
     assert manifest["check"]["findings"] == []
 
 

@@ -46,7 +46,7 @@ HEX = {
     "unit": "encapsulating",
     "layout": {"kind": "hex", "rings": 1, "pitch_mm": 20},
     "circuit": {"row_width_mm": 2},
-    "body": {"radius_mm": 45, "cast": "curved"},
+    "limb": {"radius_mm": 45, "cast": "curved"},
 }
 SLOTS = {
     "name": "slots",
@@ -54,7 +54,7 @@ SLOTS = {
     "unit": {"like": "three-layer"},
     "layout": {"kind": "list", "points_mm": [[-12, -3], [13, 4]]},
     "sheet": {"strap_slot_mm": [3, 8]},
-    "body": {"radius_mm": 61.7, "cast": "curved"},
+    "limb": {"radius_mm": 61.7, "cast": "curved"},
 }
 
 
@@ -197,9 +197,9 @@ def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap() -> None:
 @pytest.mark.parametrize(
     ("override", "field"),
     [
-        ("body.radius_mm=20", "body.radius_mm"),
-        ("body.radius_mm=27", "body.radius_mm"),
-        ("unit=single-encapsulating", "body.cast"),
+        ("limb.radius_mm=20", "limb.radius_mm"),
+        ("limb.radius_mm=27", "limb.radius_mm"),
+        ("unit=single-encapsulating", "limb.cast"),
         ("unit=embedded", "unit.design"),
         ("sheet.thickness_mm=4", "sheet.thickness_mm"),
         ("moulds.bed_z_mm=20", "moulds.bed_z_mm"),
@@ -258,8 +258,8 @@ def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> No
 def test_pockets_are_cast_flat() -> None:
     asked = load_array("forearm-pockets").asked
     with pytest.raises(Refusal) as refused:
-        load_array({**asked, "body": {"radius_mm": 40.0, "cast": "curved"}})
-    assert (refused.value.field, refused.value.nearest) == ("body.cast", "flat")
+        load_array({**asked, "limb": {"radius_mm": 40.0, "cast": "curved"}})
+    assert (refused.value.field, refused.value.nearest) == ("limb.cast", "flat")
 
 
 @pytest.mark.parametrize(

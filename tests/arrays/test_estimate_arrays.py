@@ -34,7 +34,7 @@ def test_the_answer_comes_first_and_the_tables_behind_details() -> None:
     _, more, _ = run(NINE, "--details", "--frequency", "100:200:50", "--masses")
     assert more.count("consistent") == 1
     assert "150" in more
-    assert "change what B2 gets by x 1.0" in more
+    assert "change the sum at B2 by x 1.0" in more
 
 
 def test_json_is_the_data_and_several_are_compared_with_the_first(tmp_path) -> None:  # type: ignore[no-untyped-def]

@@ -58,7 +58,7 @@ def _of(unit: str, **more: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("unit", "why"), [("custom/strap-lugs", r"reaches 12\.5 mm"), ("custom/dome", "where the sheet lies")]
+    ("unit", "why"), [("custom/strap-lugs", r"reaches 12\.5 mm"), ("custom/dome", "at the sheet's height")]
 )
 def test_a_unit_that_is_no_disc_is_refused_with_one_that_is_held(unit: str, why: str) -> None:
     name = unit.rpartition("/")[2]
@@ -71,7 +71,7 @@ def test_a_unit_that_is_no_disc_is_refused_with_one_that_is_held(unit: str, why:
 
 
 def test_a_tail_that_leaves_at_the_sheet_is_refused() -> None:
-    with pytest.raises(Refusal, match="leave where the sheet lies") as refused:
+    with pytest.raises(Refusal, match="leave at the sheet's height") as refused:
         load_array(_of("custom/film-closed", sheet={"thickness_mm": 3.3}))
     assert refused.value.field == "unit"
     assert [f for f in check_moulds(patch_moulds(load_array(_of("custom/film-closed")))) if not f.ok] == []

@@ -71,7 +71,7 @@ def test_levels_come_from_a_file_of_measure(tmp_path: Path) -> None:
     level = {"distance_mm": 0.0, "value": 0.2, "low": 0.18, "high": 0.22, "frequency_hz": 131.5}
     rows = [
         {"unit": "b", "spec": "campaign/u.toml", "chain": "line", **level},
-        {"unit": "b", "chain": "paper", **level, "value": 0.3},
+        {"unit": "b", "chain": "bandpass", **level, "value": 0.3},
         {"unit": "b", "chain": "line", **level, "distance_mm": 5.0, "value": 0.1},
     ]
     (tmp_path / "u.toml").write_text(Path("templates/embedded.toml").read_text())

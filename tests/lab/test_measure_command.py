@@ -46,7 +46,7 @@ def folder(tmp_path):
     time = np.arange(4000) / RATE
     write(tmp_path / "off.wav", 3 * np.cos(2 * np.pi * 50 * time) + 1.2 * np.cos(2 * np.pi * 100 * time))
     (tmp_path / "c.toml").write_text(
-        f'name = "test"\n{HEAD}[blank]\nrecords = ["off.wav"]\n[chain]\nuse = ["line", "paper"]\n'
+        f'name = "test"\n{HEAD}[blank]\nrecords = ["off.wav"]\n[chain]\nuse = ["line", "bandpass"]\n'
         f'[[unit]]\nname = "a"\nspec = "encapsulating"\nreference = {motor}\nedge = {edge}\n'
         f"[[unit.point]]\ndistance_mm = 10.0\nrecords = {far}\n"
     )
@@ -63,7 +63,7 @@ def test_a_campaign_has_the_levels_of_its_truth(folder):
     assert len(result.levels) == 4
     for record in result.records["a"]:
         assert record.u_um < 0.02 * record.amplitude_um
-        assert record.gains["paper"] == pytest.approx(1.0, abs=0.01)
+        assert record.gains["bandpass"] == pytest.approx(1.0, abs=0.01)
     assert dict(result.mains)[1] == pytest.approx(3.0, rel=1e-3)
 
 
@@ -158,7 +158,7 @@ def test_a_faulty_record_is_a_finding(code, tmp_path, monkeypatch):
     for i in range(3):
         write(tmp_path / f"e{i}.wav", x + 1e-4 * i, rate=rate)
     motor = repeats(tmp_path, "m", 300, 122)
-    chain = '[chain]\nuse = ["line", "paper"]\n' if code == "L106" else ""
+    chain = '[chain]\nuse = ["line", "bandpass"]\n' if code == "L106" else ""
     edges = '["e0.wav", "e1.wav", "e2.wav"]'
     if code in ("L101", "L102", "L105", "L106", "L111"):
         for i in range(3):

@@ -58,7 +58,7 @@ def apart(folder, edge, motor):
             x_i = x * (1 + 0.005 * i) + noise
             wavfile.write(folder / f"{name}{i}.wav", RATE, (x_i / 500).astype("<f4"))
     (folder / "c.toml").write_text(
-        HEAD + '[chain]\nuse = ["line", "paper"]\n[[unit]]\nname = "a"\n'
+        HEAD + '[chain]\nuse = ["line", "bandpass"]\n[[unit]]\nname = "a"\n'
         'reference = ["m0.wav", "m1.wav", "m2.wav"]\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
     )
     return measure(read_campaign(folder / "c.toml"), folder)

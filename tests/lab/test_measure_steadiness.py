@@ -29,7 +29,9 @@ def line(size, hertz, seed=1):
 
 def record(folder, x, band=BAND):
     wavfile.write(folder / "a.wav", RATE, x.astype("<f4"))
-    campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),), chain=ChainTable(use=("line", "paper")))
+    campaign = Campaign(
+        name="t", sensor=SENSOR, unit=(UnitTable(name="a"),), chain=ChainTable(use=("line", "bandpass"))
+    )
     return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), band, "a.wav")
 
 
@@ -99,7 +101,7 @@ def test_a_line_outside_the_search_is_named(tmp_path):
     assert "strongest line outside" not in said(record(tmp_path, noise(1.0), near))["L111"]
 
 
-HEAD = 'name = "t"\n[sensor]\nquantity = "displacement"\nunit = "um"\n[chain]\nuse = ["line", "paper"]\n'
+HEAD = 'name = "t"\n[sensor]\nquantity = "displacement"\nunit = "um"\n[chain]\nuse = ["line", "bandpass"]\n'
 UNIT = '[[unit]]\nname = "a"\nreference = ["m0.wav", "m1.wav", "m2.wav"]\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
 
 

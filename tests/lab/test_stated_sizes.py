@@ -73,7 +73,7 @@ def test_tdms_that_states_more_samples_than_bytes(tmp_path):
     content = (tmp_path / "a.tdms").read_bytes()
     assert content.count(struct.pack("<Q", 300)) == 3
     (tmp_path / "a.tdms").write_bytes(content.replace(struct.pack("<Q", 300), struct.pack("<Q", 3 * 10**9)))
-    assert "holds fewer samples than it states" in refused(tmp_path / "a.tdms")
+    assert "has fewer samples than it states" in refused(tmp_path / "a.tdms")
 
 
 def test_a_library_that_takes_all_memory_is_ended(tmp_path, monkeypatch):

@@ -25,7 +25,7 @@ def test_the_commands_of_the_page_give_what_it_shows(folder):
 def test_the_pasted_table_is_the_one_that_was_made(folder):
     tables = [
         tomllib.loads((folder / name).read_text())
-        for name in ("blend/material.toml", "lab/bench.toml", "lab/wish.toml")
+        for name in ("blend/material.toml", "lab/bench.toml", "lab/next-unit.toml")
     ]
     page = re.search(r"^```toml\n(.*?)^```", PAGE.read_text("utf-8"), re.MULTILINE | re.DOTALL)
     assert page

@@ -55,12 +55,12 @@ def test_overlaps_inside_the_unit_are_errors_without_moulds_too(tmp_path: Path) 
     code = "def unit(spec):\n    return ring(5.75, 7.0, 0, 2.11)\n"
     done = built(tmp_path, code, circuit="[fpcb]\nthickness_mm = 0.11\n")
     assert not done.ok
-    (finding,) = [finding for finding in done.manifest["laws"] if not finding["ok"]]
+    (finding,) = [finding for finding in done.manifest["mould_checks"] if not finding["ok"]]
     assert (finding["code"], finding["where"]) == ("C200", "unit: layer1 and fpcb")
     assert abs(finding["value"] - 0.11 * 3 * 1.25) < 0.02
     whole = built(tmp_path, code.replace("2.11", "2.0"), circuit="[fpcb]\nthickness_mm = 0.11\n")
     assert whole.ok
-    assert [finding["code"] for finding in whole.manifest["laws"]] == ["C200"]
+    assert [finding["code"] for finding in whole.manifest["mould_checks"]] == ["C200"]
 
 
 LUGS = """
@@ -135,7 +135,7 @@ def test_a_dome_has_no_opening_to_pour_into(tmp_path: Path) -> None:
     assert (
         "to pour silicone takes 2 mm2 and a circle of 0.4 mm: give it a flat top, such as a disc of 1.6 mm" in sentence
     )
-    assert sentence.endswith("--only unit makes the unit alone")
+    assert sentence.endswith("--only unit makes only the unit")
     for flat, fits in ((0.79, False), (0.8, True), (1.0, True)):
         code = DOME.replace("FLAT", f"({flat}, 4, 0), ")
         if not fits:
@@ -214,7 +214,7 @@ def test_a_build_writes_moulds_and_casting(tmp_path: Path) -> None:
     assert done.ok
     assert done.manifest["outputs"] == ["unit", "moulds", "casting"]
     assert {"casting.md", "moulds/base.stl", "moulds/step2-cup.stl"} <= set(done.manifest["files"])
-    reasons = {left["what"]: left["why"] for left in done.manifest["left_out"]}
+    reasons = {left["output"]: left["reason"] for left in done.manifest["skipped"]}
     assert reasons["estimate"].startswith("the models describe")
     first, second = (done.folder / "casting.md").read_text("utf-8").split("## Pour 2")
     assert "in the blade's way" in first  # the lugs' supports are as high in pour 1 as in pour 2
@@ -279,7 +279,7 @@ def test_the_worked_examples_are_built_whole(name: str, change: dict[str, object
     spec = load(CUSTOM / f"{name}.toml", change | {"output.formats": ["stl", "svg"]})
     done = build(spec, tmp_path)
     assert done.ok
-    assert [finding for finding in done.manifest["laws"] if not finding["ok"]] == []
+    assert [finding for finding in done.manifest["mould_checks"] if not finding["ok"]] == []
     assert done.manifest["check"]["errors"] == 0
     pours = [f"moulds/step{i + 1}-cup.stl" for i in range(len(spec.layers))]
     assert {"casting.md", "bom.csv", "moulds/base.stl", "step1-section.svg", *pours} <= set(done.manifest["files"])

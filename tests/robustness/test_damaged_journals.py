@@ -19,7 +19,7 @@ VARIANTS = 12
 
 
 def _entry(index, tries=0):
-    row = {"name": f"n{index}", "diameter_mm": 14.0 + index / 7, "laws": tries}
+    row = {"name": f"n{index}", "diameter_mm": 14.0 + index / 7, "mould_checks": tries}
     return JournalEntry(index=index, status="ok", values={"a": index}, row=row)
 
 
@@ -85,7 +85,11 @@ def _block(content, dice, byte):
 
 def _changed_value(content, dice):
     """A line that is still JSON and says something else."""
-    return _lines(content, dice, lambda lines, at: lines.__setitem__(at, lines[at].replace(b'"laws": 0', b'"laws": 7')))
+    return _lines(
+        content,
+        dice,
+        lambda lines, at: lines.__setitem__(at, lines[at].replace(b'"mould_checks": 0', b'"mould_checks": 7')),
+    )
 
 
 RANDOM = {

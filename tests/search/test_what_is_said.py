@@ -25,13 +25,13 @@ from unitcad.validation import from_data, load
 FIELD = "target.edge_max"
 
 
-def _target(vary: dict[str, Any] | None = None, **wish: Any) -> Inversion:
-    return invert(target_of({"target": {"edge_max": 0.2, **wish}, "vary": vary or {}}), check=False)
+def _target(vary: dict[str, Any] | None = None, **goals: Any) -> Inversion:
+    return invert(target_of({"target": {"edge_max": 0.2, **goals}, "vary": vary or {}}), check=False)
 
 
 @pytest.fixture(scope="module")
 def paper() -> Inversion:
-    return invert(load_target("paper"), check=False)
+    return invert(load_target("published"), check=False)
 
 
 @pytest.fixture(scope="module")
@@ -127,8 +127,8 @@ def test_a_specs_crosstalk_over_its_limit_is_among_the_reasons(tmp_path: Path) -
 
 
 def test_the_command_that_builds_is_quoted(paper: Inversion) -> None:
-    found = contents(paper, "odd dir/design-paper")
-    file = f"odd dir/design-paper/specs/1-{paper.data['proposals'][0]['name']}.toml"
+    found = contents(paper, "odd dir/design-published")
+    file = f"odd dir/design-published/specs/1-{paper.data['proposals'][0]['name']}.toml"
     assert f"`unitcad build '{file}'`" in found["design.md"].decode()
     assert f"unitcad build '{file}'" in html.unescape(found["design.html"].decode())
 
@@ -136,12 +136,12 @@ def test_the_command_that_builds_is_quoted(paper: Inversion) -> None:
 def test_a_measurement_is_shown_and_the_nearest_others_are_no_proposals(paper: Inversion) -> None:
     names = {one["rank"]: one["name"] for one in paper.data["proposals"]}
     first = explanation_lines(explain(paper, names[1]))
-    assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the wish; probability 0.79" in first[0]
+    assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target; probability 0.79" in first[0]
     for third in (names[3], "embedded"):
         lines = explanation_lines(explain(paper, third))
-        assert "measured 16 % (the paper): outside the wish; probability 0.10, below your 50 %" in lines[0]
+        assert "measured 16 % (the paper): outside the target; probability 0.10, below your 50 %" in lines[0]
         assert lines[1:] == [
-            "  it is no proposal: it was measured outside the wish, and stands among the nearest others as number 3"
+            "  it is no proposal: it was measured outside the target, and stands among the nearest others as number 3"
         ]
 
 

@@ -18,9 +18,9 @@ pytest.importorskip("uvicorn", reason="the extra serve is not installed")
 import uvicorn
 
 from unitcad.files import TEMPORARY, scratch
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.connections import Connection
-from unitcad.serve.gate import Gate, Limits
-from unitcad.serve.keys import Keys
+from unitcad.serve.request_guard import Limits, RequestGuard
 
 TOKEN = "a-token-of-the-lab"
 HEAD = f"GET / HTTP/1.1\r\nHost: x:1\r\nX-Unitcad-Token: {TOKEN}\r\n\r\n".encode()
@@ -32,12 +32,12 @@ class Quick(Connection):
     write_s = 0.3
 
 
-def behind_a_gate(app, client):
+def behind_a_guard(app, client):
     """Run a client, given a function that connects it, of an app behind a gate that lets one request in."""
 
     async def both():
         listening = socket.create_server(("127.0.0.1", 0))
-        gate = Gate(app, TOKEN, frozenset({"x:1"}), "cookie", Keys(TOKEN), Limits(requests=1))
+        gate = RequestGuard(app, TOKEN, frozenset({"x:1"}), "cookie", AccessKeys(TOKEN), Limits(requests=1))
         config = uvicorn.Config(
             gate, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_graceful_shutdown=1
         )
@@ -82,7 +82,7 @@ def test_an_answer_that_nobody_reads_frees_its_place():
             assert begun.wait(10)
             answered(connect)
 
-    behind_a_gate(app, client)
+    behind_a_guard(app, client)
 
 
 def test_an_asker_who_leaves_ends_the_work_for_the_answer():
@@ -105,7 +105,7 @@ def test_an_asker_who_leaves_ends_the_work_for_the_answer():
         assert ended.wait(10)
         answered(connect)
 
-    behind_a_gate(app, client)
+    behind_a_guard(app, client)
 
 
 def test_an_address_is_bounded_without_a_token(server):

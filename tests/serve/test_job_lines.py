@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.jobs import Jobs, build_folder
-from unitcad.serve.keys import Keys
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the command is a script of the shell")
@@ -23,7 +23,7 @@ def test_a_line_of_70_000_characters_ends_neither_its_job_nor_the_next_one(tmp_p
     monkeypatch.setattr("unitcad.serve.jobs.sys", SimpleNamespace(executable=str(script)))
 
     async def run():
-        jobs = Jobs(tmp_path / "out", Keys("token"))
+        jobs = Jobs(tmp_path / "out", AccessKeys("token"))
         try:
             states = []
             for _ in range(2):

@@ -189,7 +189,7 @@ def test_a_campaign_is_measured_again_after_a_save(running, tmp_path):
         page.goto(own.url)
         assert page.url == f"{own.base}/"  # the token is in no address that is copied or kept
         assert page.locator("table").first.locator("tr").count() == 7
-        file.write_text(file.read_text("utf-8").replace('use = ["line", "paper"]', 'use = ["line"]'), "utf-8")
+        file.write_text(file.read_text("utf-8").replace('use = ["line", "bandpass"]', 'use = ["line"]'), "utf-8")
         page.click("text=measure again")
         page.wait_for_function("() => document.querySelector('table').rows.length === 4")
         context.close()

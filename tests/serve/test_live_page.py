@@ -248,7 +248,7 @@ def test_save_and_build_from_the_page(running, tmp_path):
         visit.close()
     manifests = list((tmp_path / "out").glob("*/manifest.json"))
     assert len(manifests) == 1
-    assert all(check["ok"] for check in json.loads(manifests[0].read_text())["laws"])
+    assert all(check["ok"] for check in json.loads(manifests[0].read_text())["mould_checks"])
 
 
 def test_an_older_answer_does_not_replace_a_newer_one(live):

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from running import serving
 
-from unitcad.serve.keys import Keys
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.validation import templates
 
 TOKEN = "a-token-of-the-lab"
@@ -70,7 +70,7 @@ def status(server, head, body=b""):
 
 
 def test_odd_addresses_and_headers_are_no_fault_of_the_server(own):
-    key = Keys(TOKEN).address("x.json").partition("/")[0]
+    key = AccessKeys(TOKEN).address("x.json").partition("/")[0]
     targets = [(route + path, "") for route, path in itertools.product(READ, PATHS)]
     targets += [(route + query, "") for route, query in itertools.product(READ, QUERIES)]
     targets += [(route, header) for route, header in itertools.product(READ, HEADERS)]

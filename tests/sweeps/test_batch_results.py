@@ -68,7 +68,7 @@ def test_laws_and_checks_are_in_the_table(tmp_path):
     sweep = load_sweep("all-materials").overridden(['output.formats=["stl"]'])
     run(sweep, tmp_path / "o", BatchOptions(("unit", "moulds"), limit=2), SerialExecutor(), workers=1)
     for row in rows(tmp_path / "o"):
-        assert row["laws_held"] == row["laws"] > 20
+        assert row["laws_held"] == row["mould_checks"] > 20
         assert row["laws_broken"] == ""
         assert row["check_errors"] == 0
 
@@ -115,16 +115,16 @@ def test_folders_that_are_not_ours(tmp_path):
         assert message in done.stderr
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["letter"]
     assert unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0).returncode == 0
-    other = unitcad("batch", "paper", "-o", tmp_path / "o")
+    other = unitcad("batch", "published", "-o", tmp_path / "o")
     assert other.returncode == 2
-    assert "holds another batch (rings" in other.stderr
+    assert "has another batch (rings" in other.stderr
     # A variant's place taken by something else: that one fails, nothing is overwritten.
     folder = next((tmp_path / "o").glob("ring-*"))
     (folder / "spec.toml").write_text(to_toml(from_data(read("embedded"))))
     (folder / "manifest.json").unlink()
     again = unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0)
     assert again.returncode == 1
-    assert "holds the result of another spec" in again.stderr
+    assert "has the result of another spec" in again.stderr
 
 
 def test_progress_is_lines_for_machines_and_nothing_in_a_pipe(tmp_path):
@@ -196,7 +196,7 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path):
     manifest = json.loads((folder / "manifest.json").read_text())
     assert [part["name"] for part in manifest["parts"]] == ["layer1", "motor"]
     assert manifest["check"]["errors"] == 0
-    assert {left["what"] for left in manifest["left_out"]} >= {"moulds", "casting", "estimate"}
+    assert {left["output"] for left in manifest["skipped"]} >= {"moulds", "casting", "estimate"}
     (tmp_path / "tub.py").unlink()
     again = [folder / "spec.toml", "-o", tmp_path / "out", "--formats", "stl,3mf", "--only", "unit"]
     refused = unitcad("build", *again)

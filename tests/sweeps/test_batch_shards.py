@@ -141,7 +141,7 @@ def test_a_shard_is_refused_where_no_merge_could_take_it(tmp_path):
         made(sweep, out, shard=Shard(3, 3))
     assert [path.name for path in shard_folders(out)] == ["shard-1-of-2"]
     made(ring_sweep(tmp_path / "t", heights=[5.0]), tmp_path / "other")
-    with pytest.raises(UnitcadError, match="holds another batch"):
+    with pytest.raises(UnitcadError, match="has another batch"):
         made(sweep, tmp_path / "other", shard=Shard(1, 2))
     assert not shard_folders(tmp_path / "other")
     made(sweep, out, shard=Shard(2, 2))

@@ -65,21 +65,21 @@ def test_a_range_has_both_its_ends_and_no_digits_of_rounding():
 
 
 @pytest.mark.parametrize(
-    ("name", "count", "geometries"), [("paper", 15, 4), ("thickness", 32, 32), ("all-materials", 50, 2)]
+    ("name", "count", "geometries"), [("published", 15, 4), ("thickness", 32, 32), ("all-materials", 50, 2)]
 )
 def test_shipped_sweeps_hold_what_they_say(name, count, geometries):
     sweep = load_sweep(name)
     assert sweep.count == count
     specs = [sweep.spec(i) for i in range(count)]
     assert len({build_key(spec, ("unit", "moulds"), True) for spec in specs}) == geometries
-    assert set(shipped()) == {"paper", "thickness", "all-materials"}
+    assert set(shipped()) == {"published", "thickness", "all-materials"}
 
 
 def test_the_paper_sweep_has_every_measured_unit():
     from unitcad import catalogue
 
     table = catalogue.measurements()
-    sweep = load_sweep("paper")
+    sweep = load_sweep("published")
     there = {
         (spec.design, "/".join(layer.material for layer in spec.layers))
         for spec in (sweep.spec(i) for i in range(sweep.count))
@@ -194,13 +194,13 @@ def test_dry_run_tells_what_can_not_be():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["papr"], "closest: paper"),
-        (["paper", "--limit", "0"], "--limit"),
-        (["paper", "--only", "unitt"], "closest: unit"),
-        (["paper", "--formats", "stp"], "--formats"),
-        (["paper", "--set", "diametr_mm=3"], "diameter_mm"),
-        (["paper", "-j", "0", "--timeout", "3"], "--timeout"),
-        (["paper", "--only", "estimate", "--scheduler", "tcp://127.0.0.1:9"], "--scheduler"),
+        (["publishd"], "closest: published"),
+        (["published", "--limit", "0"], "--limit"),
+        (["published", "--only", "unitt"], "closest: unit"),
+        (["published", "--formats", "stp"], "--formats"),
+        (["published", "--set", "diametr_mm=3"], "diameter_mm"),
+        (["published", "-j", "0", "--timeout", "3"], "--timeout"),
+        (["published", "--only", "estimate", "--scheduler", "tcp://127.0.0.1:9"], "--scheduler"),
         (["no/such.toml"], "no such file"),
     ],
 )

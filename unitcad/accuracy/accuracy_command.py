@@ -10,9 +10,9 @@ import typer
 from rich.table import Table
 
 from unitcad.accuracy.amplification import amplifications, extremes
-from unitcad.accuracy.left_out import left_out_rows
 from unitcad.accuracy.meshes import mesh_rows
 from unitcad.accuracy.responses import response_rows
+from unitcad.accuracy.skipped import skipped_rows
 from unitcad.accuracy.survey import survey_media, survey_specs
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson, Sets
@@ -36,7 +36,7 @@ _MESHES = {
 }
 _RESPONSE = {"rtol": "rtol", "error": "error", "bound": "bound", "over_bound": "of bound", "wavenumbers": "k", "s": "s"}
 _EXTREMES = {"what": "", "value": "value", "at": "at", "limit": "limit", "extreme": ""}
-_REQUESTS = {"request": "request", "s": "s", "saved_s": "saved", "left_out": "left out"}
+_REQUESTS = {"request": "request", "s": "s", "saved_s": "saved", "skipped": "skipped"}
 _MEDIA_HEADS = {
     "responses": "responses",
     "within_rtol": "within rtol",
@@ -92,7 +92,7 @@ def _one_spec(name: str, sets: Sequence[str] | None, as_json: bool) -> None:
             say("inputs")
             data["amplification"] = amplifications(spec, variant)
         say("requests")
-        data["left_out"] = left_out_rows(subject)
+        data["skipped"] = skipped_rows(subject)
     if as_json:
         print_json(_finite(data))
     else:
@@ -133,8 +133,8 @@ def _print_spec(data: dict[str, Any]) -> None:
         rows = [{**row, "extreme": "extreme" if row["extreme"] else ""} for row in data["extremes"]]
         _table("Stiff or extreme", _EXTREMES, rows)
         _print_amplification(data["amplification"]["results"])
-    rows = [{**row, "left_out": ", ".join(one["what"] for one in row["left_out"])} for row in data["left_out"]]
-    _table("Left out by a request, and what that saves", _REQUESTS, rows)
+    rows = [{**row, "skipped": ", ".join(one["output"] for one in row["skipped"])} for row in data["skipped"]]
+    _table("Time saved by requests for fewer outputs", _REQUESTS, rows)
 
 
 def _print_amplification(results: Sequence[dict[str, Any]]) -> None:

@@ -27,7 +27,7 @@ from unitcad.files import regular, write_new
 
 MARK = "unitcad-cache"
 GATE = "unitcad-cache.lock"
-"""The lock held while a store opens, and while one process collects alone."""
+"""The lock of a store that opens, and of the one process that collects."""
 FOLDERS = ("data", "files", "content", "locks", "tmp")
 _POLL_S = 0.01
 _CLAIMS, _CLAIM_S = 40, 0.05
@@ -112,7 +112,7 @@ class DiskStore:
     def size(self, sha256: str) -> int:
         if sha256 in self._held:
             return len(self._held[sha256])
-        # What was verified before is not checked again here: `place` checks it, and content has one size.
+        # Verified contents are not checked again here: `place` checks it, and content has one size.
         if sha256 not in self._verified and not self.has(sha256):
             raise self._missing(sha256)
         return self._verified[sha256][1]
@@ -128,7 +128,7 @@ class DiskStore:
             raise self._missing(sha256) from None
 
     def place(self, sha256: str, target: str | os.PathLike[str]) -> None:
-        """Make a hard link at `target`; a copy where links fail (other disk, no right, no support)."""
+        """Make a hard link at `target`; a copy if links fail (other disk, no right, no support)."""
         if not self.has(sha256):
             raise self._missing(sha256)
         if sha256 in self._held:
@@ -213,7 +213,7 @@ class DiskStore:
                 os.utime(path)
 
     def _write(self, path: Path, content: bytes, shared: bool = False) -> None:
-        """Write a file whole; what results share is read-only, and on the disk when this ends. Raises OSError."""
+        """Write a file whole; shared files are read-only, and on the disk when this ends. Raises OSError."""
         try:
             self._put(path, content, shared)
         except (FileNotFoundError, NotADirectoryError):  # the cache was removed meanwhile
@@ -253,9 +253,9 @@ class DiskStore:
 
 
 def default_root() -> Path:
-    """Return UNITCAD_CACHE, or unitcad in the user's cache folder, where the system keeps such folders.
+    """Return UNITCAD_CACHE, or unitcad in the user's cache folder, on this system.
 
-    Raises UnitcadError where there is no home.
+    Raises UnitcadError if there is no home.
     """
     chosen = os.environ.get("UNITCAD_CACHE")
     if chosen:
@@ -273,7 +273,7 @@ def read(path: Path) -> bytes:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, a link or a whole folder where one of the cache's files belongs; nothing where that fails."""
+    """Remove a file, a link or a whole folder at the place of a cache file; nothing if that fails."""
     try:
         path.unlink(missing_ok=True)
     except OSError:
@@ -292,7 +292,7 @@ def _signature(path: str) -> tuple[int, int, int]:
 
 
 def _claim(root: Path) -> None:
-    """Make a folder a cache, or refuse one that holds something else.
+    """Make a folder a cache, or refuse one with other contents.
 
     A cache that another process is deleting has lost its mark and some of its folders: it is waited for.
     """
@@ -332,9 +332,9 @@ def lock(path: Path) -> FileLock:
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold a lock by one thread of one process at a time; a process that dies releases it, and no file stays.
+    """Lock for one thread of one process at a time; a process that dies releases it, and no file stays.
 
-    Where there can be no lock (read-only, no space, no folder) the block runs without: work may then be done twice.
+    If there can be no lock (read-only, no space, no folder) the block runs without: work may then be done twice.
     """
     taken = lock(path)
     if path.parent.is_dir():  # else the lock would make it, and a removed cache would look like another program's
@@ -347,7 +347,7 @@ def held(path: Path) -> Iterator[None]:
 
 
 def free(path: Path) -> bool:
-    """Tell whether nobody holds the lock on a file; the file, left by a process that died, is then removed."""
+    """Tell whether the lock on a file is free; the file, left by a process that died, is then removed."""
     taken = lock(path)
     try:
         taken.acquire(blocking=False)

@@ -21,14 +21,14 @@ _HALF = re.compile(r"([a-z][a-z0-9+.-]+):")
 
 
 class Objects(Protocol):
-    """A place for named bytes. Every method raises OSError where the place can't be reached, or refuses."""
+    """A place for named bytes. Every method raises OSError if the place can't be reached, or refuses."""
 
     def get(self, name: str, start: int = 0, end: int | None = None) -> bytes:
         """Return an object, or its bytes from `start` to `end`. Raises FileNotFoundError."""
         ...
 
     def put(self, name: str, content: bytes) -> None:
-        """Write an object whole, in place of what is there."""
+        """Write an object whole, and replace an existing one."""
         ...
 
     def create(self, name: str, content: bytes) -> bool:
@@ -36,7 +36,7 @@ class Objects(Protocol):
         ...
 
     def size(self, name: str) -> int | None:
-        """Return an object's bytes; None where there is none."""
+        """Return an object's bytes; None if there is none."""
         ...
 
     def sizes(self, below: str) -> dict[str, int]:
@@ -167,7 +167,7 @@ def absolute(address: str) -> str:
 
 @contextlib.contextmanager
 def _plain_errors():
-    """Turn what a file system's library raises into OSError: each library has its own errors for a lost connection."""
+    """Turn the errors of a file system's library into OSError: libraries differ in them."""
     try:
         yield
     except (OSError, UnitcadError):

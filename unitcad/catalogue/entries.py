@@ -1,6 +1,6 @@
-"""What an entry of the catalogue holds: for each key its type, its range and a sentence.
+"""Entries of the catalogue: for each key its type, its range and a description.
 
-`Material`, `Motor`, `Printer` and `Tissue` are whole entries; the `...Entry` of each is what a spec may give of one.
+`Material`, `Motor`, `Printer` and `Tissue` are whole entries; a spec gives the keys of the `...Entry` of each.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from msgspec import Meta, Struct
 T = TypeVar("T")
 Status = Literal["datasheet", "paper", "secondary", "assumed", "measured", "spec"]
 FREQUENCIES_HZ = (1.0, 5000.0)
-"""What an estimate may be asked for: vibration motors, with room on both sides; above it waves are too short."""
+"""Frequencies of an estimate: those of vibration motors, with room on both sides; above them waves are too short."""
 LONGEST_MM = 1000.0
 """Beyond a metre nothing here is printed or cast."""
 
@@ -70,7 +70,7 @@ WindowClearance = Annotated[
     float, Meta(ge=0.01, le=5, description="gap between the tongue and a cup's window, per side")
 ]
 Wall = Annotated[float, Meta(ge=0.05, le=50, description="thinnest wall that prints whole")]
-FlatWall = Annotated[float, Meta(ge=0.05, le=50, description="thinnest wall that lies flat on the bed")]
+FlatWall = Annotated[float, Meta(ge=0.05, le=50, description="thinnest wall that prints flat on the bed")]
 Feature = Annotated[float, Meta(ge=0.05, le=20, description="smallest width of a rib, a groove or a stroke")]
 Skirt = Annotated[float, Meta(ge=0.05, le=50, description="wall of a cup around its plinth")]
 Land = Annotated[float, Meta(ge=0.05, le=50, description="width of the rim around a cavity")]
@@ -93,9 +93,9 @@ TissueViscosity = Annotated[float, Meta(ge=0, le=1e6, description="viscosity in 
 
 
 class Value(Struct, Generic[T], frozen=True, omit_defaults=True, repr_omit_defaults=True, forbid_unknown_fields=True):
-    """A number or a word with where it comes from; `low` and `high` bound it where a range is known.
+    """A number or a word with its status and source; `low` and `high` bound it if a range is known.
 
-    `method`: how a measured value was worked out, where several methods differ.
+    `method`: the method of a measured value, if methods differ.
     """
 
     value: T
@@ -110,7 +110,7 @@ class Value(Struct, Generic[T], frozen=True, omit_defaults=True, repr_omit_defau
 
 
 class Material(Struct, frozen=True, kw_only=True):
-    """A castable silicone. Times at 23 degC; `youngs_modulus_kpa`: small strain, the motor's frequency."""
+    """A castable silicone. Times are at 23 °C."""
 
     name: str
     density_g_cm3: Value[Density]
@@ -210,7 +210,7 @@ def kinds_of(entry: type[Struct]) -> tuple[tuple[str, Any], ...]:
 
 
 def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
-    """Return what a spec may give of an entry: a value, or a value with its source; the rest is as in `like`."""
+    """Return the class of an entry in a spec: values, or values with their source; missing ones come from `like`."""
     scope = "default for values without their own"
     fields: list[tuple[str, Any, Any]] = [
         *([("like", Annotated[str | None, Meta(description="the shipped entry to start from")], None)] if like else []),

@@ -149,10 +149,10 @@ def _print_faults(manifest: Manifest) -> None:
 
     for warning in manifest["warnings"]:
         warn(f"warning: {warning}")
-    for entry in manifest["left_out"]:
-        if entry["why"] == NO_KERNEL:
+    for entry in manifest["skipped"]:
+        if entry["reason"] == NO_KERNEL:
             warn(f"note: STEP left out: {entry['why']}; {install_command('step')}")
-    checks = manifest["laws"]
+    checks = manifest["mould_checks"]
     for check in checks:
         if not check["ok"]:
             measured = f"{check['value']:.3g} {check['unit']}, limit {check['limit']:.3g}"

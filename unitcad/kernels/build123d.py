@@ -21,7 +21,7 @@ with loading("build123d"):
 
 
 def solid(shape: Shape) -> B3dShape:
-    """Return the Solid of `shape`, or a Compound where it has several; faces that continue each other are merged."""
+    """Return the Solid of `shape`, or a Compound if it has several; faces that continue each other are merged."""
     return _solids([shape])[0]
 
 

@@ -20,7 +20,7 @@ WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")
 
 @contextlib.contextmanager
 def loading(library: str) -> Iterator[None]:
-    """Run the imports of `library` (OCP, build123d or cadquery). Raises Missing where they fail."""
+    """Run the imports of `library` (OCP, build123d or cadquery). Raises Missing if they fail."""
     try:
         yield
     except (ImportError, AttributeError) as error:
@@ -37,7 +37,7 @@ def installed_wheels() -> dict[str, str]:
 
 
 def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
-    """Say what to do when an import of `library` fails with `error`, given the installed OCP wheels."""
+    """Return the advice for an import of `library` that failed with `error`, given the installed OCP wheels."""
     missing = isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == library
     extra = "step" if library == "OCP" else library
     if missing and (not wheels or library != "OCP"):

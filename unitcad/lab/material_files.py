@@ -1,4 +1,4 @@
-"""What `unitcad material` writes: the table for a spec, everything as JSON, a chart of curves and fits."""
+"""The files of `unitcad material`: the table for a spec, everything as JSON, a chart of curves and fits."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ SLICED = "slicer.json"
 
 
 def check_slicing(spec: Spec, only: Sequence[str]) -> None:
-    """Raise UnitcadError, before the work, where nothing of a spec can be sliced."""
+    """Raise UnitcadError, before the work, if nothing of a spec can be sliced."""
     if slicer.program() is None:
         raise Missing("--slice: PrusaSlicer is not installed, or not on the path (prusa-slicer)")
     if "moulds" not in only:
@@ -32,9 +32,9 @@ def check_slicing(spec: Spec, only: Sequence[str]) -> None:
 
 
 def slice_tools(spec: Spec, folder: Path, manifest: Manifest, say: Callable[[str], object]) -> str:
-    """Write the slicer.json of a built folder's tools and return in a sentence what they take.
+    """Write the slicer.json of a built folder's tools and return a sentence with time and filament.
 
-    A file that the slicer refuses is named and no error, since another slicer may take it.
+    A file that the slicer refuses is named. It is no error, since another slicer may accept it.
     """
     tools = [
         folder / part["files"]["stl"]["path"]

@@ -1,7 +1,7 @@
 """The tables of a spec as typed in a TOML file. Lengths in mm, the unit in each name.
 
-None means that the key is left out; `unitcad.spec.effective` has the same spec with every value there. Only types and
-ranges of single values are checked here. What depends on several values is checked by the design and `validation`.
+None means that the key is missing; `unitcad.spec.effective` has the same spec with every value there. Only types and
+ranges of single values are checked here. The design and `validation` check conditions on several values.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ MOTOR_SIZES = ("diameter_mm", "thickness_mm")
 
 
 def printer_of(spec: Spec) -> catalogue.Printer:
-    """Return the catalogue's printer with what the spec's moulds override."""
+    """Return the catalogue's printer with the lengths that the spec's moulds override."""
     return _overridden(catalogue.printers(spec.printers)[spec.moulds.printer], spec.moulds)
 
 
@@ -38,7 +38,7 @@ def motor_of(spec: Spec) -> catalogue.Motor | None:
 
 
 def assumed_lengths(spec: Spec) -> dict[str, str]:
-    """Return what is assumed of the lengths that nobody has measured, by their keys."""
+    """Return the assumed lengths, which nobody has measured, by their keys."""
     motor = motor_of(spec)
     sizes = [(size, getattr(motor, size)) for size in MOTOR_SIZES] if motor else []
     found = {

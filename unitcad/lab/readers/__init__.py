@@ -43,9 +43,9 @@ _EXTRA = {"pyuff": "pyuff", "nptdms": "npTDMS", "h5py": "h5py"}
 
 
 def expect_held(path: Path, name: str, stated: int, held: int, size: int = 1) -> None:
-    """Raise Unreadable if a file states more numbers than it holds or than are read; `size` is a number's in bytes.
+    """Raise Unreadable if a file states more numbers than it contains or than unitcad reads; `size`: bytes of one.
 
-    `held`: the most bytes that its stored data can stand for.
+    `held`: the largest number of bytes that its stored data can expand to.
     """
     if stated > MOST_NUMBERS:
         limit = f"{name} states {stated} numbers; at most {MOST_NUMBERS} are read: cut the record"
@@ -84,7 +84,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Recording:
-    """Channels of a file; `time` is the one that holds time by its name and unit."""
+    """Channels of a file; `time` is the time by its name and unit."""
 
     path: Path
     channels: Sequence[Channel]

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
+from unitcad.sweeps.unread_keys import swept_estimate, warnings
 
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments
 from unitcad.cli import app
 from unitcad.sweeps.sweep import from_file, load_sweep
-from unitcad.sweeps.unread_keys import swept_estimate, warnings
 
 
 def swept(base="encapsulating", mode="product", **values):

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 from running import serving
-
 from unitcad.serve.gate import BODY_S, LARGEST_BODY
 from unitcad.serve.keys import Keys
+
 from unitcad.validation import templates
 
 HOSTS = ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "0.0.0.0", "[::]"]

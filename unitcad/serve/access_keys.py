@@ -1,6 +1,6 @@
-"""What a server gives out besides its token, each good for less: a cookie for the page, a key for a folder's files.
+"""Access keys with fewer rights than the token: a cookie for the page, a key for a folder's files.
 
-All are made from the token, which can't be told from them, and end with it.
+All are derived from the token, which can't be recovered from them, and end with it.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import hmac
 from pathlib import PurePosixPath
 
 
-class Keys:
+class AccessKeys:
     """The cookie and the folders' keys of a server with a token."""
 
     def __init__(self, token: str) -> None:
         self._token = token.encode()
         self.cookie = self._made("cookie")
-        """Reads the page itself, which holds no token, and nothing else."""
+        """Reads only the page itself, which has no token."""
 
     def address(self, file: str) -> str:
         """Return the path of a file below /files/, with the key of its folder: it reads that folder and those in it."""

@@ -1,7 +1,7 @@
 """Which swept keys do not enter a model of the edge level, and which no measurement supports.
 
-Levels that stay the same are no result of the sweep. Of a length that every measured unit had alike, how a level
-changes with it is a model's word alone.
+Levels that stay the same are no result of the sweep. If all measured units had the same length, only the model says how
+the level changes with it.
 """
 
 from __future__ import annotations
@@ -35,26 +35,26 @@ _OF_THE_UNIT = re.compile(
 _LENGTH = re.compile(r"diameter_mm|layers\.\d+\.(wall|cap)_mm")
 """Lengths that every measured unit of one number of layers had alike."""
 _STARTS, _VALUES = 4, 8
-"""Variants from which a key is changed alone, and values of it that are tried."""
+"""Number of variants from which only one key is changed, and number of values that are tried."""
 _SAME = 1e-9
 
 
 class SweptEstimate(Struct, frozen=True):
-    """What a batch's levels are worth: each model's typical error, a factor, the best first, and the keys not read.
+    """Reliability of a batch's levels: each model's typical error, a factor, the best first, and the keys not read.
 
     `not_measured`: swept lengths in mm with values that no measured unit had, each with the one that all of them had.
     """
 
     typical_error: dict[str, float]
-    not_read: dict[str, list[str]]
+    insensitive: dict[str, list[str]]
     not_measured: dict[str, float]
 
 
 def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
-    """Return the models' errors and the keys that each does not read; None where no variant has an estimate.
+    """Return the models' errors and the keys that each does not read; None if no variant has an estimate.
 
-    A key is changed alone, from several variants, through several of its values, since a rule by name would have to
-    know every model. A key that can't be changed alone, or whose levels are not known, is taken for read.
+    Each key is changed by itself, from several variants, through several of its values, since a rule by name would have
+    to know every model. A key that can't be changed by itself, or whose levels are not known, is taken for read.
     """
     if sweep.of_compounds:
         return None
@@ -101,12 +101,12 @@ def warnings(found: SweptEstimate | None) -> list[str]:
     if found is None:
         return []
     by_keys: dict[tuple[str, ...], list[str]] = {}
-    for model, paths in found.not_read.items():
+    for model, paths in found.insensitive.items():
         if paths:
             by_keys.setdefault(tuple(paths), []).append(model)
     lines = []
     for paths, models in by_keys.items():
-        every = len(models) == len(found.not_read) and len(models) > 1
+        every = len(models) == len(found.insensitive) and len(models) > 1
         who = "no model of the edge level reads" if every else f"{listed(models)} {_do(models)} not read"
         lines.append(
             f"{who} {listed(paths)}: {'the' if every else 'their' if len(models) > 1 else 'its'} level stays the same"
@@ -141,7 +141,7 @@ def _spec(sweep: Sweep, index: int) -> Spec | None:
 
 
 def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[str, list[float]]:
-    """Return levels by model as the value at a path alone goes through those of the sweep, from variant `index`."""
+    """Return levels by model while only the value at a path goes through those of the sweep, from variant `index`."""
     base, values = sweep.values(index)
     data, levels = sweep.base_data(base), {model: list[float]() for model in models}
     for own, value in values.items():

@@ -1,4 +1,4 @@
-"""What a build of a spec leaves out by what is asked for, and the time that it saves."""
+"""The outputs that a build skips for each request, and the time that this saves."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def time_requests(subject: Subject, requests: Mapping[str, Request], repeats: in
     return interleaved({name: partial(_manifest, subject, request) for name, request in requests.items()}, repeats)
 
 
-def left_out_rows(subject: Subject) -> list[dict[str, Any]]:
-    """Return the time, how much less than for everything that is, and what was left out: a row for each request."""
+def skipped_rows(subject: Subject) -> list[dict[str, Any]]:
+    """Return a row for each request: its time, the saving against all outputs, and the skipped outputs."""
     requests = {EVERYTHING: REQUESTS[EVERYTHING], "as the spec asks": (OUTPUTS, subject.formats, True), **REQUESTS}
     times = time_requests(subject, requests, 1)
     whole = times[EVERYTHING].median
     return [
-        {"request": name, "s": time.median, "saved_s": whole - time.median, "left_out": time.value["left_out"]}
+        {"request": name, "s": time.median, "saved_s": whole - time.median, "skipped": time.value["skipped"]}
         for name, time in times.items()
     ]
 

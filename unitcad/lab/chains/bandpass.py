@@ -1,7 +1,7 @@
-"""The chain `paper`: what the paper says of its own, a band-pass and a comb at 2 kHz; the rest is assumed, and named.
+"""The chain `bandpass`: the article's band-pass and comb at 2 kHz; other parameters are assumed, and named.
 
 It says: sampled at 2 kHz, Butterworth 40 to 200 Hz, 50 Hz comb, three repeats, divided by the motor's amplitude. It
-does not say the filter's order, the comb's Q, whether the filters run forwards alone, or peak or RMS.
+does not say the filter's order, the comb's Q, whether the filters run only forwards, or peak or RMS.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def gain(table: ChainTable, frequency_hz: float) -> float:
 def amplitude(table: ChainTable, x: Floats, rate: float) -> float:
     """Return the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit.
 
-    Samples of another rate than 2 kHz go through a polyphase filter. Raises Refusal for a record shorter than what is
-    trimmed, or without a sample.
+    Samples of another rate than 2 kHz go through a polyphase filter. Raises Refusal for a record shorter than the
+    trimmed part, or without a sample.
     """
 
     x = np.where(np.isfinite(x), x, 0.0)
@@ -47,7 +47,7 @@ def amplitude(table: ChainTable, x: Floats, rate: float) -> float:
     trim = round(table.trim_s * RATE_HZ)
     if len(x) < 2 * trim + 200:
         limit = f"leaves less than 0.1 s of a record of {len(x) / RATE_HZ:.2g} s"
-        raise Refusal("paper.trim_s", table.trim_s, limit)
+        raise Refusal("chain.trim_s", table.trim_s, limit)
     band, comb = _filters(table)
     x = x - x.mean()
     if table.zero_phase:
@@ -62,7 +62,7 @@ def amplitude(table: ChainTable, x: Floats, rate: float) -> float:
 def chain(table: ChainTable) -> Chain:
     """Return the chain with a campaign's parameters."""
     return Chain(
-        "paper",
+        "bandpass",
         lambda x, rate, fit: amplitude(table, x, rate),
         unfit=_unfit,
         gain=lambda hertz: gain(table, hertz),
@@ -73,7 +73,7 @@ def chain(table: ChainTable) -> Chain:
 
 
 def _unfit(fits: list[LineFit]) -> str:
-    """Return why the filters, which have no robust step, give no amplitude; empty where they do."""
+    """Return why the filters, which have no robust step, give no amplitude; empty if they do."""
     missing, dropped = max(fit.missing for fit in fits), max(fit.dropped for fit in fits)
     if missing > MOST_MASKED:
         return f"{missing:.2%} of the samples are missing, which it does not leave out"

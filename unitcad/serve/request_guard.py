@@ -1,8 +1,8 @@
-"""Who may ask the server, and how much: Host, Origin and token checked, requests bounded in size, time and number.
+"""The guard of requests: checks Host, Origin and token, and limits requests in size, time and number.
 
 A page of another site can reach the loopback address through the person's browser. Its requests carry its own Origin,
 or under DNS rebinding its own Host, and never the token. A result's page is apart from the server too, and its links to
-the files beside it are another site's: they carry their folder's key in their path.
+files next to it are another site's: they carry their folder's key in their path.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from urllib.parse import parse_qs
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.addresses import means
-from unitcad.serve.keys import Keys
 
 TOKEN_HEADER = b"x-unitcad-token"
 FILES = "/files/"
@@ -47,16 +47,16 @@ class Limits:
     requests: int = MOST_REQUESTS
 
 
-class Gate:
+class RequestGuard:
     """ASGI middleware in front of `app`: passes a request on, its body whole, or refuses it with one line.
 
     `hosts` are the values of Host that mean this server (`addresses.hosts`). A request carries the token in a header,
-    which a page of another site can't set, or, where it only reads, in its query. Two of `keys` do instead of it: the
+    which a page of another site can't set, or, if it only reads, in its query. Two of `keys` replace it: the
     page itself is read with the cookie of the name `cookie`, and a file with its folder's key in its path.
     """
 
     def __init__(
-        self, app: ASGIApp, token: str, hosts: frozenset[str], cookie: str, keys: Keys, limits: Limits
+        self, app: ASGIApp, token: str, hosts: frozenset[str], cookie: str, keys: AccessKeys, limits: Limits
     ) -> None:
         self.app, self.token, self.hosts, self.limits = app, token.encode(), hosts, limits
         self.cookie, self.keys = cookie.encode(), keys
@@ -85,11 +85,11 @@ class Gate:
             self._under_way -= 1
 
     def _refused(self, scope: Scope) -> tuple[int, str] | None:
-        """Return the status and the reason for which a request is refused by its head alone; None where it is not."""
+        """Return the status and the reason for which a request is refused by its head; None if it is not."""
         headers = [(name.lower(), value) for name, value in scope["headers"]]
         hosts = [value.decode("latin-1").lower() for name, value in headers if name == b"host"]
         if len(hosts) != 1 or not means(hosts[0], self.hosts):
-            return 421, "this server answers to its own address alone"
+            return 421, "this server answers only to its own address"
         origins = [value.decode("latin-1").lower() for name, value in headers if name == b"origin"]
         if any(origin != f"http://{hosts[0]}" for origin in origins):
             return 403, "a request from another site"
@@ -101,7 +101,7 @@ class Gate:
         ):
             return 403, "a request from another site"
         if scope["method"] not in ("GET", "POST"):
-            return 405, "GET and POST alone"
+            return 405, "only GET and POST"
         if not keyed and not self._has_token(scope, headers):
             return 403, "no valid token: open the address that unitcad serve printed"
         lengths = [value for name, value in headers if name == b"content-length"]
@@ -165,7 +165,7 @@ class Gate:
             return 408, f"the body took more than {self.limits.seconds:g} s"
 
     async def _answer(self, status: int, reason: str, scope: Scope, receive: Receive, send: Send) -> None:
-        # What is left of the body is not waited for.
+        # The rest of the body is not waited for.
         response = PlainTextResponse(reason + "\n", status, headers={"connection": "close"})
         await response(scope, receive, _with_headers(send))
 
