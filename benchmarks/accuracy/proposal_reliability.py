@@ -21,7 +21,7 @@ from unitcad.search.target_file import Target, target_of
 
 STACKS = {"every closed form": STACKED, "crossings, fitted, paper": ("crossings", "fitted", "paper")}
 LEVELS = (0.03, 0.06, 0.12, 0.25, 0.5)
-"""Wishes "at most this much at the edge"."""
+"""Targets "at most this much at the edge"."""
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 RANGE = 0.8
 """What the range from 10 to 90 % should hold."""
@@ -123,7 +123,7 @@ def pairs(own: Sequence[Judged]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def score(own: Sequence[Judged]) -> float:
-    """Return the Brier score over that of saying, for each wish, the share of the other units that met it."""
+    """Return the Brier score over that of saying, for each target, the share of the other units that met it."""
     p, met = pairs(own)
     shape = (len(own), len(LEVELS))
     share = (met.reshape(shape).sum(axis=0) - met.reshape(shape)) / (len(own) - 1)
@@ -169,12 +169,12 @@ def _reliability(judged: dict[str, list[Judged]]) -> Table:
             shares = (float(p[inside].mean()), float(met[inside].mean())) if count else (None, None)
             ends = "{:.2f} to {:.2f}".format(*interval(int(met[inside].sum()), count)) if count else "-"
             rows.append((name, f"{low:g} to {high:g}", count, *shares, ends))
-    wishes = ", ".join(f"{100 * level:g} %" for level in LEVELS)
+    targets = ", ".join(f"{100 * level:g} %" for level in LEVELS)
     return Table(
-        "Reliability: probabilities of meeting a wish, and how often it was met",
+        "Reliability: probabilities of meeting a target, and how often it was met",
         ("models", "probability", "judgements", "mean probability", "share met", "95 % interval of the share"),
         tuple(rows),
-        f"Wishes: at most {wishes} at the edge, of each of the nine units. The judgements of one unit hang together, "
+        f"Targets: at most {targets} at the edge, of each of the nine units. The judgements of one unit hang together, "
         "so the true intervals are wider than these.",
     )
 
@@ -190,7 +190,7 @@ def _coverage(judged: dict[str, list[Judged]]) -> Table:
         ("models", "ranges that held", "95 % interval of the share", "nominal", "Brier score over the share's"),
         tuple(rows),
         "Nine units can't tell 0.8 from much of what is near it: the interval says how much. A score below 1 says more "
-        "than the share of the other units that met the wish.",
+        "than the share of the other units that met the goals.",
     )
 
 
@@ -220,7 +220,7 @@ def searches(quick: bool, say: Say) -> list[Search]:
 def _ours(target: Target) -> Search:
     start = time.process_time()
     table = candidates(target)
-    rows = np.flatnonzero(table.mass_g <= (target.wish.mass_max_g or np.inf))
+    rows = np.flatnonzero(table.mass_g <= (target.goals.mass_max_g or np.inf))
     ranked = kinds(table, rows)[:5]
     better = [refined(table, kind.best) for kind in ranked]
     best = max([float(table.probability[rows].max()), *(float(one.probability[0]) for one in better if one)])
@@ -245,7 +245,7 @@ class _Counter:
             one = self.table.alone(Lengths(design, motor, walls, caps, diameter), materials)
         except Refusal:
             return 0.0
-        p = float(one.probability[0]) if one.mass_g[0] <= (self.target.wish.mass_max_g or np.inf) else 0.0
+        p = float(one.probability[0]) if one.mass_g[0] <= (self.target.goals.mass_max_g or np.inf) else 0.0
         self.best = max(self.best, p)
         return p
 

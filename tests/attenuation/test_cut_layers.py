@@ -159,9 +159,9 @@ def test_a_batch_says_why_a_variant_has_no_level(only: tuple[str, ...], tmp_path
 
 
 def test_a_search_and_a_fit_refuse_three_layers(tmp_path: Path) -> None:
-    (tmp_path / "wish.toml").write_text("[target]\nedge_max = 0.1\n[vary]\nlayers = [2, 3]\n")
+    (tmp_path / "quiet.toml").write_text("[target]\nedge_max = 0.1\n[vary]\nlayers = [2, 3]\n")
     with pytest.raises(Refusal, match=r"vary\.layers\.1 = 3: .*2"):
-        load_target(tmp_path / "wish.toml")
+        load_target(tmp_path / "quiet.toml")
     own = {"name": "bench", "unit": [{"name": "three", "spec": "three-layer", "level": {"value": 0.1}}]}
     (tmp_path / "lab.toml").write_text(tomli_w.dumps(own))
     with pytest.raises(Refusal, match=r"unit\.0 = 'three': can't be fitted: no measured unit"):

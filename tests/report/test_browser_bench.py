@@ -1,11 +1,7 @@
 """The bench page in a browser: two pages of paper, timers that survive a reload, a record that the report shows."""
 
-from __future__ import annotations
-
 import json
 import re
-from pathlib import Path
-from typing import Any
 
 import pytest
 from cast_records import spec_of
@@ -25,7 +21,7 @@ SETS = {
 }
 
 
-def bench(name: str, changes: tuple[str, ...], out: Path) -> Path:
+def bench(name, changes, out):
     spec = load(name, [*changes, "output.formats=[]"])
     folder = build(spec, out, only=("moulds", "casting"), check=False).folder
     write_report(folder)
@@ -33,12 +29,12 @@ def bench(name: str, changes: tuple[str, ...], out: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def page_of_one(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page_of_one(tmp_path_factory):
     return bench("encapsulating", (), tmp_path_factory.mktemp("bench"))
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_a_printed_sheet_fits_two_pages(name: str, running: Any, tmp_path: Path) -> None:
+def test_a_printed_sheet_fits_two_pages(name, running, tmp_path):
     visit = Visit(running, bench(name, SETS[name], tmp_path))
     pdf = visit.page.pdf(prefer_css_page_size=True)
     visit.page.emulate_media(media="print")
@@ -53,7 +49,7 @@ def test_a_printed_sheet_fits_two_pages(name: str, running: Any, tmp_path: Path)
     assert 1 <= len(re.findall(rb"/Type\s*/Page[^s]", pdf)) <= 2
 
 
-def test_on_paper_no_text_stands_beside_a_picture(running: Any, page_of_one: Path) -> None:
+def test_on_paper_no_text_stands_beside_a_picture(running, page_of_one):
     """Every line of a step has the width of its column, 60 mm: some forty letters of 8 pt."""
     visit = Visit(running, page_of_one)
     visit.page.emulate_media(media="print")
@@ -72,7 +68,7 @@ def test_on_paper_no_text_stands_beside_a_picture(running: Any, page_of_one: Pat
     visit.close()
 
 
-def test_a_measured_length_changes_the_command_and_a_weighed_part_the_other(running: Any, page_of_one: Path) -> None:
+def test_a_measured_length_changes_the_command_and_a_weighed_part_the_other(running, page_of_one):
     """1.40 g of A at 1 to 1 ask for 1.40 g of B; a motor of 2.3 mm asks for other moulds, one of 2.03 does not."""
     visit = Visit(running, page_of_one)
     page, code = visit.page, visit.page.locator("#first code")
@@ -95,7 +91,7 @@ def test_a_measured_length_changes_the_command_and_a_weighed_part_the_other(runn
     visit.close()
 
 
-def test_the_sheet_has_what_goes_wrong(running: Any, page_of_one: Path) -> None:
+def test_the_sheet_has_what_goes_wrong(running, page_of_one):
     visit = Visit(running, page_of_one)
     rows = visit.page.locator("#troubles tbody tr").count()
     said = (page_of_one.parent / "troubleshooting.md").read_text("utf-8")
@@ -104,7 +100,7 @@ def test_the_sheet_has_what_goes_wrong(running: Any, page_of_one: Path) -> None:
 
 
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (390, True), (1280, False)])
-def test_it_contacts_nothing_and_fits_its_window(width: int, dark: bool, running: Any, page_of_one: Path) -> None:
+def test_it_contacts_nothing_and_fits_its_window(width, dark, running, page_of_one):
     visit = Visit(running, page_of_one, width=width, dark=dark)
     assert (visit.errors, visit.console) == ([], [])
     assert {url.partition(":")[0] for url in visit.requests} <= {"file", "data"}
@@ -123,7 +119,7 @@ def test_it_contacts_nothing_and_fits_its_window(width: int, dark: bool, running
     visit.close()
 
 
-def test_a_timer_goes_on_through_a_reload(running: Any, page_of_one: Path) -> None:
+def test_a_timer_goes_on_through_a_reload(running, page_of_one):
     visit = Visit(running, page_of_one)
     page = visit.page
     page.get_by_role("button", name="Start pot life").first.click()
@@ -144,7 +140,7 @@ def test_a_timer_goes_on_through_a_reload(running: Any, page_of_one: Path) -> No
     visit.close()
 
 
-def test_the_schedule_counts_back(running: Any, page_of_one: Path) -> None:
+def test_the_schedule_counts_back(running, page_of_one):
     casting = json.loads((page_of_one.parent / "casting.json").read_text("utf-8"))
     visit = Visit(running, page_of_one)
     visit.page.locator("[name=ready]").fill("2101-03-14T12:00")
@@ -158,7 +154,8 @@ def test_the_schedule_counts_back(running: Any, page_of_one: Path) -> None:
     visit.close()
 
 
-def test_the_record_is_saved_and_shown(running: Any, page_of_one: Path) -> None:
+@pytest.mark.smoke
+def test_the_record_is_saved_and_shown(running, page_of_one):
     visit = Visit(running, page_of_one)
     page, folder = visit.page, page_of_one.parent
     for name, text in {"p1.a": "1,02", "p1.b": "0.99", "u1.height": "4.6", "u1.w2.1": "1.3", "u1.w2.3": "1.2"}.items():

@@ -64,7 +64,7 @@ def test_a_fault_of_a_table_for_every_spec_is_named() -> None:
 
 
 def test_shipped_targets_load_and_are_listed(run: Any) -> None:
-    assert set(shipped()) == {"amplify", "paper", "quiet-edge"}
+    assert set(shipped()) == {"amplify", "published", "quiet-edge"}
     for name in shipped():
         assert load_target(name).name == name
         assert name in run("list", "targets").stdout
@@ -78,7 +78,7 @@ def test_a_name_that_is_no_target_is_refused(run: Any) -> None:
 
 def test_a_target_to_start_from(run: Any, tmp_path: Path) -> None:
     assert run("init", "mine", "--template", "quiet-edge", cwd=tmp_path).returncode == 0
-    assert load_target(tmp_path / "mine.toml").wish.edge_max == 0.06
+    assert load_target(tmp_path / "mine.toml").goals.edge_max == 0.06
     done = run("init", "other", "--template", "quiet", cwd=tmp_path)
     assert done.returncode == 2
     assert "--template = 'quiet': not known; closest: quiet-edge" in done.stderr

@@ -1,4 +1,4 @@
-"""`unitcad.estimate` and what it returns."""
+"""`unitcad.estimate` and its result."""
 
 # pyright: strict
 from __future__ import annotations
@@ -26,12 +26,12 @@ class EdgeEstimate:
 
     @property
     def answer(self) -> str:
-        """The sentence that leads the estimate: what was measured, the best model's level in per cent, its error."""
+        """The sentence that leads the estimate: the measurement, the best model's level in per cent, its error."""
         return summary(self.data)["answer"]
 
     @property
     def edge(self) -> dict[str, float | None]:
-        """The amplitude at the edge over the motor's, by model; None where no number can be given."""
+        """The amplitude at the edge over the motor's, by model; None if no number can be given."""
         return {model: row["edge"] for model, row in summary(self.data)["models"].items()}
 
     @property
@@ -71,7 +71,7 @@ def estimate(
     """Estimate the vibration at a unit's edge, and on the skin beyond it.
 
     `source` and `set` are as for `unitcad.load`. `models` ("bush", "fitted", "paper", "consistent"; "mechanics", which
-    needs scikit-fem and seconds) and `frequency_hz` stand in for the spec's. Nothing is drawn or written. Raises
+    needs scikit-fem and seconds) and `frequency_hz` replace the spec's. Nothing is drawn or written. Raises
     Refusal for a value that is not valid, and for a custom design that no model describes.
     """
     spec = load(source, set)

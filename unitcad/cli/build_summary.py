@@ -32,7 +32,7 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         yield f"measure first; assumed: {listed(lengths)}"
     if manifest["casting"]:
         yield from in_short(json.loads((built.folder / "casting.json").read_bytes()))
-    checks, check = manifest["laws"], manifest["check"]
+    checks, check = manifest["mould_checks"], manifest["check"]
     if checks:
         passed = sum(entry["ok"] for entry in checks)
         files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"

@@ -1,4 +1,4 @@
-"""From a target to proposals as JSON-ready data: the best of each kind, cast in thought, with what speaks for it."""
+"""From a target to proposals as JSON-ready data: the best of each kind, with moulds drawn, and with reasons."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
     proposals = [{**one, "rank": i} for i, (_, one) in enumerate(chosen, 1)]
     data = {
         "name": target.name,
-        "wish": {key: value for key, value in _wish(target).items() if value is not None},
+        "target": {key: value for key, value in _goals(target).items() if value is not None},
         "tried": {
             "candidates": found.count,
             "geometries": int(np.unique(found.geometry).size),
@@ -86,7 +86,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
             ],
         },
         "models": models_block(target),
-        "left_out": found.left_out,
+        "skipped": found.skipped,
         "proposals": proposals,
         "not_castable": out,
     }
@@ -99,8 +99,8 @@ def models_block(target: Target) -> dict[str, Any]:
     slow = ", by the moduli of a slow pull" if target.asked.estimate.moduli == "quasi-static" else ""
     by = f"the paper's nine levels{slow}" if target.fit is None else f"the lab's fit {target.fit.name}"
     weights = {model: float(weight) for model, weight in zip(stack.models, stack.weights, strict=True)}
-    left_out = list(stack.left_out) if isinstance(stack, Stack) else [m for m in target.models if m not in weights]
-    return {"weights": weights, "without_weight": left_out, "by": by}
+    unweighted = list(stack.left_out) if isinstance(stack, Stack) else [m for m in target.models if m not in weights]
+    return {"weights": weights, "without_weight": unweighted, "by": by}
 
 
 def _chosen(
@@ -185,18 +185,18 @@ def _is_other(found: Candidates, probability: float, measured: Mapping[str, Any]
 
     It was measured outside the target, or is less probable than is asked for and was not measured within it.
     """
-    return not measured["meets"] if measured else probability < found.target.wish.probability_min
+    return not measured["meets"] if measured else probability < found.target.goals.probability_min
 
 
 def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[str, Any]]) -> list[Kind]:
     """Return the kinds in their order, those measured within the target first, the nearest others last.
 
-    A measured unit within the target stands for its kind if the kind's best is less probable than is asked for.
+    A measured unit within the target represents its kind if the kind's best is less probable than required.
     """
     made = []
     for kind in kinds(found, rows):
         inside = [int(row) for row in kind.rows if measured.get(int(row), {}).get("meets")]
-        if inside and found.probability[kind.best] < found.target.wish.probability_min:
+        if inside and found.probability[kind.best] < found.target.goals.probability_min:
             kind = replace(kind, rows=np.array([*inside, *(row for row in kind.rows if row not in inside)]))
         made.append(kind)
 
@@ -210,8 +210,8 @@ def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[
 def proposal(
     found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None, is_refined: bool
 ) -> dict[str, Any]:
-    """Return a candidate as data: what it is, its probability and range, its measurement, limits, unmeasured inputs."""
-    variant, lengths, wish = estimate_input(spec), found.lengths(row), found.target.wish
+    """Return a candidate as data: its kind, its probability and range, its measurement, limits, unmeasured inputs."""
+    variant, lengths, goals = estimate_input(spec), found.lengths(row), found.target.goals
     low, middle, high = (float(end[row]) for end in found.range)
     by_model = probability_by_model(found.target, found.predictive)[row]
     measured = measurement(found.target, variant)
@@ -225,7 +225,7 @@ def proposal(
         "motor": lengths.motor,
         "measured": measured,
         "nearest_other": _is_other(found, float(found.probability[row]), measured),
-        "probability_min": wish.probability_min,
+        "probability_min": goals.probability_min,
         "probability": float(found.probability[row]),
         "by_model": dict(zip(found.predictive.models, map(float, by_model), strict=True)),
         "edge": {"p10": low, "p50": middle, "p90": high},
@@ -241,18 +241,18 @@ def proposal(
         "lengths_gain": _gain(kind, is_refined),
         "remarks": [*warnings(spec), *_scale(spec)],
     }
-    if wish.pitch_mm is not None:
-        ratio = crosstalk_ratio(variant, 1e-3 * wish.pitch_mm)
+    if goals.pitch_mm is not None:
+        ratio = crosstalk_ratio(variant, 1e-3 * goals.pitch_mm)
         data["crosstalk"] = {
             "value": ratio.value,
             "low": ratio.low,
             "high": ratio.high,
-            "pitch_mm": wish.pitch_mm,
+            "pitch_mm": goals.pitch_mm,
             "drive": variant.drive,
             "range": CROSSTALK_RANGE,
             "neighbour": (ratio.value or ratio.middle) * middle,
         }
-        if wish.crosstalk_ratio_max is not None and (ratio.high or 0.0) > wish.crosstalk_ratio_max:
+        if goals.crosstalk_ratio_max is not None and (ratio.high or 0.0) > goals.crosstalk_ratio_max:
             data["remarks"].append(
                 f"the crosstalk ratio may reach {number(ratio.high or 0.0, 2)}: the body's range goes over the limit"
             )
@@ -280,8 +280,8 @@ def name_from(target: Target, lengths: Lengths, materials: Sequence[str]) -> str
     return re.sub(r"[^a-z0-9.]+", "-", "-".join(parts).lower()).strip("-")[:110]
 
 
-def _wish(target: Target) -> dict[str, Any]:
-    return {key: getattr(target.wish, key) for key in target.wish.__struct_fields__}
+def _goals(target: Target) -> dict[str, Any]:
+    return {key: getattr(target.goals, key) for key in target.goals.__struct_fields__}
 
 
 def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
@@ -298,13 +298,13 @@ def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
 
 
 def _gain(kind: Kind, is_refined: bool) -> str:
-    """Say how the lengths change a kind's probability; `is_refined`: the proposal lies between the steps."""
+    """Say how the lengths change a kind's probability; `is_refined`: the proposal is between the steps."""
     if kind.rows.size < 2:
         return "its lengths are the only ones within the limits"
     of = f"{kind.rows.size} sets of lengths within the limits"
     if kind.most - kind.least < 1e-6:
         return f"lengths gain nothing: the probability is the same for all {of}"
-    between = "; this one lies between the steps" if is_refined else ""
+    between = "; this one is between the steps" if is_refined else ""
     return f"lengths change the probability from {kind.least:.2f} to {kind.most:.2f} over the {of}{between}"
 
 

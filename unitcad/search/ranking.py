@@ -53,7 +53,10 @@ def ordered(found: Candidates, rows: np.ndarray) -> np.ndarray:
 
 
 def kinds(found: Candidates, rows: np.ndarray) -> list[Kind]:
-    """Return the kinds among rows, the best first. In a kind, rows within `ALIKE` of the best stand by novelty."""
+    """Return the kinds among rows, the best first.
+
+    In a kind, rows within `ALIKE` of the best are ordered by novelty.
+    """
     by_kind: dict[object, list[int]] = {}
     for row in rows:
         by_kind.setdefault(found.kind(row), []).append(int(row))
@@ -102,7 +105,7 @@ def measurement(target: Target, variant: EstimateInput) -> dict[str, Any] | None
         by = "the paper" if len(variant.layers) > 1 else "the paper, of which design is not said"
     else:
         return None
-    least, most = target.wish.edge_min or 0.0, target.wish.edge_max or np.inf
+    least, most = target.goals.edge_min or 0.0, target.goals.edge_max or np.inf
     return {"level": level, "also": also, "by": by, "meets": bool(least <= level <= most)}
 
 

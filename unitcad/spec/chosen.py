@@ -15,7 +15,7 @@ MOTOR_SIZES = ("diameter_mm", "thickness_mm")
 
 
 def printer_of(spec: Spec) -> catalogue.Printer:
-    """Return the catalogue's printer with what the spec's moulds override."""
+    """Return the catalogue's printer with the lengths that the spec's moulds override."""
     return _overridden(catalogue.printers(spec.printers)[spec.moulds.printer], spec.moulds)
 
 

@@ -222,10 +222,10 @@
   function estimate(variant) {
     const data = variant.estimate;
     if (!data) {
-      const left = (variant.manifest.left_out || []).find((entry) => entry.what === "estimate");
-      const ask = !left || left.why === "not asked for (--only)";
+      const left = (variant.manifest.skipped || []).find((entry) => entry.output === "estimate");
+      const ask = !left || left.reason === "not asked for (--only)";
       return section("estimate", "Attenuation estimate", el("p", { className: "absent" },
-        ask ? ["No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.why}.`));
+        ask ? ["No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.reason}.`));
     }
     return section("estimate", "Attenuation estimate", lead(data.answer), levels(data), mechanics(data.mechanics), el("h3", {}, "Outwards from the edge"), curves(data.layered),
       el("details", {}, el("summary", {}, "Tables: against controls, inputs, the paper's constraints, errors"), ratios(data), inputs(data), margins(data.models || {}), errors(data)), assumptions(data),
