@@ -38,7 +38,7 @@ class Fitting:
 
     needs       tools and consumables, as casting.steps.NEEDS names them
     silicone    the layer whose silicone it asks for: from 1, -1 the last; 0 for none
-    mixed       what that silicone makes, if it is mixed after the pours
+    mixed       its use, if it is mixed after the pours
     volume_mm3  the volume of it in one unit
     mix         whether it uses the mix of the pour that it is laid into
     """

@@ -48,6 +48,11 @@ def stub_pieces(stubs: Sequence[Shape]) -> list[Body]:
     ]
 
 
+def tray_piece(shape: Shape) -> Body:
+    """Return the tray of a skin's film; it stands in no pour."""
+    return Body("skin-tray", "tool", "tray", shape, _CUP)
+
+
 def blade_piece(shape: Shape, *, too_long: bool = False) -> Body:
     """Return the blade, printed upside down; it stands in no pour. One that no bed takes is cut: it has no joint."""
     return Body("blade", "tool", "blade", shape, _BLADE, made="cut" if too_long else "printed", upside_down=True)

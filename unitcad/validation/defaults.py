@@ -36,6 +36,8 @@ def effective(asked: AskedSpec) -> Spec:
             raise Refusal("design_source", None, f"is required with design = {asked.design!r}")
         if is_body_file(asked.design) and asked.parameters:
             raise Refusal("parameters", "...", f"nothing reads them: {asked.design} is a file of bodies")
+        if asked.skin_mm:
+            raise Refusal("skin_mm", asked.skin_mm, "a custom design draws its own skin side", 0.0)
     else:
         for field in ("parameters", "design_source"):
             if getattr(asked, field):
@@ -61,6 +63,7 @@ def _with_defaults(asked: AskedSpec, design: Design) -> Spec:
         name=asked.name,
         design=asked.design,
         diameter_mm=asked.diameter_mm,
+        skin_mm=asked.skin_mm,
         motor=motor,
         fpcb=fpcb,
         wires=asked.wires,
