@@ -293,8 +293,8 @@ def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
             pieces += " A piece without an outer edge needs none."
     return BenchStep(
         f"Hold cup {cup} down",
-        f"On each of the two sides {'where the filaments come out' if split else 'without a pry slot'} run {strips} "
-        f"from the cup's wall, below the rim, round the plate's edge to its underside{where}."
+        f"On both sides {'where the filaments come out' if split else 'without a pry slot'} run {strips} "
+        f"from the cup's wall, below the rim, to the plate's underside{where}."
         f"{pieces} {LEVEL_AGAIN}",
         picture,
         minutes=2.0,
