@@ -198,7 +198,7 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     procedure = json.loads((folder / "casting.json").read_text())
     manifest = json.loads((folder / "manifest.json").read_text())
     assert lines[0].startswith("14 mm across")
-    assert lines[1] == "assumed: motor.thickness_mm = 2 (2 to 2.65); measure the motor before you print"
+    assert lines[1].startswith("measure first; assumed: motor.thickness_mm = 2 (2 to 2.65: up to 0.65 mm out of the skin")
     assert duration(procedure["earliest_finish_min"]) in lines[2]
     assert lines[3] == "to mix: 2 g of ecoflex-00-10, 4 g of dragon-skin-30"
     assert f"{len(manifest['mould_checks'])} of {len(manifest['mould_checks'])} mould checks passed" in lines[4]

@@ -151,7 +151,7 @@ def test_refinement_finds_what_lies_between_the_steps() -> None:
     second = next(one for one in made.data["proposals"] if (one["design"], tuple(one["materials"])) == kind)
     of_kind = [row for row in made.rows if (made.found.kind(row)[0], made.found.materials(row)) == kind]
     assert second["refined"]
-    assert second["lengths_gain"].endswith("this one lies between the steps")
+    assert second["lengths_gain"].endswith("this one is between the steps")
     assert second["probability"] > made.found.probability[of_kind].max() + 0.02
     assert 1.05 < second["mass_g"] <= 1.08
     assert all(round(wall / 0.05, 6) == round(wall / 0.05) for wall in second["walls_mm"])

@@ -45,7 +45,7 @@ from unitcad.search.target_file import load_target, shipped, target_of
         ({"estimate": {"models": ["bushes"]}}, "estimate.models.0", "not known; closest: bush", "bush"),
         ({"estimate": {"fit": "none.toml"}}, "estimate.fit", "none.toml", None),
         ({"spec": {"layers": {}}}, "spec.layers", "not known", None),
-        ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "stands in at_hand.motors", None),
+        ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "is in at_hand.motors", None),
     ],
 )
 def test_what_is_refused(data: dict[str, Any], field: str, limit: str, nearest: object) -> None:

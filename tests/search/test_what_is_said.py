@@ -141,7 +141,7 @@ def test_a_measurement_is_shown_and_the_nearest_others_are_no_proposals(paper: I
         lines = explanation_lines(explain(paper, third))
         assert "measured 16 % (the paper): outside the target; probability 0.10, below your 50 %" in lines[0]
         assert lines[1:] == [
-            "  it is no proposal: it was measured outside the target, and stands among the nearest others as number 3"
+            "  it is no proposal: it was measured outside the target, and is among the nearest others as number 3"
         ]
 
 
