@@ -89,10 +89,10 @@ def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
     assert used["adhesive tape"] == 5 * strips
     (container,) = [item for item in made.bill if "degassing" in item.item]
     asked = [
-        float(re.findall(r"at least ([0-9.]+) ml", step.text)[0])
+        figure.value
         for pour in (*unit.pours, *made.pours)
-        for step in pour.steps
-        if step.title == "Degas"
+        for figure in pour.figures
+        if figure.name == "degassing container, at least"
     ]
     assert (container.quantity, container.made) == (1, "tool")
     assert container.least_ml == pytest.approx(max(asked), rel=0.05)

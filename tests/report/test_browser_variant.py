@@ -54,6 +54,7 @@ def test_loads_from_a_file_and_asks_for_nothing(visit):
     assert visit.page.inner_text("h1") == "encapsulating"
     heads = visit.page.locator("section > h2").all_inner_texts()
     assert heads == [
+        "Make it",
         "3D",
         "Section",
         "Attenuation estimate",
@@ -250,7 +251,7 @@ def test_the_procedure_is_all_there(visit, built):
     items = visit.page.locator("#procedure ol > li").all_inner_texts()
     pours = [step for pour in casting["pours"] for step in pour["steps"]]
     steps = [*casting["preparation"], *pours, *casting["release"], *casting["assembly"]]
-    assert items == [f"{step['title']}. {step['text']}" for step in steps]
+    assert items == [f"{step['title']}. {step['short'] or step['text']}" for step in steps]
     assert "of which" in visit.page.locator("#procedure").inner_text()
     starts = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.start)")
     lengths = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.children.length)")
