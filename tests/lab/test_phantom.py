@@ -84,7 +84,7 @@ def test_the_range_has_what_the_frequency_may_bring_and_every_page_says_quasi_st
 
 def test_the_procedure_warns_of_what_spoils_a_phantom() -> None:
     words = bench.casting_markdown(_skin())
-    for part in ("on acrylic does not bond", "nothing may lie on the rim", "latex", "Thinner migrates"):
+    for part in ("on acrylic does not bond", "nothing may be on the rim", "latex", "Thinner migrates"):
         assert part in words
     assert {"scale", "level", "calliper", "release agent"} < {one.item for one in bench.bill(_skin())}
 
