@@ -50,12 +50,6 @@ def test_shipped_entries_pass_the_validation_of_a_own_entries(kind: str) -> None
         assert msgspec.structs.replace(ours, name=name) == entry
 
 
-def test_the_shipped_body_passes_the_validation_of_a_own_entries() -> None:
-    shipped = tomllib.loads((files("unitcad.catalogue") / "tissue.toml").read_text("utf-8"))
-    spec = from_data({**read("encapsulating"), "tissue": {"ours": shipped["forearm"]}, "estimate": {"tissue": "ours"}})
-    assert catalogue.tissue("ours", spec.tissue) == catalogue.tissue("forearm")
-
-
 @pytest.mark.parametrize(
     ("table", "key", "value", "nearest"),
     [

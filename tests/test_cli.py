@@ -16,7 +16,6 @@ from typer.testing import CliRunner
 from unitcad.casting.steps import duration
 from unitcad.cli import app
 from unitcad.export import slicer
-from unitcad.rooms import commands
 
 
 def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -120,15 +119,6 @@ def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words: str)
     assert f"error: {json.loads(as_json.stdout)['error']['message']}" == line
 
 
-def test_a_command_loads_no_other_command() -> None:
-    code = (
-        "import sys\nfrom unitcad.cli import main\nsys.argv = ['unitcad', 'list']\ntry:\n    main()\n"
-        "except SystemExit:\n    print([name for name in sys.modules if name.endswith('_command')], file=sys.stderr)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr.strip() == "['unitcad.cli.list_command']"
-
-
 def _commands() -> dict[str, Any]:
     whole: Any = get_command(app)
     shown = {name: whole.get_command(None, name) for name in whole.list_commands(None)}
@@ -150,12 +140,6 @@ def test_help_cuts_no_option_s_name_and_no_square_bracket(command: str) -> None:
         for option in (*parameter.opts, *parameter.secondary_opts):
             assert not option.startswith("-") or option in shown.replace(",", " ").split()
         assert " ".join((getattr(parameter, "help", None) or "").split()) in shown
-
-
-def test_the_list_of_commands_says_what_their_help_says() -> None:
-    for name, command in commands().items():
-        said = " ".join(CliRunner().invoke(app, [name, "--help"], env={"COLUMNS": "80"}).stdout.split())
-        assert command.help in said
 
 
 def test_help_and_version() -> None:
@@ -196,14 +180,6 @@ def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(
     assert done.returncode == 2
     assert said in done.stderr
     assert not (tmp_path / "out").exists()
-
-
-def test_nothing_is_sliced_unless_asked(tmp_path: Path) -> None:
-    done = _run("build", "single-embedded", "--formats", "stl", "--no-report", cwd=tmp_path)
-    assert done.returncode == 0
-    folder = tmp_path / done.stdout.strip()
-    assert not (folder / "slicer.json").exists()
-    assert "build spec.toml --slice -o sliced" in (folder / "casting.md").read_text()
 
 
 def test_the_summary_of_a_gang_speaks_of_each_unit(tmp_path: Path) -> None:

@@ -48,12 +48,6 @@ def test_an_address_is_installed_from_again(installed_from) -> None:
     assert installed_from(archive)[-1] == "unitcad[lab] @ https://git.example/unitcad-1.whl"
 
 
-def test_a_wheel_on_this_disk_is_installed_from_again(installed_from, tmp_path: Path) -> None:
-    wheel = tmp_path / "unitcad-0.1.0-py3-none-any.whl"
-    wheel.touch()
-    assert installed_from({"url": wheel.as_uri(), "archive_info": {}})[-1] == f"{wheel}[lab]"
-
-
 def test_every_command_to_install_comes_from_the_one_function() -> None:
     """Messages that spell one fail where the package came from elsewhere."""
     package = Path(errors.__file__).parent

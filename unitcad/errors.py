@@ -18,8 +18,6 @@ from urllib.request import url2pathname
 
 from unitcad.text import some, toml
 
-PIP = (sys.executable, "-m", "pip")
-"""The pip of this installation."""
 NEAREST = "; nearest accepted: "
 """The words before the nearest accepted value in a refusal."""
 UNIT_ALONE = "; --only unit makes only the unit"
@@ -59,6 +57,13 @@ def missing_extra(extra: str, need: str) -> Missing:
     return Missing(f"{need}: {install_command(extra)}")
 
 
+def pip_install() -> list[str]:
+    """Return the command that installs packages into this installation."""
+    if importlib.util.find_spec("pip") is None:  # an environment made by uv
+        return ["uv", "pip", "install", "--python", sys.executable]
+    return [sys.executable, "-m", "pip", "install"]
+
+
 def install_command(extras: str) -> str:
     """Return the command that adds extras to this installation, from the folder or address that it came from."""
 
@@ -69,9 +74,7 @@ def install_command(extras: str) -> str:
     url = source.get("url", "")
     local = url.startswith("file:")
     folder = Path(url2pathname(urlsplit(url).path)) if local else Path(__file__).parent.parent
-    command = [*PIP, "install"]
-    if importlib.util.find_spec("pip") is None:  # an environment made by uv
-        command = ["uv", "pip", "install", "--python", sys.executable]
+    command = pip_install()
     if (local or not url) and (folder / "pyproject.toml").is_file():
         if (folder / "constraints.txt").is_file():
             command += ["-c", str(folder / "constraints.txt")]
@@ -79,10 +82,8 @@ def install_command(extras: str) -> str:
         return shlex.join([*command, f"{folder}[{extras}]"])
     if vcs := source.get("vcs_info"):
         return shlex.join([*command, f"unitcad[{extras}] @ {vcs['vcs']}+{url}@{vcs['commit_id']}"])
-    if "archive_info" in source and not local:
+    if "archive_info" in source and (not local or folder.is_file()):
         return shlex.join([*command, f"unitcad[{extras}] @ {url}"])
-    if local and folder.is_file():  # a wheel or an archive
-        return shlex.join([*command, f"{folder}[{extras}]"])
     if not url:
         return shlex.join([*command, f"unitcad[{extras}]"])
     return f"in a clone, {shlex.join([*command, f'.[{extras}]'])}"

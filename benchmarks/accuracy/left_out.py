@@ -5,6 +5,7 @@ from __future__ import annotations
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Cell, Result, Say, Table
 from unitcad.accuracy.skipped import EVERYTHING, REQUESTS, Request, time_requests
+from unitcad.pipeline.make import Subject
 from unitcad.pipeline.plan import OUTPUTS
 from unitcad.validation import default_template, load, templates
 
@@ -21,7 +22,7 @@ def run(quick: bool, say: Say) -> Result:
     rows: list[tuple[Cell, ...]] = []
     for name in chosen:
         say(name)
-        times = time_requests(load(name), _REQUESTS, 1 if quick else 3)
+        times = time_requests(Subject(load(name)), _REQUESTS, 1 if quick else 3)
         whole = times[EVERYTHING].median
         for request, time in times.items():
             left = "; ".join(f"{entry['output']} ({entry['reason']})" for entry in time.value["skipped"])

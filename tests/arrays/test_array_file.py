@@ -167,13 +167,6 @@ def test_no_table_lets_the_decoder_read_beyond_its_memory() -> None:
         gc.collect()
 
 
-def test_an_option_that_changes_the_kind_is_not_blamed_on_the_file() -> None:
-    with pytest.raises(Refusal) as refused:
-        load_array("forearm-pockets", ["layout.kind=ring"])
-    assert refused.value.field.startswith("layout")
-    assert refused.value.file is None
-
-
 def test_a_back_sheet_has_no_pockets_to_hold_by() -> None:
     with pytest.raises(Refusal, match="leave it out") as refused:
         load_array("forearm-patch", ["sheet.hold_mm=0.2"])

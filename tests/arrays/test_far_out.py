@@ -69,24 +69,6 @@ def test_what_can_not_be_made_is_refused(name: str, changes: dict[str, Any], fie
     assert isinstance(refused.value.nearest, float)
 
 
-def test_the_corner_that_fits_a_circuit_is_found_in_few_tries(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A corner of 20 mm, far above what fits: tenths are halved, not counted down."""
-    from unitcad.arrays.circuit import outline as module
-
-    tries: list[float] = []
-    rounded = module._rounded
-    monkeypatch.setattr(
-        module, "_rounded", lambda laid, walls, corner: tries.append(corner) or rounded(laid, walls, corner)
-    )
-    module._outline.cache_clear()
-    with pytest.raises(Refusal) as refused:
-        module.outline(load_array("forearm-patch", {"circuit.corner_mm": 20}))
-    fits = refused.value.nearest
-    assert isinstance(fits, float)
-    assert len(tries) < 12
-    assert module.outline(load_array("forearm-patch", {"circuit.corner_mm": fits}))
-
-
 NUMBERS = {
     "layout.pitch_mm": 20.0, "layout.columns": 3, "layout.rows": 3, "layout.rings": 2, "layout.count": 8,
     "sheet.thickness_mm": 1.5, "sheet.margin_mm": 3.0, "sheet.corner_mm": 5.0, "sheet.strap_web_mm": 5.0,

@@ -76,17 +76,6 @@ def test_measured_walls_stand_in_for_the_spec_s(tmp_path: Path) -> None:
     assert fit.measured[0].source == "as typed, walls as measured, 1.4, 1.1 mm"
 
 
-def test_a_unit_that_nobody_measured_has_the_spec_s_walls(tmp_path: Path) -> None:
-    record(tmp_path)
-    one = load_fit_lab(fit_file(tmp_path, cavity=1)).units[0]
-    assert one.built == one.spec
-    assert one.source == "as typed"
-    record(tmp_path, lambda data: data.update(units=[data["units"][1], data["units"][2]]))
-    assert load_fit_lab(fit_file(tmp_path)).units[0].built.layers[0].wall_mm == pytest.approx(1.4)  # the usable one
-    record(tmp_path, lambda data: data.update(units=[]))
-    assert load_fit_lab(fit_file(tmp_path)).units[0].built == one.spec
-
-
 @pytest.mark.parametrize(
     ("unit", "change", "field", "part"),
     [

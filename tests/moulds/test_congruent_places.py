@@ -12,12 +12,10 @@ from manifold3d import Manifold, OpType
 
 from tests.sample_bodies import LEADLESS
 from unitcad.checks import check_moulds, draw, groove_walls
-from unitcad.checks.walls import near
 from unitcad.kernels.mesh import realise, shells
-from unitcad.moulds.congruence import column_round, cropped
+from unitcad.moulds.congruence import column_round
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, box, cut, union
-from unitcad.shape.column import Column, Standing
 
 BED = ("moulds.bed_x_mm=1000", "moulds.bed_y_mm=1000")
 GANGS = [
@@ -161,53 +159,6 @@ def test_a_hundred_cells_have_one_surrounding() -> None:
     """The filaments' ways, which differ from row to row, lie below them; numbers lie beside them."""
     moulds = set_of(LEADLESS, "moulds.cavities=[10,10]", *BED)
     assert [len(set(cells)) for cells in moulds.cells] == [1, 1]
-
-
-@pytest.mark.parametrize("gang", GANGS, ids=[" ".join(gang) for gang in GANGS])
-def test_what_a_column_is_told_to_hold_is_what_the_meshes_have_there(gang: tuple[str, ...]) -> None:
-    """The reduced trees, made into meshes of their own, fill the column as the whole tools do."""
-    moulds = set_of(*gang)
-    for cell in (moulds.plan.layout.cells[0], moulds.plan.layout.cells[-1]):
-        for radius in (6.0, 9.0, 14.0):
-            column = Column(cell.x, cell.y, radius)
-            for tool in moulds.plan.tools:
-                whole = cropped(moulds.solids[tool.name], column).translate((-column.x, -column.y, 0))
-                parts = [realise(part, moulds.segments) for part in Standing([tool.shape]).within(column)]
-                told = cropped(Manifold.compose(parts), Column(0, 0, radius)) if parts else Manifold()
-                differ = whole.volume() + told.volume() - 2 * (whole ^ told).volume()
-                assert abs(differ) < 1e-6, (tool.name, radius)
-
-
-def test_a_set_keeps_each_mesh_however_many_there_are() -> None:
-    """Checks tell solids apart by identity, and a mesh made anew may get that of a lost one."""
-    moulds = set_of(LEADLESS, "moulds.cavities=[3,3]")
-    first = moulds.meshes(moulds.plan.steps[0].layer)
-    for size in range(1, 600):
-        moulds.mesh_of(box(0, size, 0, 1, 0, 1))
-    assert [id(mesh) for mesh in moulds.meshes(moulds.plan.steps[0].layer)] == [id(mesh) for mesh in first]
-
-
-def test_pairs_of_boxes_within_a_gap_are_those_found_one_by_one() -> None:
-    cubes = [Manifold.cube((1, 1, 1)).translate((1.5 * (i % 4), 1.7 * (i // 4), 0)) for i in range(12)]
-    for gap in (0.0, 0.4, 0.6, 0.8, 4.0):
-        apart = [
-            (i, k)
-            for i in range(12)
-            for k in range(i + 1, 12)
-            if max(1.5 * abs(i % 4 - k % 4), 1.7 * abs(i // 4 - k // 4)) - 1 <= gap
-        ]
-        assert near(cubes, gap) == apart
-
-
-def test_what_a_boolean_leaves_on_flat_faces_makes_no_place_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Corners, sides and middle of a plate whose grooves join: the order of the cells' operands tells none apart."""
-    judged = []
-    once_each = groove_walls.once_each
-    monkeypatch.setattr(groove_walls, "once_each", lambda keys, make: judged.append(keys) or once_each(keys, make))
-    assert all(finding.ok for finding in groove_walls.findings(set_of(LEADLESS, "moulds.cavities=[4,4]")))
-    a, b, c, d, e, f, g, h, i = range(1, 10)
-    assert judged[0] == [1] * 16
-    assert judged[1] == [a, b, b, c, d, e, e, f, d, e, e, f, g, h, h, i]
 
 
 def test_a_mesh_that_lacks_a_wedge_makes_a_cell_of_its_own() -> None:

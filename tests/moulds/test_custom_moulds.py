@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -120,31 +119,6 @@ def test_lugs_at_the_skin_hold_air(tmp_path: Path) -> None:
 def test_a_support_with_a_knife_edge_has_no_clearance(tmp_path: Path) -> None:
     """Lugs as wide as the body meet its round corner in an edge without thickness."""
     assert broken(moulds_of(tmp_path, lugs(half=7.25), layers=2)) == {"C210"}
-
-
-@pytest.mark.parametrize(("inner", "outer"), [(7, 10), (7, 8), (6, 7)])
-@pytest.mark.parametrize("clearance", [0.1, 0.2])
-def test_a_round_overhang_has_its_clearance(inner: float, outer: float, clearance: float, tmp_path: Path) -> None:
-    """The gap between two polygons of n sides is least midway along a side: the clearance's cosine of pi / n."""
-    overhang = f"union([cylinder({inner}, 0, 3), cylinder({outer}, 3, 4.2)])"
-    code = f"def unit(spec):\n    return cut({overhang}, [cylinder(4, -1, 2.2)])\n"
-    moulds = moulds_of(tmp_path, code, f"moulds.window_clearance_mm={clearance}")
-    found = check_moulds(moulds)
-    assert [finding for finding in found if not finding.ok] == []
-    (gap,) = (finding.value for finding in found if finding.where == "cup1 and what stands on the base")
-    assert clearance * math.cos(math.pi / moulds.segments) - 1 / 1024 <= gap <= clearance * math.sqrt(2)
-
-
-def test_the_place_of_a_refusal_is_in_the_piece(tmp_path: Path) -> None:
-    """Round a cone that widens upwards, the piece below is a ring: its middle is in the silicone."""
-    code = "def unit(spec):\n    return Revolve(polygon((0, 0), (6, 0), (8, 4), (0, 4)))\n"
-    with pytest.raises(Refusal) as bad:
-        moulds_of(tmp_path, code)
-    place = re.search(r"x = (\S+), y = (\S+), z = (\S+) mm", str(bad.value))
-    assert place
-    x, y, z = map(float, place.groups())
-    assert 6 + z / 2 < math.hypot(x, y)
-    assert 0 < z < 4
 
 
 DOME = (
@@ -326,11 +300,3 @@ def test_every_worked_example_has_its_test() -> None:
     assert load("custom/dome") == load(CUSTOM / "dome.toml")
     with pytest.raises(UnitcadError, match="closest: custom/strap-lugs"):
         load("strap-lugs")
-
-
-def test_an_opening_off_the_grid_is_seen() -> None:
-    """A rim's height that the kernels snap downwards, at 2.219 mm, has its opening just below."""
-    moulds = set_of("single-embedded", "motor.thickness_mm=2.219")
-    found = [finding for finding in check_moulds(moulds) if finding.code == "C410"]
-    assert [finding.ok for finding in found] == [True, True]
-    assert found[0].value == pytest.approx(math.pi * (7**2 - 4.5**2), rel=1e-3)

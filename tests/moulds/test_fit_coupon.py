@@ -15,10 +15,8 @@ from tests.sample_bodies import LEADLESS
 from unitcad.casting import coupon
 from unitcad.catalogue import printers
 from unitcad.kernels.mesh import area_true, realise
-from unitcad.moulds.cup import window_section
-from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import moved, turned
-from unitcad.validation import from_data, load, read, templates
+from unitcad.validation import from_data, read
 
 GRID = 2 / 1024
 SEGMENTS = 64
@@ -119,18 +117,3 @@ def test_resin_coupon_says_how_to_cut_the_tongue() -> None:
     text = coupon.Coupon(printers()["sla"]).markdown()
     assert "cut a strip 3.4 wide" in text
     assert "0.35 mm thick" in text
-
-
-@pytest.mark.parametrize("name", sorted(printers()))
-def test_a_cup_has_the_window_of_station_3_or_one_layer_more(name: str) -> None:
-    """What the coupon's page says of cups, for every template's window."""
-    printer = printers()[name]
-    layer = float(printer.layer_mm)
-    low, high = coupon.Coupon(printer).windows[2]
-    beside = high - low - float(printer.slot_height_mm)
-    for template in templates():
-        moulds = MouldSet(load(template, [f"moulds.printer={name}"]))
-        for step in moulds.plan.steps if moulds.dimensions.exit else ():
-            _, bottom, top = window_section(moulds.spec, moulds.dimensions.exit, step.rim)
-            more = (top - bottom - moulds.dimensions.exit.height - beside) / layer
-            assert min(abs(more), abs(more - 1)) < 1e-6, (template, step.cup)

@@ -25,7 +25,7 @@ from unitcad.search import design_files, explanation, proposals
 from unitcad.search.candidates import Candidates, candidates, grid, sequences_of, spec_data
 from unitcad.search.design_files import front
 from unitcad.search.explanation import explain
-from unitcad.search.proposals import Inversion, castability, invert, name_of, refined
+from unitcad.search.proposals import Inversion, invert, name_of, refined
 from unitcad.search.ranking import kinds
 from unitcad.search.target_file import Target, load_target, target_of
 from unitcad.validation import from_data, load
@@ -211,35 +211,6 @@ def test_what_is_offered_for_several_impossible_targets_is_accepted_together(tar
     assert several > targets / 6
 
 
-def test_three_per_cent_is_answered_with_the_least_that_is_possible() -> None:
-    with pytest.raises(Refusal) as refused:
-        invert(_target(PAPER, edge_max=0.03), check=False)
-    assert refused.value.nearest == 0.04
-    least = "an edge level of 0.04 (probability 0.5, or measured) is the least (encapsulating ecoflex-00-10/dragon-skin"
-    assert least in str(refused.value)
-    accepted = invert(_target(PAPER, edge_max=0.04), check=False).data["proposals"][0]
-    assert (accepted["measured"]["level"], accepted["nearest_other"]) == (0.04, False)
-    with pytest.raises(Refusal):
-        invert(_target(PAPER, edge_max=0.0399), check=False)
-
-
-def test_what_no_unit_was_measured_at_is_answered_by_the_probability() -> None:
-    vary = {"wall_mm": [1.5, 1.5]}
-    with pytest.raises(Refusal, match=r"an edge level of 0\.0434 .* is the least") as refused:
-        invert(_target(PAPER, vary, edge_max=0.03), check=False)
-    assert refused.value.nearest == pytest.approx(0.0434, abs=0.0003)
-    assert invert(_target(PAPER, vary, edge_max=refused.value.nearest), check=False).data["proposals"]
-
-
-def test_a_measured_level_is_the_most_where_it_is_above_the_probable_ones() -> None:
-    with pytest.raises(Refusal) as refused:
-        invert(_target(PAPER, edge_max=None, edge_min=0.95, probability_min=0.9), check=False)
-    assert refused.value.nearest == 0.671
-    assert "an edge level of 0.671 (probability 0.9, or measured) is the most" in str(refused.value)
-    goals = {"edge_max": None, "edge_min": 0.671, "probability_min": 0.9}
-    assert invert(_target(PAPER, **goals), check=False).data["proposals"][0]["measured"]["meets"]
-
-
 def test_limits_that_exclude_each_other_are_named_together() -> None:
     with pytest.raises(
         Refusal, match=r"target\.mass_max_g = 0\.3: none of .* with target\.cure_hours_max = "
@@ -290,15 +261,6 @@ def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch: pytest.
     assert made.data["not_castable"][0]["failed"] == ["C300 layer1: 0.1 against 0.2 mm"]
     out = explain(made, made.data["not_castable"][0]["name"])
     assert "can't be cast: C300 layer1: 0.1 against 0.2 mm" in out["reasons"]
-
-
-def test_faults_of_real_moulds_are_found() -> None:
-    """The drawn plan refuses a lid's vents that do not come in fours; a design can't know."""
-    checked, failed = castability(load("encapsulating"))
-    assert checked > 20
-    assert failed == []
-    _, failed = castability(load("encapsulating", {"moulds.pour": "injected", "moulds.vents": 1}))
-    assert "moulds.vents = 1" in failed[0]
 
 
 @pytest.mark.parametrize("check", [True, False])

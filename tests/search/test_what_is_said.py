@@ -15,7 +15,7 @@ from unitcad.attenuation.edge.variant_units import MANY_LAYERS
 from unitcad.errors import Refusal, UnknownKey
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.search.design_files import contents, ranking
-from unitcad.search.design_text import explanation_lines, lines, title
+from unitcad.search.design_text import explanation_lines, lines
 from unitcad.search.explanation import explain
 from unitcad.search.proposals import Inversion, invert
 from unitcad.search.target_file import load_target, target_of
@@ -47,18 +47,6 @@ def test_the_estimate_of_a_proposals_spec_has_its_range(paper: Inversion, quiet:
             assert ends == pytest.approx([one["edge"][end] for end in ("p10", "p50", "p90")], rel=1e-6)
             assert answer["weights"] == pytest.approx(made.data["models"]["weights"])
     assert paper.specs[0].estimate.models == ("fitted", "paper")
-
-
-def test_only_lengths_that_some_candidate_has_are_counted(paper: Inversion) -> None:
-    two = {"target": {"edge_max": 0.6}, "at_hand": {"materials": ["ecoflex-00-10"]}}
-    tried = invert(target_of(two), check=False).data["tried"]
-    assert (tried["candidates"], tried["geometries"]) == (14, 14)
-    assert paper.data["tried"]["geometries"] == 64
-
-
-def test_lengths_that_were_never_measured_stand_in_the_title(paper: Inversion, quiet: Inversion) -> None:
-    assert title(quiet.data["proposals"][0]).endswith("walls 1.75 and 1 mm (not measured at these lengths)")
-    assert title(paper.data["proposals"][0]).endswith("walls 1.25 and 1.25 mm")
 
 
 def test_a_frequency_that_no_model_reads_is_said() -> None:
@@ -145,13 +133,6 @@ def test_the_command_that_builds_is_quoted(paper: Inversion) -> None:
     assert f"unitcad build '{file}'" in html.unescape(found["design.html"].decode())
 
 
-def test_a_refined_proposals_name_is_explained() -> None:
-    made = _target({"layers": [2], "wall_mm": [1.1, 2.1], "step_mm": 0.5}, edge_max=0.06, mass_max_g=1.08)
-    one = next(one for one in made.data["proposals"] if one["refined"])
-    own = explain(made, one["name"])
-    assert (own["listed"], own["probability"]) == (one["rank"], one["probability"])
-
-
 def test_a_measurement_is_shown_and_the_nearest_others_are_no_proposals(paper: Inversion) -> None:
     names = {one["rank"]: one["name"] for one in paper.data["proposals"]}
     first = explanation_lines(explain(paper, names[1]))
@@ -162,15 +143,6 @@ def test_a_measurement_is_shown_and_the_nearest_others_are_no_proposals(paper: I
         assert lines[1:] == [
             "  it is no proposal: it was measured outside the target, and stands among the nearest others as number 3"
         ]
-
-
-def test_every_impossible_target_has_its_nearest() -> None:
-    with pytest.raises(
-        Refusal, match=r"target\.height_max_mm = 2: .* together with target\.cure_hours_max = "
-    ) as refused:
-        _target(height_max_mm=2.0, cure_hours_max=3.0)
-    assert "target.cure_hours_max = 3: none of" in str(refused.value.others[0])
-    assert refused.value.nearest == 2.11
 
 
 def test_a_crosstalk_that_is_out_of_reach_says_what_reaches_it() -> None:

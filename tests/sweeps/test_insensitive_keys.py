@@ -1,37 +1,34 @@
 """A batch says which swept keys a model of the edge level does not read."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 from typer.testing import CliRunner
+from unitcad.sweeps.unread_keys import swept_estimate, warnings
 
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments
 from unitcad.cli import app
-from unitcad.sweeps.insensitive_keys import swept_estimate, warnings
-from unitcad.sweeps.sweep import Sweep, from_file, load_sweep
+from unitcad.sweeps.sweep import from_file, load_sweep
 
 
-def swept(base: Any = "encapsulating", mode: str = "product", **values: Any) -> Sweep:
+def swept(base="encapsulating", mode="product", **values):
     paths = {path.replace("__", "."): value for path, value in values.items()}
     return from_file({"base": base, "sweep": {"mode": mode, **paths}}, Path(), "s")
 
 
-def unread(sweep: Sweep) -> dict[str, list[str]]:
+def unread(sweep):
     found = swept_estimate(sweep, sweep.count)
     assert found is not None
-    return {model: keys for model, keys in found.insensitive.items() if keys}
+    return {model: keys for model, keys in found.not_read.items() if keys}
 
 
-def test_the_walls_of_the_shipped_sweep_do_not_enter_the_divider() -> None:
+def test_the_walls_of_the_shipped_sweep_do_not_enter_the_divider():
     walls = ["layers.0.wall_mm", "layers.1.wall_mm"]
     assert unread(load_sweep("thickness")) == {"fitted": walls}
 
 
-def test_the_reading_keys_are_those_that_move_a_level() -> None:
+def test_the_reading_keys_are_those_that_move_a_level():
     """Against the batch's own table: over an axis alone a level moves where, and only where, the key is read."""
     sweep = load_sweep("thickness")
     from unitcad.sweeps.estimate_table import evaluate
@@ -44,20 +41,20 @@ def test_the_reading_keys_are_those_that_move_a_level() -> None:
         assert moved == ["layers.0.wall_mm" not in missing, "layers.1.wall_mm" not in missing], model
 
 
-def test_a_key_that_no_model_reads_is_said_once() -> None:
+def test_a_key_that_no_model_reads_is_said_once():
     sweep = swept(fpcb__pad_diameter_mm=[8.0, 8.5])
     assert sorted(unread(sweep)) == sorted(MODELS)
     found = warnings(swept_estimate(sweep, sweep.count))
     assert found == ["no model of the edge level reads fpcb.pad_diameter_mm: the level stays the same"]
 
 
-def test_keys_of_tooling_casting_and_files_are_no_matter_of_the_estimate() -> None:
+def test_keys_of_tooling_casting_and_files_are_no_matter_of_the_estimate():
     sweep = swept(moulds__plate_mm=[4.0, 5.0], casting__room_c=[20.0, 25.0], output__tolerance_mm=[0.01, 0.02])
     assert unread(sweep) == {}
 
 
 @pytest.mark.parametrize("mode", ["zip", "cases"])
-def test_keys_that_vary_together_are_told_apart(mode: str) -> None:
+def test_keys_that_vary_together_are_told_apart(mode):
     """The modulus moves every model's level; the wall beside it moves none of the divider's."""
     names, walls = ["ecoflex-00-10", "dragon-skin-10-medium"], [1.25, 1.5]
     if mode == "zip":
@@ -68,25 +65,25 @@ def test_keys_that_vary_together_are_told_apart(mode: str) -> None:
     assert unread(sweep) == {"fitted": ["layers.0.wall_mm"]}
 
 
-def test_a_level_that_is_not_known_says_nothing() -> None:
+def test_a_level_that_is_not_known_says_nothing():
     sweep = swept(base="embedded", layers__0__material=["ecoflex-00-50"], layers__0__wall_mm=[1.0, 1.25])
     assert unread(sweep) == {}
 
 
-def test_a_batch_of_units_without_estimates_has_none(tmp_path: Path) -> None:
+def test_a_batch_of_units_without_estimates_has_none(tmp_path):
     sweep = swept(base=str(Path("templates/custom/strap-lugs.toml").resolve()), diameter_mm=[14.0, 14.5])
     assert swept_estimate(sweep, sweep.count) is None
     assert warnings(None) == []
 
 
-def test_the_terminal_warns_and_batch_json_tells(tmp_path: Path) -> None:
+def test_the_terminal_warns_and_batch_json_tells(tmp_path):
     done = CliRunner().invoke(app, ["batch", "thickness", "--only", "estimate", "-o", str(tmp_path / "b")])
     assert done.exit_code == 0
     warning = "warning: fitted does not read layers.0.wall_mm and layers.1.wall_mm: its level stays the same"
     assert warning in done.output
     told = json.loads((tmp_path / "b" / "batch.json").read_text())["estimate"]
     assert told["not_measured"] == {"layers.0.wall_mm": 1.25, "layers.1.wall_mm": 1.25}
-    assert told["insensitive"] == {
+    assert told["not_read"] == {
         "bush": [],
         "fitted": ["layers.0.wall_mm", "layers.1.wall_mm"],
         "paper": [],
@@ -108,9 +105,7 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path: Path) -> None:
         ({"layers__0__material": ["ecoflex-00-10", "dragon-skin-10"]}, {}),
     ],
 )
-def test_swept_lengths_that_every_measured_unit_had_alike_are_named(
-    values: dict[str, Any], lengths: dict[str, float]
-) -> None:
+def test_swept_lengths_that_every_measured_unit_had_alike_are_named(values, lengths):
     sweep = swept(**values)
     found = swept_estimate(sweep, sweep.count)
     assert found is not None
@@ -120,14 +115,14 @@ def test_swept_lengths_that_every_measured_unit_had_alike_are_named(
     assert all(any(path in line and f"{length:g} mm" in line for line in told) for path, length in lengths.items())
 
 
-def test_a_control_s_wall_is_that_of_the_measured_controls() -> None:
+def test_a_control_s_wall_is_that_of_the_measured_controls():
     sweep = swept("single-embedded", layers__0__wall_mm=[2.0, 2.5])
     found = swept_estimate(sweep, sweep.count)
     assert found is not None
     assert found.not_measured == {"layers.0.wall_mm": 2.5}
 
 
-def test_units_without_a_level_say_nothing_of_what_models_read() -> None:
+def test_units_without_a_level_say_nothing_of_what_models_read():
     """Of three layers no length was measured, and no model has an error."""
     sweep = from_file({"base": "three-layer", "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "three")
     assert swept_estimate(sweep, sweep.count) is None

@@ -19,8 +19,7 @@ from unitcad.cli.shared_options import AsJson, Sets
 from unitcad.designs import design_of
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
-from unitcad.moulds.mould_set import MouldSet
-from unitcad.validation import load
+from unitcad.pipeline.subjects import load_subject
 
 _MEDIA, _SPECS = 20, 20
 _INPUTS = 8
@@ -50,7 +49,8 @@ _RANGES = ("ranges", "specs", "built", "refused", "faults", "longest_s")
 
 def accuracy(
     spec: Annotated[
-        str | None, typer.Argument(metavar="SPEC", help="Template or TOML file of a unit; default: the survey.")
+        str | None,
+        typer.Argument(metavar="SPEC", help="A unit or an array: template or TOML file; default: the survey."),
     ] = None,
     sets: Sets = None,
     media: Annotated[
@@ -65,7 +65,8 @@ def accuracy(
     """Measure the errors of meshes and response, their bounds and what they cost. Exit 1 if an error exceeds its bound.
 
     With SPEC: error against time at five tolerances, the inputs that move the results most, and the parts that a build
-    leaves out. Without SPEC: the bounds of random media, and builds of random specs.
+    leaves out. An array's response and inputs are those of its unit. Without SPEC: the bounds of random media, and
+    builds of random specs.
     """
     if spec is None:
         if sets:
@@ -80,9 +81,10 @@ def accuracy(
 
 def _one_spec(name: str, sets: Sequence[str] | None, as_json: bool) -> None:
 
-    spec = load(name, sets or ())
+    subject = load_subject(name, sets or ())
+    spec = subject.unit
     with progress("accuracy") as say:
-        data: dict[str, Any] = {"spec": spec.name, "meshes": mesh_rows(MouldSet(spec), say)}
+        data: dict[str, Any] = {"spec": subject.name, "meshes": mesh_rows(subject.moulds, say)}
         if design_of(spec).passes is not None:
             say("response")
             variant = estimate_input(spec)
@@ -90,14 +92,14 @@ def _one_spec(name: str, sets: Sequence[str] | None, as_json: bool) -> None:
             say("inputs")
             data["amplification"] = amplifications(spec, variant)
         say("requests")
-        data["skipped"] = skipped_rows(spec)
+        data["skipped"] = skipped_rows(subject)
     if as_json:
         print_json(_finite(data))
     else:
         _print_spec(data)
     broken = not all(row.get("within_bounds", True) for row in data["meshes"])
     if broken or any(not row["over_bound"] <= 1 for row in data.get("response", ())):
-        typer.echo(f"{spec.name}: an error exceeds its bound", err=True)
+        typer.echo(f"{subject.name}: an error exceeds its bound", err=True)
         sys.exit(1)
 
 

@@ -10,7 +10,6 @@ from unitcad.accuracy.timing import Timing, interleaved
 from unitcad.cache import MemoryStore
 from unitcad.pipeline.make import Progress, Subject, forget
 from unitcad.pipeline.manifest import Manifest
-from unitcad.spec import Spec, with_formats
 from unitcad.spec.asked import OUTPUTS
 
 Request = tuple[Sequence[str], Sequence[str], bool]
@@ -26,15 +25,15 @@ REQUESTS: dict[str, Request] = {
 """Without shaded pictures."""
 
 
-def time_requests(spec: Spec, requests: Mapping[str, Request], repeats: int) -> dict[str, Timing]:
+def time_requests(subject: Subject, requests: Mapping[str, Request], repeats: int) -> dict[str, Timing]:
     """Return the time of each request, made from an empty store in this process; the value is its manifest."""
-    return interleaved({name: partial(_manifest, spec, request) for name, request in requests.items()}, repeats)
+    return interleaved({name: partial(_manifest, subject, request) for name, request in requests.items()}, repeats)
 
 
-def skipped_rows(spec: Spec) -> list[dict[str, Any]]:
+def skipped_rows(subject: Subject) -> list[dict[str, Any]]:
     """Return a row for each request: its time, the saving against all outputs, and the skipped outputs."""
-    requests = {EVERYTHING: REQUESTS[EVERYTHING], "as the spec asks": (OUTPUTS, spec.output.formats, True), **REQUESTS}
-    times = time_requests(spec, requests, 1)
+    requests = {EVERYTHING: REQUESTS[EVERYTHING], "as the spec asks": (OUTPUTS, subject.formats, True), **REQUESTS}
+    times = time_requests(subject, requests, 1)
     whole = times[EVERYTHING].median
     return [
         {"request": name, "s": time.median, "saved_s": whole - time.median, "skipped": time.value["skipped"]}
@@ -42,8 +41,7 @@ def skipped_rows(spec: Spec) -> list[dict[str, Any]]:
     ]
 
 
-def _manifest(spec: Spec, request: Request) -> Manifest:
+def _manifest(subject: Subject, request: Request) -> Manifest:
     only, formats, check = request
     forget()
-    wanted = Subject(with_formats(spec, tuple(formats)))  # type: ignore[arg-type]
-    return wanted.make(only, check, MemoryStore(), Progress()).manifest
+    return subject.with_formats(formats).make(only, check, MemoryStore(), Progress()).manifest  # type: ignore[arg-type]

@@ -151,7 +151,7 @@ def _print_faults(manifest: Manifest) -> None:
         warn(f"warning: {warning}")
     for entry in manifest["skipped"]:
         if entry["reason"] == NO_KERNEL:
-            warn(f"note: STEP left out: {entry['why']}; {install_command('step')}")
+            warn(f"note: STEP left out: {entry['reason']}; {install_command('step')}")
     checks = manifest["mould_checks"]
     for check in checks:
         if not check["ok"]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 
-from unitcad.errors import UnitcadError
+from unitcad.errors import UnitcadError, pip_install
 from unitcad.kernels import brep, occt
 from unitcad.kernels.ocp import loading
 from unitcad.shape import Shape
@@ -47,7 +48,7 @@ def show(assembly: b3d.Compound) -> None:
 
         yacv_server.show(*assembly.children, names=[child.label for child in assembly.children])
     else:
-        raise UnitcadError("no viewer is installed: pip install ocp-vscode or pip install yacv-server")
+        raise UnitcadError(f"no viewer is installed: {shlex.join([*pip_install(), 'ocp-vscode'])} (or yacv-server)")
 
 
 def line(start: brep.Point, end: brep.Point) -> b3d.Edge:

@@ -12,7 +12,7 @@ import importlib.metadata
 import shlex
 from collections.abc import Iterator
 
-from unitcad.errors import PIP, Missing, install_command
+from unitcad.errors import Missing, install_command, pip_install
 
 WHEEL_VERSION = "7.9.3.1.1"
 WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")
@@ -50,7 +50,7 @@ def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
     if library == "cadquery" and "cadquery-ocp" not in wanted:
         wanted = ["cadquery-ocp", *wanted]
     # cadquery needs the wheel with VTK, which serves build123d as well: it is unpacked last.
-    install = shlex.join([*PIP, "install", "--force-reinstall", "--no-deps"])
+    install = shlex.join([*pip_install(), "--force-reinstall", "--no-deps"])
     fix = "; ".join(f"{install} {name}=={WHEEL_VERSION}" for name in reversed(wanted))
     return (
         f"{library} does not load ({type(error).__name__}: {error}). The folder OCP is broken or of another version:"
