@@ -154,7 +154,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
     name : str
         A name; the result's folder begins with it.
     design : str
-        "embedded", "encapsulating", "FILE.py:NAME", or a file of bodies.
+        A design (``unitcad list designs``), "FILE.py:NAME", or a file of bodies.
     diameter_mm : float
         Diameter of the unit, mm.
     layers : sequence of Layer or dict
