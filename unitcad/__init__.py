@@ -122,6 +122,8 @@ def __getattr__(name: str) -> object:
     module, _, attribute = _PLACES[name].partition(":")
     loaded = import_module(f"{__name__}.{module}")
     value = getattr(loaded, attribute) if attribute else loaded
+    if attribute.endswith(("Table", "Entry")):
+        value.__doc__ = import_module(f"{__name__}.spec.fields").documented(value)
     globals()[name] = value
     return value
 

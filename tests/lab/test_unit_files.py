@@ -86,7 +86,7 @@ def test_measured_walls_stand_in_for_the_spec_s(tmp_path: Path) -> None:
         ({"cavity": 2, "spec": "encapsulating"}, None, "unit.0.cast", "excludes spec"),
         ({"cavity": 2, "cast": None, "spec": "encapsulating"}, None, "unit.0.cavity", "there is no cast"),
         ({"cast": None}, None, "unit.0.spec", "is required, or cast"),
-        ({"cavity": 2, "set": {"layers.0.wall_mm": 1.0}}, None, "unit.0.set", "the record says what was cast"),
+        ({"cavity": 2, "set": {"layers.0.wall_mm": 1.0}}, None, "unit.0.set", "the record has the spec that was cast"),
         ({"cavity": 2}, lambda d: d.update(version=2), "unit.0.cast", "version = 2: must be at most 1"),
         ({"cavity": 2}, lambda d: d.pop("spec"), "unit.0.cast", "spec: is required here"),
         ({"cavity": 2}, lambda d: d["spec"].update(diameter_mm=3), "unit.0.cast", "diameter_mm"),

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
-from unitcad.sweeps.unread_keys import swept_estimate, warnings
 
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments
 from unitcad.cli import app
+from unitcad.sweeps.insensitive_keys import swept_estimate, warnings
 from unitcad.sweeps.sweep import from_file, load_sweep
 
 
@@ -20,7 +20,7 @@ def swept(base="encapsulating", mode="product", **values):
 def unread(sweep):
     found = swept_estimate(sweep, sweep.count)
     assert found is not None
-    return {model: keys for model, keys in found.not_read.items() if keys}
+    return {model: keys for model, keys in found.insensitive.items() if keys}
 
 
 def test_the_walls_of_the_shipped_sweep_do_not_enter_the_divider():
@@ -83,7 +83,7 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path):
     assert warning in done.output
     told = json.loads((tmp_path / "b" / "batch.json").read_text())["estimate"]
     assert told["not_measured"] == {"layers.0.wall_mm": 1.25, "layers.1.wall_mm": 1.25}
-    assert told["not_read"] == {
+    assert told["insensitive"] == {
         "bush": [],
         "fitted": ["layers.0.wall_mm", "layers.1.wall_mm"],
         "paper": [],

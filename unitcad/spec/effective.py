@@ -147,11 +147,44 @@ else:
 
 
 class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
-    """A haptic unit; `layers` run from the inside out, one entry being a single-layer control. Lengths in mm.
+    """A haptic unit with every value resolved.
 
-    `Spec(name=..., design=..., diameter_mm=..., layers=[...])` takes the keys of a TOML file, tables as the classes
-    of `unitcad.spec.asked` or as dicts. Defaults are written out and every limit is checked: raises Refusal with
-    the sentence that the same file would get.
+    Parameters
+    ----------
+    name : str
+        A name; the result's folder begins with it.
+    design : str
+        A design (``unitcad list designs``), "FILE.py:NAME", or a file of bodies.
+    diameter_mm : float
+        Diameter of the unit, mm.
+    layers : sequence of Layer or dict
+        The silicone layers, from the inside out; one is a single-layer control.
+    motor : Motor or dict, optional
+        The motor. Default: the part LCM0720A3463F.
+    fpcb : Fpcb or dict, optional
+        The flexible circuit. Default: none.
+    wires : Wires or dict, optional
+        Wires in place of a circuit. Default: none.
+    moulds, casting, estimate, output : Moulds, Casting, Estimate, Output or dict, optional
+        Settings. Default: the defaults of each class.
+    materials, motors, printers, tissue : mapping, optional
+        Entries of the spec's own, by name.
+    parameters : mapping of str to bool, int, float or str, optional
+        Values that a custom design reads.
+    design_source : str, optional
+        Text of a custom design's file; unitcad fills it in.
+
+    Raises
+    ------
+    Refusal
+        For an invalid value, with the same sentence as for a file.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> layer = unitcad.Layer(material="ecoflex-00-30", wall_mm=2.5)
+    >>> unitcad.Spec(name="control", design="embedded", diameter_mm=14, layers=[layer])
+    Spec('control': embedded, 14 mm, ecoflex-00-30 2.5)
     """
 
     name: str

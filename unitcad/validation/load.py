@@ -25,7 +25,19 @@ from unitcad.validation.tables import Changes, Source, asked_of, changes_of, pla
 
 
 def templates() -> dict[str, Path]:
-    """Return the shipped templates by name."""
+    """Return the shipped templates.
+
+    Returns
+    -------
+    dict of str to Path
+        The TOML file of each template, by name.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> "encapsulating" in unitcad.templates()
+    True
+    """
     return shipped_files()
 
 
@@ -72,14 +84,35 @@ def default_template() -> str:
 
 
 def load(source: Source, set: Changes = ()) -> Spec:
-    """Return the effective spec of a template, a file, plain data, or another spec or variant.
+    """Return the resolved spec of a template, a file, plain data, or another spec or variant.
 
-    A text is a template's name (such as custom/strap-lugs), or a file where it holds a path separator or ends in .toml.
-    `set` changes values:
-    a dict by dotted path ({"layers.0.wall_mm": 1.2}), or texts "path=value" with a value in TOML syntax (a bare word
-    counts as a string). Lengths in mm. Values that follow from others follow the changed ones. A custom design's
-    path starts at the file's folder, else at the working directory. Raises Refusal or UnitcadError, naming the
-    field, for an invalid value; the refusal's `others` are the spec's further faults, each with `file` and `line`.
+    Parameters
+    ----------
+    source : str, path, dict, Spec or Variant
+        Name of a template, path of a TOML file (with a path separator or ending in .toml), or a spec's data.
+    set : dict or sequence of str, optional
+        Changes by dotted path: ``{"layers.0.wall_mm": 1.2}`` or ``["layers.0.wall_mm=1.2"]``. Lengths in mm.
+        Values that follow from others follow the changed ones.
+
+    Returns
+    -------
+    Spec
+        The spec with every default written out.
+
+    Raises
+    ------
+    Refusal
+        For an invalid value: field, value, limit and nearest accepted value. Its ``others`` are the spec's further
+        faults, each with ``file`` and ``line``.
+    UnitcadError
+        For a file that can't be read, and for a source of another type.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> spec = unitcad.load("encapsulating", set={"diameter_mm": 15})
+    >>> spec.diameter_mm, spec.motor.thickness_mm
+    (15.0, 2.0)
     """
     changes = list(changes_of(set))
     if kind := compound_kind(source):

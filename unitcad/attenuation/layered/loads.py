@@ -347,10 +347,25 @@ def _orders(direction: Direction) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Point:
-    """One newton at the origin. Radial: the traction 1 / (2 pi r^2), its transform as constant as the normal one's.
+    """A force of one newton at the origin.
 
-    (A radial traction that vanishes outside a point has no resultant and no effect; this one is what the paper's F2
-    means once its F1 is a point.)
+    A radial point load is the traction 1 / (2 pi r^2), whose transform is constant like that of the normal one.
+
+    Parameters
+    ----------
+    direction : {"normal", "radial", "tangential"}, default "normal"
+        Direction of the force.
+
+    Raises
+    ------
+    Refusal
+        For an unknown direction.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import Point
+    >>> Point("tangential").reach
+    0.0
     """
 
     direction: Direction = "normal"
@@ -397,7 +412,26 @@ class Point:
 
 @dataclass(frozen=True)
 class UniformDisc:
-    """One pascal, everywhere the same, on a disc of `radius` (m): a pressure, a traction outwards or one sideways."""
+    """A uniform stress of one pascal on a disc.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the disc, m, above 0.
+    direction : {"normal", "radial", "tangential"}, default "normal"
+        A pressure, a traction outwards, or one sideways.
+
+    Raises
+    ------
+    Refusal
+        For a radius that is not positive, and for an unknown direction.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import UniformDisc
+    >>> UniformDisc(3.5e-3).reach
+    0.0035
+    """
 
     radius: float
     direction: Direction = "normal"
