@@ -278,7 +278,7 @@ def table_of_receivers() -> str:
 
 
 def _elements() -> dict:
-    return json.loads((HERE / "mechanics.json").read_text("utf-8"))
+    return json.loads((HERE / "fem.json").read_text("utf-8"))
 
 
 def table_of_elements() -> str:

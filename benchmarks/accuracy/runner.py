@@ -22,7 +22,7 @@ MODULES = {
     "hankel": "hankel",
     "stability": "stability",
     "models": "edge_levels",
-    "mechanics": "unit_elements",
+    "fem": "unit_elements",
     "design": "proposal_reliability",
     "extremes": "extremes",
     "left-out": "left_out",
@@ -38,8 +38,7 @@ NEEDS = {
     "hankel": {**_REFERENCE, "libdlf": "fem"},
     "stability": _REFERENCE,
     "models": _ELEMENTS,
-    "mechanics": _ELEMENTS,
-    "design": {"optuna": "test"},
+    "fem": _ELEMENTS,
 }
 """What a suite imports beyond the core: each module, and the extra that installs it."""
 

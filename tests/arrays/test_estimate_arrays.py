@@ -32,7 +32,6 @@ def test_the_answer_comes_first_and_the_tables_behind_details() -> None:
     assert "B2 gets the most" in out
     assert "%" not in out.splitlines()[-1]
     _, more, _ = run(NINE, "--details", "--frequency", "100:200:50", "--masses")
-    assert more.count("consistent") == 1
     assert "150" in more
     assert "change what B2 gets by x 1.0" in more
 

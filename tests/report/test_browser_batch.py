@@ -237,29 +237,29 @@ def colours(visit: Visit) -> tuple[str, str]:
 
 
 def test_the_plot_says_who_is_not_in_it_and_why(running: Any, tmp_path: Path) -> None:
-    columns = ["name", "material", "wall_mm", "edge_fitted", "reason"]
+    columns = ["name", "material", "wall_mm", "edge_rule", "reason"]
     rows: list[list[Any]] = [[f"f{i}", f"unit {i}", "soft", i, i / 10, None] for i in range(5)]
     rows += [["g", "unit", "stiff", 3, None, None]] * 2 + [["", "burst", "soft", None, None, "wall too thin"]]
-    estimate = {"models": {"fitted": {"edge_level": {"value": None, "reason": "no modulus is known"}}}}
+    estimate = {"models": {"rule": {"edge_level": {"value": None, "reason": "no modulus is known"}}}}
     variants = [["g", {"estimate": estimate}]]
     seen = Visit(running, table_page(tmp_path, columns, rows, variants=variants))
     seen.page.select_option('select[name="plot-x"]', "wall_mm")
-    seen.page.select_option('select[name="plot-y"]', "edge_fitted")
+    seen.page.select_option('select[name="plot-y"]', "edge_rule")
     seen.page.select_option('select[name="plot-group"]', "material")
     assert "5 of 8 points" in seen.page.inner_text("#plot .tip")
     assert seen.page.locator("#plot .note").all_inner_texts() == [
         "1 has no wall_mm: burst, soft. Why: wall too thin.",
-        "2 have no edge_fitted: unit, stiff (2 times). Why: no modulus is known.",
-        "1 has no edge_fitted: burst, soft. Why: wall too thin.",
+        "2 have no edge_rule: unit, stiff (2 times). Why: no modulus is known.",
+        "1 has no edge_rule: burst, soft. Why: wall too thin.",
     ]
     assert seen.page.locator("#plot .key li").all_inner_texts() == ["soft", "stiff (no point)"]
-    seen.page.fill('input[name="filter-edge_fitted"]', "0..1")
+    seen.page.fill('input[name="filter-edge_rule"]', "0..1")
     assert seen.page.locator("#plot .note").count() == 0
-    seen.page.fill('input[name="filter-edge_fitted"]', "")
+    seen.page.fill('input[name="filter-edge_rule"]', "")
     seen.page.fill('input[name="filter-material"]', "stiff")
     assert "0 of 2 points" in seen.page.inner_text("#plot .tip")
     assert seen.page.locator("#plot .note").all_inner_texts() == [
-        "2 have no edge_fitted: unit, stiff (2 times). Why: no modulus is known."
+        "2 have no edge_rule: unit, stiff (2 times). Why: no modulus is known."
     ]
     assert seen.errors == []
     seen.close()

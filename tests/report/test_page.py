@@ -184,10 +184,10 @@ def test_a_batch_with_senseless_errors_is_damaged(sweep: Path, tmp_path: Path, e
 
 def test_what_was_swept_and_the_levels_come_first(sweep: Path) -> None:
     columns = ["index", "status", "reason", "folder", "motor", "moulds.land_mm", "name", "design", "diameter_mm",
-               "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_paper", "edge_fitted"]  # fmt: skip
+               "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_published", "edge_divider"]  # fmt: skip
     batch = {"name": "s", "columns": columns, "variants": [dict.fromkeys(columns)]}
     assert read_results.results_table(batch, [], {}).columns == [
-        "name", "motor", "moulds.land_mm", "design", "diameter_mm", "edge_paper", "edge_fitted",
+        "name", "motor", "moulds.land_mm", "design", "diameter_mm", "edge_published", "edge_divider",
         "index", "status", "reason", "layer1_volume_mm3", "layer1_mass_g", "laws",
     ]  # fmt: skip
     without = data_of((sweep / "report.html").read_text("utf-8"))["table"]["columns"]

@@ -26,8 +26,8 @@ class EdgeEstimate:
 
     @property
     def answer(self) -> str:
-        """The sentence that leads the estimate: what was measured, the best model's level in per cent, its error."""
-        return summary(self.data)["answer"]
+        """The two lines that lead the estimate: what is measured or expected, and the paper's analytic model."""
+        return "\n".join(summary(self.data)["lines"])
 
     @property
     def edge(self) -> dict[str, float | None]:
@@ -70,7 +70,7 @@ def estimate(
 ) -> EdgeEstimate:
     """Estimate the vibration at a unit's edge, and on the skin beyond it.
 
-    `source` and `set` are as for `unitcad.load`. `models` ("bush", "fitted", "paper", "consistent"; "mechanics", which
+    `source` and `set` are as for `unitcad.load`. `models` ("rule", "published", "corrected", "divider"; "fem", which
     needs scikit-fem and seconds) and `frequency_hz` stand in for the spec's. Nothing is drawn or written. Raises
     Refusal for a value that is not valid, and for a custom design that no model describes.
     """

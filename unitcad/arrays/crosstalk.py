@@ -15,7 +15,6 @@ import numpy as np
 
 from unitcad.arrays.array import Array
 from unitcad.attenuation.crosstalk import Reading, decay, ends
-from unitcad.attenuation.edge.estimates import not_of_this_drive
 from unitcad.attenuation.inputs import Drive, EstimateInput, body
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
 from unitcad.errors import Refusal
@@ -169,7 +168,7 @@ def crosstalk(
 
     `matrix`: the decay between each two units by drive, rows the unit that drives, to the other's centre and nearest
     edge, null for itself, at the units' own frequencies; `sums`: what adds up at each place; `band`: the same at the
-    nearest neighbour and the worst place over frequencies (Hz); `absolute`: a range over the models; `masses`: with the
+    nearest neighbour and the worst place over frequencies (Hz); `absolute`: a range; `masses`: with the
     masses of the others on the skin. Raises Refusal for a unit without an estimate, a frequency that no body takes,
     and for masses of more than `MOST_LOADED` units.
     """
@@ -266,37 +265,24 @@ def _nearest(units: Decays, own: np.ndarray) -> tuple[int, int] | None:
 
 
 def _absolute(units: Decays, own: np.ndarray, worst: int) -> dict[str, Any]:
-    """Return the amplitude at the worst place from the others, in motors' amplitudes: a range over the models.
+    """Return the amplitude at the worst place from the others, in motors' amplitudes, as a range.
 
-    The models' levels at the edge, each to the ends of its inputs' ranges, times the nominal decay.
+    The 80 % ranges of the units' levels at the edge, all at one end, times the nominal decay.
     """
-    blocks = [estimate_spec(unit, layered=lambda variant: {})["models"] for unit in units.array.units]
-    by_model: dict[str, dict[str, float]] = {}
-    for model in blocks[0]:
-        levels = [block[model]["edge_level"] for block in blocks]
-        if any(not_of_this_drive(one, [model]) for one in units.inputs) or any(one["low"] is None for one in levels):
-            continue
-        low, high = (np.array([levels[kind][key] for kind in units.kind]) for key in ("low", "high"))
-        by_model[model] = {
-            f"{name}_{key}": round(float(_sums(own * level[:, None])[name][worst]), DIGITS)
-            for name in ("sum", "root_sum_of_squares")
-            for key, level in (("low", low), ("high", high))
-        }
+    answers = [estimate_spec(unit, (), layered=lambda variant: {})["answer"] for unit in units.array.units]
     block: dict[str, Any] = {
         "place": units.array.places[worst].name,
         "unit": "of the motor's amplitude",
-        "range": "models' levels at the edge to the ends of their inputs' ranges; nominal decay",
+        "range": "80 % ranges of the levels at the edge, nominal decay",
+        **dict.fromkeys(("sum", "root_sum_of_squares")),
     }
-    for name in ("sum", "root_sum_of_squares"):
-        if not by_model:
-            block[name] = None
-            continue
-        low = min(one[f"{name}_low"] for one in by_model.values())
-        high = max(one[f"{name}_high"] for one in by_model.values())
-        block[name] = {"low": low, "high": high}
-    if not by_model:
-        block["reason"] = "no model gives a level for every unit"
-    return {**block, "by_model": by_model}
+    if any(one["p10"] is None for one in answers):
+        return {**block, "reason": "the level of a unit is not known"}
+    for end in ("p10", "p90"):
+        level = np.array([one[end] for one in answers])[units.kind]
+        for name, sums in _sums(own * level[:, None]).items():
+            block[name] = {**(block[name] or {}), "low" if end == "p10" else "high": round(float(sums[worst]), DIGITS)}
+    return block
 
 
 def _masses(units: Decays) -> dict[str, Any]:
@@ -483,8 +469,8 @@ def _absolute_line(block: Mapping[str, Any]) -> str:
         return f"No absolute level: {block['reason']}."
     said = [f"{number(100 * one['low'], 2)} to {number(100 * one['high'], 2)} %" for one in (root, phase)]
     return (
-        f"At {block['place']} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase: the "
-        "models of the level at a unit's edge differ so much."
+        f"At {block['place']} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase: so "
+        "wide are the ranges of the level at a unit's edge."
     )
 
 

@@ -37,7 +37,7 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
     if level := manifest["estimate"]:
-        yield level["answer"]
+        yield from level["lines"]
     if (built.folder / PAGE).is_file():
         yield f"open {shlex.quote(str(built.folder / PAGE))}"
 

@@ -33,9 +33,8 @@ Output = Literal["unit", "moulds", "estimate", "casting"]
 OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
 _LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
 _TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
-Moduli = Literal["dynamic", "quasi-static"]
-Stacked = Literal["bush", "fitted", "paper", "consistent", "crossings"]
-Model = Literal["bush", "fitted", "paper", "consistent", "mechanics"]
+Moduli = Literal["small-strain", "quasi-static"]
+Model = Literal["rule", "published", "corrected", "divider", "fem"]
 
 
 class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_unknown_fields=True):
@@ -143,13 +142,9 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     frequency_hz: kinds.Frequency | None = None
     amplitude_um: kinds.Amplitude | None = None
     tissue: str = "forearm"
-    models: Annotated[tuple[Model, ...], Meta(min_length=1)] = ("bush", "fitted", "paper", "consistent")
-    stack: Annotated[
-        Annotated[tuple[Stacked, ...], Meta(min_length=1)] | None,
-        Meta(description="closed forms behind the range; else the models"),
-    ] = None
+    models: Annotated[tuple[Model, ...], Meta(min_length=1)] = ("rule", "published", "corrected", "divider")
     moduli: Annotated[Moduli, Meta(description="of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")] = (
-        "dynamic"
+        "small-strain"
     )
     fit: Annotated[str | None, Meta(description="a lab-fit.toml of unitcad fit: a lab's own constants and ranges")] = (
         None

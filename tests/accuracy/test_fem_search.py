@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("skfem")
 
 from benchmarks.accuracy import runner
-from benchmarks.accuracy.mechanics_search import (
+from benchmarks.accuracy.fem_search import (
     AXES,
     drawn_levels,
     one_constant,
@@ -18,7 +18,7 @@ from benchmarks.accuracy.mechanics_search import (
     unit_spec,
 )
 from unitcad.attenuation.edge.measured_levels import measured_table
-from unitcad.attenuation.mechanics.motor_level import level
+from unitcad.attenuation.fem.motor_level import level
 from unitcad.estimating import estimate_input
 
 MEASURED = measured_table().levels
@@ -78,7 +78,7 @@ def test_a_search_names_its_hypothesis():
 
 
 def test_the_page_has_error_against_time_of_a_unit_under_both_drives():
-    (page,) = [one for one in runner.read(Path(__file__).parents[2] / "docs") if one.suite == "mechanics"]
+    (page,) = [one for one in runner.read(Path(__file__).parents[2] / "docs") if one.suite == "fem"]
     table = page.tables[0]
     assert {row[0].rpartition(", ")[2] for row in table.rows} == {"axial", "flat"}
     assert {"fineness", "unknowns", "time", "error, skin", "error, own edge"} <= set(table.columns)
