@@ -23,6 +23,7 @@ MODULES = {
     "stability": "stability",
     "models": "edge_levels",
     "fem": "unit_elements",
+    "skin": "skin_curve",
     "design": "proposal_reliability",
     "extremes": "extremes",
     "left-out": "left_out",
@@ -39,6 +40,7 @@ NEEDS = {
     "stability": _REFERENCE,
     "models": _ELEMENTS,
     "fem": _ELEMENTS,
+    "skin": _ELEMENTS,
 }
 """What a suite imports beyond the core: each module, and the extra that installs it."""
 
