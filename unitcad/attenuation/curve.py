@@ -38,9 +38,9 @@ ASSUMPTIONS = [
     "The body's layers are a template from published ranges, not this person's arm nor the paper's phantom.",
 ]
 FAR = (
-    "Beyond 2 cm it falls faster than was measured on arms: on hand and forearm vibration keeps 0.79 (0.70 to 0.88) of "
-    "its amplitude every 20 mm at 40 to 60 Hz and 0.80 (0.68 to 0.92) at 75 to 100 Hz. Under a flat motor no body "
-    "within the template's sources does the second."
+    "Beyond 2 cm the curve on the skin falls faster than was measured on arms: on hand and forearm vibration keeps "
+    "0.79 (0.70 to 0.88) of its amplitude every 20 mm at 40 to 60 Hz and 0.80 (0.68 to 0.92) at 75 to 100 Hz. Under a "
+    "flat motor no body within the template's sources does the second."
 )
 _DIRECTIONS: dict[Drive, Direction] = {"flat": "tangential", "axial": "normal"}
 _COMPONENTS = {"flat": ("u_r", "u_theta", "u_z"), "axial": ("u_r", "u_z")}

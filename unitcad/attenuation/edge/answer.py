@@ -199,4 +199,6 @@ def _skin(layered: dict[str, Any]) -> Iterator[str]:
     places = [(r, layered["r_mm"].index(r)) for r in SKIN_MM if r in layered["r_mm"]]
     ends = {r: _range(drive["u"]["low"][i], drive["u"]["high"][i]).removesuffix(" %") for r, i in places}
     told = [f"{percent(drive['u']['value'][i])} ({ends[r]}) after {r} mm" for r, i in places]
-    yield f"On the skin ({layered['tissue']}), of the motion at the edge: {listed(told)}. {layered.get('far', '')}".rstrip()
+    yield f"On the skin ({layered['tissue']}), of the motion at the edge: {listed(told)}."
+    if "far" in layered:
+        yield layered["far"]
