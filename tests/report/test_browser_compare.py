@@ -81,8 +81,10 @@ def test_a_model_is_plotted_only_against_what_it_reads(visit):
     assert visit.page.input_value('select[name="plot-x"]') == "layers.1.wall_mm"
     assert visit.page.input_value('select[name="plot-y"]') == "edge_published"
     assert "4 of 4 points" in visit.page.inner_text("#plot .tip")
-    assert visit.page.locator('select[name="plot-y"] option:disabled').all_inner_texts() == ["edge_rule", "edge_divider"]
-    assert "edge_rule, edge_divider, whose model does not read layers.1.wall_mm" in visit.page.inner_text("#plot .unread")
+    disabled = visit.page.locator('select[name="plot-y"] option:disabled').all_inner_texts()
+    assert disabled == ["edge_rule", "edge_divider"]
+    unread = visit.page.inner_text("#plot .unread")
+    assert "edge_rule, edge_divider, whose model does not read layers.1.wall_mm" in unread
     assert "typical error" in visit.page.inner_text("#plot .note")
     visit.page.select_option('select[name="plot-y"]', "layer2_volume_mm3")
     assert visit.page.locator("#plot .note").count() == 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -47,7 +47,7 @@ def crosstalk_ratio(variant: EstimateInput, pitch: float, spread: bool = True) -
     return Quantity(value, low * min(every), high * max(every))
 
 
-def contact(drive: Drive, mm: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def contact(drive: Drive, mm: float | np.ndarray) -> tuple[Any, Any]:
     """Return the least and the largest factor of `CONTACT` at distances from a unit's edge, mm; 1 inside it."""
     low, high = (np.interp(mm, CONTACT_MM, factors) for factors in CONTACT[drive])
     return low, high
