@@ -56,7 +56,7 @@ def test_the_answer_that_is_known(known: Inversion) -> None:
         expected = predictive_of([estimate_input(spec) for spec in known.specs if spec.name == one["name"]])
         assert one["probability"] == pytest.approx(expected.at_most(0.06)[0], rel=1e-6)
     assert all("only ones within the limits" in one["lengths_gain"] for one in best)
-    assert set(known.data["left_out"]) == {"ecoflex-00-30", "ecoflex-00-50"}
+    assert set(known.data["skipped"]) == {"ecoflex-00-30", "ecoflex-00-50"}
     assert [one["measured"]["level"] for one in best[:2]] == [0.04, 0.0517]
     assert all(one["checks"] > 20 for one in best)
     assert all(one["relies_on"] == [] for one in best[:2])

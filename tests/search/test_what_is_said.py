@@ -128,7 +128,7 @@ def test_a_proposals_own_spec_is_recognised_and_another_is_not_called_a_proposal
     assert any("vary.wall_mm goes from 1.25 to 1.25 mm, and a wall is 1.5" in line for line in of_table["reasons"])
     between = [{**one, "wall_mm": 1.3, "cap_mm": 1.3} for one in thicker]
     lines = explanation_lines(explain(quiet, _spec(paper, 0, tmp_path, layers=between)))
-    assert any("not tried: its lengths lie between the steps" in line for line in lines)
+    assert any("not tried: its lengths are between the steps" in line for line in lines)
     motor = {"part": "LCM0720A3463F", "fill": True}
     filled = explanation_lines(explain(paper, _spec(paper, 0, tmp_path, motor=motor)))
     assert any("with another motor or circuit" in line for line in filled)

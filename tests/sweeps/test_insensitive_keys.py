@@ -83,7 +83,7 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path):
     assert warning in done.output
     told = json.loads((tmp_path / "b" / "batch.json").read_text())["estimate"]
     assert told["not_measured"] == {"layers.0.wall_mm": 1.25, "layers.1.wall_mm": 1.25}
-    assert told["not_read"] == {
+    assert told["insensitive"] == {
         "rule": ["layers.0.wall_mm", "layers.1.wall_mm"],
         "divider": ["layers.0.wall_mm", "layers.1.wall_mm"],
         "published": [],
