@@ -178,7 +178,7 @@ def run(asked: argparse.Namespace, scratch: Path) -> dict[str, Any]:
         parent = Node(net, "parent", "10.77.0.4", own_files=False)
         store.start([sys.executable, "-W", "ignore", "-c", STORE_SERVER.format(port=PORT)], "store")
         awaited(scratch / "logs" / "store", "ready", 1)
-        made = f"import fsspec; fsspec.filesystem('s3').mkdir({BUCKET!r})"
+        made = f"import s3fs; s3fs.S3FileSystem().mkdir({BUCKET!r})"
         assert parent.start([sys.executable, "-c", made], "parent").wait(LATE_S) == 0
         cluster = Cluster(net, asked.workers)
         return measured(asked, net, parent, cluster)

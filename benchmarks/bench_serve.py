@@ -4,8 +4,8 @@
 
 A number is typed: a unit's wall, an array's pitch or margin. The time ends with the frame after what is shown. Beside
 it stands the processor time of the answers, which other work on the machine changes little; the load average before and
-after says how much there was. `--write` puts the table into docs/serve.md. Needs the extras `serve` and `test`, and
-Chromium.
+after says how much there was. `--write` puts the table into docs/how-to/live-page.md. Needs the extras `serve` and
+`test`, and Chromium.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ SHOWN = {"unit": "unit and section", "moulds": "moulds judged", "estimate": "est
 NUMBERS = {
     "forearm-pockets": ("layout.pitch_mm", 20.0, 24.0),
     "forearm-patch": ("sheet.margin_mm", 3.0, 5.0),
-    "sleeve-curved": ("body.radius_mm", 40.0, 44.0),
+    "sleeve-curved": ("limb.radius_mm", 40.0, 44.0),
 }
 """What is typed, and from where to where, in what is no unit's spec."""
-DOCS = Path(__file__).resolve().parents[1] / "docs" / "serve.md"
+DOCS = Path(__file__).resolve().parents[1] / "docs" / "how-to" / "live-page.md"
 WARM = 5
 """Changes that do not count."""
 CHANGE = """async ([path, value]) => {
@@ -61,7 +61,7 @@ def main() -> None:
     parser.add_argument("--changes", type=int, default=40, help="of each spec")
     parser.add_argument("--specs", default="embedded,encapsulating,three-layer,forearm-pockets,forearm-patch")
     parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--write", action="store_true", help="the table into docs/serve.md")
+    parser.add_argument("--write", action="store_true", help="the table into docs/how-to/live-page.md")
     asked = parser.parse_args()
     measured, load = {}, os.getloadavg()[0]
     with chromium.browser() as running:
@@ -79,7 +79,7 @@ def main() -> None:
 
 
 def table(measured: dict[str, dict[str, list[list[float]]]], load: str, count: int) -> list[str]:
-    """The lines of docs/serve.md: milliseconds to what is shown, median and 95th percentile, and of the processor."""
+    """Return the lines of the page: milliseconds to what is shown, median and 95th percentile, and of the processor."""
     lines = [
         f"{os.cpu_count()} cores, load average {load}, {count} changes of each spec; "
         "median, 95th percentile, and in brackets the processor's median, in milliseconds:",

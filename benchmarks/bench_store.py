@@ -3,7 +3,7 @@
     python benchmarks/bench_store.py [--variants 1000] [--geometries 5] [--shards 4] [--only unit,moulds] [--json FILE]
 
 All in one process, one task after the other, on a store in a folder whose requests are counted. Processor time, so that
-other work on the machine does not count. docs/scale.md computes large batches from these figures.
+other work on the machine does not count. docs/explanation/scaling.md computes large batches from these figures.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ WORDS = {
     r"\bscissors": "small scissors",
     r"\bpin\b": "pin",
     r"\bspatula": "blunt spatula",
-    r"\blevel, or a small spirit level": "level",
+    r"\blay a level": "level",
     r"\bpaper\b": "paper",
     r"\bvice\b": "vice and two boards",
     r"\bpen\b": "pen",
@@ -81,11 +81,12 @@ def _degassing(procedure: Procedure) -> Iterator[str]:
 def _held(procedure: Procedure) -> Iterator[str]:
     """Hold an open cup down before it is struck off, and pull the tongue before a cup is lifted."""
     for pour in procedure.pours:
-        strike, hold = _first(pour.steps, "Strike off"), _first(pour.steps, f"Hold cup {pour.index} down")
+        strike, hold = _titled(pour.steps, "Strike off"), _titled(pour.steps, f"Hold cup {pour.index} down")
         cups = any(step.title == f"Cup {pour.index} on" for step in pour.steps)
         if cups and strike is not None and (hold is None or hold > strike):
             yield f"pour {pour.index}: nothing holds the cup down while it is struck off"
-        inserted, pull, lift = (_first(pour.steps, words) for words in ("on the ledge", "tongue out", "Lift cup"))
+        inserted, pull = (_titled(pour.steps, title) for title in ("Tongue home", "Tongue out FIRST"))
+        lift = _titled(pour.steps, f"Cup {pour.index} off")
         if inserted is not None and (pull is None or lift is None or pull > lift):
             yield f"pour {pour.index}: the cup is lifted over a tongue"
 
@@ -145,9 +146,9 @@ def _cured(procedure: Procedure) -> Iterator[str]:
             yield f"pour {pour.index}: cures for less than the silicone takes"
         elif TACK not in pour.steps[cures[0]].text:
             yield f"pour {pour.index}: nothing says how to tell cured silicone from tacky"
-    smeared = any("smear" in step.text for step in procedure.assembly)
-    if smeared and procedure.assembly[-1].kind != "cure":
-        yield "the smear that holds the motor is not cured"
+    fixed = any("silicone adhesive" in step.needs or "fill the ring" in step.text for step in procedure.assembly)
+    if fixed and procedure.assembly[-1].kind != "cure":
+        yield "what holds the motor is not cured"
 
 
 def _enough(procedure: Procedure) -> Iterator[str]:
@@ -174,9 +175,9 @@ def _propped(procedure: Procedure) -> Iterator[str]:
     """Bear the grip of every tongue that stands, and look at the ledge only where nothing covers it."""
     for pour in procedure.pours:
         for step in pour.steps:
-            if step.title == "Tongue home" and " hangs free: put" not in step.text:
+            if step.title == "Tongue home" and "stacked card" not in step.text:
                 yield f"pour {pour.index}: nothing bears the tongue's grip"
-            if pour.index > 1 and "none under it on the ledge" in step.text:
+            if pour.index > 1 and "none under it" in step.text:
                 yield f"pour {pour.index}: asks to look at a ledge that Layer 1 covers"
 
 
@@ -190,10 +191,10 @@ def _listed(procedure: Procedure) -> Iterator[str]:
 
 
 def _bought(procedure: Procedure) -> Iterator[str]:
-    """Buy what the pours take of each silicone, and the smear's batch on top."""
+    """Buy what the pours take of each silicone, and the ring's batch on top."""
     bought = {item.item: item.quantity for item in procedure.bill}
     batches = [(pour.material, pour.part_a_g + pour.part_b_g) for pour in procedure.pours]
-    layers = set(layers_named(step.text for step in procedure.assembly))
+    layers = set(layers_named(step.text for step in procedure.assembly if "fill the ring" in step.text))
     for material in dict.fromkeys(material for material, _ in batches):
         taken = sum(grams for name, grams in batches if name == material)
         there = sum(bought.get(f"{material} part {part}", 0.0) for part in "AB")
@@ -226,14 +227,17 @@ def _mixed_first(procedure: Procedure) -> Iterator[str]:
                 yield f"pour {pour.index}: {step.title} uses the mix before it is mixed"
 
 
-def _smeared(procedure: Procedure) -> Iterator[str]:
-    """Let the smear cure as long as the silicone that the steps name for it, and no other."""
+def _fixed(procedure: Procedure) -> Iterator[str]:
+    """Let the ring cure as long as the silicone that the steps name for it, and adhesive for a day."""
     silicones = [pour.material for pour in procedure.pours]
     hours = {pour.material: pour.cure_h for pour in procedure.pours}
-    for said in layers_named(step.text for step in procedure.assembly):
-        asked = hours[silicones[min(said, len(silicones) - 1)]]
-        if abs(procedure.assembly[-1].wait_min - 60 * asked) > 1e-6:
-            yield f"the smear is of layer {said % len(silicones) + 1}'s silicone and cures for another's time"
+    for step in procedure.assembly:
+        asked = 24.0 if "silicone adhesive" in step.needs else None
+        if "fill the ring" in step.text:
+            (said,) = layers_named([step.text])
+            asked = hours[silicones[min(said, len(silicones) - 1)]]
+        if asked and abs(procedure.assembly[-1].wait_min - 60 * asked) > 1e-6:
+            yield "what holds the motor cures for another's time"
 
 
 RULES = (
@@ -252,7 +256,7 @@ RULES = (
     _listed,
     _bought,
     _timed,
-    _smeared,
+    _fixed,
     _level_again,
     _mixed_first,
 )
@@ -263,6 +267,11 @@ def _all(procedure: Procedure) -> Iterator[BenchStep]:
     for pour in procedure.pours:
         yield from pour.steps
     yield from (*procedure.release, *procedure.assembly)
+
+
+def _titled(steps: tuple[BenchStep, ...], title: str) -> int | None:
+    """Return the number of the step (from 0) of that title."""
+    return next((i for i, step in enumerate(steps) if step.title == title), None)
 
 
 def _first(steps: tuple[BenchStep, ...], words: str) -> int | None:

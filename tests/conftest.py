@@ -3,9 +3,7 @@
 import os
 import signal
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -17,8 +15,17 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a 
 sys.path.append(str(Path(__file__).parent / "report"))
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Count a test that drives a browser or the slicer as long, unless it is marked `smoke`."""
+    for item in items:
+        slow = "running" in item.fixturenames or item.get_closest_marker("slicer")
+        if slow and not item.get_closest_marker("smoke"):
+            item.add_marker(pytest.mark.long)
+
+
 @pytest.fixture(scope="session")
-def running() -> Iterator[Any]:
+def running():
     """Chromium. Its absence is a failure in CI and a reason to skip elsewhere."""
     import chromium
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 from unitcad.shape import (
     Common,
@@ -21,6 +22,8 @@ from unitcad.shape import (
 )
 from unitcad.shape.body import Body
 
+LEADLESS = str(Path(__file__).with_name("leadless.toml"))
+"""A spec of a closed cavity without circuit and wires."""
 QUARTER = math.tan(math.pi / 8)
 
 LAYER1 = polygon((4.5, 0), (5.75, 0), (5.75, 3.36), (0, 3.36), (0, 2.11), (4.5, 2.11))

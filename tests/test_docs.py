@@ -1,31 +1,71 @@
-"""Every example in README.md and docs/ runs."""
+"""Every example in README.md and in docs/ and its folders runs, and every link leads somewhere."""
 
 from __future__ import annotations
 
+import os
 import re
-import shlex
-import shutil
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+from page_examples import BLOCK, ROOT, blocks, missing, pages, run_console
 
+from docs.generated import pages as generated_pages
 from unitcad.arrays.array_file import load_array
 from unitcad.validation import from_data
 
-ROOT = Path(__file__).parent.parent
-BLOCK = re.compile(r"^```(\w+(?: \w+)?)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+RUN = ("toml", "python", "python notebook", "python brep", "console")
+NOT_RUN = ("sh", "text", "json", "yaml")
 
 
 def _blocks(language: str) -> list:
     return [
-        pytest.param(text, id=f"{page.stem}-{i}")
-        for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-        for i, (found, text) in enumerate(BLOCK.findall(page.read_text("utf-8")))
-        if found == language
+        pytest.param(text, id=f"{page.relative_to(ROOT).with_suffix('')}-{i}")
+        for page in pages()
+        for i, text in enumerate(blocks(page, language))
     ]
+
+
+def _pages_with(language: str) -> list:
+    return [pytest.param(page, id=page.stem) for page in pages() if blocks(page, language)]
+
+
+def test_no_example_drops_out(tmp_path: Path) -> None:
+    """An independent walk, line by line, counts the fences; a page in a new folder is found."""
+    fences = [
+        line.removeprefix("```").strip()
+        for folder, _, files in [("", [], [str(ROOT / "README.md")]), *os.walk(ROOT / "docs")]
+        for file in files
+        if file.endswith(".md")
+        for line in Path(folder, file).read_text("utf-8").splitlines()
+        if line.startswith("```") and line != "```"
+    ]
+    assert set(fences) <= {*RUN, *NOT_RUN}
+    for language in RUN:
+        assert fences.count(language) == len(_blocks(language)) > 0, language
+    (tmp_path / "docs" / "a" / "b").mkdir(parents=True)
+    page = tmp_path / "docs" / "a" / "b" / "c.md"
+    page.write_text("# C\n\n```console\n$ python -c 'raise SystemExit(3)'\n```\n")
+    assert page in pages(tmp_path)
+    with pytest.raises(AssertionError, match="SystemExit"):
+        run_console(page, tmp_path)
+
+
+def test_shown_output_is_compared(tmp_path: Path) -> None:
+    output = ["a", "b", "c", "d"]
+    assert missing(["a", "...", "c", "d"], output) is None
+    assert missing(["a", "..."], output) is None
+    assert missing(["a", "c", "..."], output) == "c"
+    assert missing(["...", "c", "...", "b", "..."], output) == "b"
+    assert missing(["a", "b", "c"], output) == "d"
+    assert missing(["1 of ... made"], ["1 of 2 made"]) is None
+    assert missing(["1 of ... made"], ["1 of 2 lost"]) == "1 of ... made"
+    page = tmp_path / "page.md"
+    page.write_text("```console\n$ python -c 'print(1)'\n1\n$ python -c 'print(1)'\n```\n")
+    assert run_console(page, tmp_path) == 2
+    page.write_text("```console\n$ python -c 'print(1)'\n2\n```\n")
+    with pytest.raises(AssertionError, match="not in the output: '2'"):
+        run_console(page, tmp_path)
 
 
 @pytest.mark.parametrize("text", _blocks("toml"))
@@ -43,13 +83,13 @@ def test_python_examples_run(text: str, tmp_path: Path, monkeypatch: pytest.Monk
     exec(compile(text, "example", "exec"), {"__name__": "__main__"})
 
 
-def test_the_python_page_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "page", [page for page in pages() if blocks(page, "python notebook")], ids=lambda page: page.stem
+)
+def test_notebook_pages_run_from_top_to_bottom(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    page = (ROOT / "docs" / "python.md").read_text("utf-8")
-    cells = [text for language, text in BLOCK.findall(page) if language == "python notebook"]
-    assert len(cells) > 10
     names: dict[str, object] = {"__name__": "__main__"}
-    for i, cell in enumerate(cells):
+    for i, cell in enumerate(blocks(page, "python notebook")):
         exec(compile(cell, f"cell {i}", "exec"), names)
 
 
@@ -60,30 +100,22 @@ def test_examples_with_a_brep_library_run(text: str, tmp_path: Path, monkeypatch
     exec(compile(text, "example", "exec"), {"__name__": "__main__"})
 
 
-@pytest.mark.parametrize("text", _blocks("console"))
-def test_console_examples_run(text: str, tmp_path: Path) -> None:
-    for line in text.splitlines():
-        if not line.startswith(("$ unitcad", "$ python")) or "# not run:" in line:
-            continue
-        command, _, code = line[2:].partition("# exit ")
-        words = shlex.split(command, comments=True)
-        if words[0] == "unitcad":
-            words[0] = shutil.which("unitcad", path=str(Path(sys.executable).parent)) or "unitcad"
-        else:
-            words[0] = sys.executable
-        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
-        assert done.returncode == int(code or 0), f"{line}\n{done.stdout}{done.stderr}"
-        assert "Traceback" not in done.stderr
+@pytest.mark.parametrize("page", _pages_with("console"))
+def test_console_examples_run(page: Path, tmp_path: Path) -> None:
+    run_console(page, tmp_path)
 
 
 LINK = re.compile(r"\]\(([^)\s#]*)(?:#([^)\s]+))?\)")
 
 
-def _anchors(page: Path) -> set[str]:
+def _anchors(text: str) -> set[str]:
     """The headings of a page as GitHub writes them in links."""
-    headings = re.findall(r"^#+ +(.+?) *$", re.sub(BLOCK, "", page.read_text("utf-8")), re.MULTILINE)
+    headings = re.findall(r"^#+ +(.+?) *$", re.sub(BLOCK, "", text), re.MULTILINE)
     plain = [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower() for heading in headings]
     return {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in plain}
+
+
+GENERATED = {(ROOT / "docs" / name).resolve(): text for name, text in generated_pages().items()}
 
 
 def _lost(page: Path, text: str) -> list[str]:
@@ -93,18 +125,23 @@ def _lost(page: Path, text: str) -> list[str]:
         target, anchor = match.groups()
         if ":" in target:  # of the web
             continue
-        file = page if not target else page.parent / target
-        if not file.exists() or (anchor and file.suffix == ".md" and anchor not in _anchors(file)):
+        file = (page.parent / target).resolve() if target else page
+        content = GENERATED.get(file)
+        if content is None and file.is_file() and file.suffix == ".md":
+            content = file.read_text("utf-8")
+        if not (file.exists() or content) or (anchor and content is not None and anchor not in _anchors(content)):
             lost.append(match[0])
     return lost
 
 
 def test_links_within_the_pages_lead_to_a_file_and_a_heading() -> None:
-    pages = [*ROOT.glob("*.md"), *sorted((ROOT / "docs").glob("**/*.md"))]
-    assert {str(page): lost for page in pages if (lost := _lost(page, page.read_text("utf-8")))} == {}
-    python = ROOT / "docs" / "python.md"
-    assert _lost(python, "[a](batch.md#custom-designs) [b](https://a.b/#c)") == []
-    assert _lost(python, "[a](batch.md#of-ones-own) [b](nowhere.md)") == ["](batch.md#of-ones-own)", "](nowhere.md)"]
+    written = {page: page.read_text("utf-8") for page in [*ROOT.glob("*.md"), *pages()[1:]]}
+    assert {str(page): lost for page, text in {**written, **GENERATED}.items() if (lost := _lost(page, text))} == {}
+    python = ROOT / "docs" / "reference" / "python.md"
+    there = "../how-to/sweep.md#run-it"
+    assert _lost(python, f"[a]({there}) [b](https://a.b/#c) [c](mesh-rules.md#file)") == []
+    gone = ["](../how-to/sweep.md#of-ones-own)", "](nowhere.md)", "](mesh-rules.md#nothing)"]
+    assert _lost(python, "".join(f"[a{link}" for link in gone)) == gone
 
 
 def test_the_citation_names_this_version() -> None:
@@ -114,6 +151,6 @@ def test_the_citation_names_this_version() -> None:
 
 def test_no_page_waits_for_a_figure() -> None:
     waiting = re.compile(r"\b(?:TODO|TBD|FIXME|XXX|ESTIMATES|MEASURED_[A-Z]+)\b")
-    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]:
+    for page in pages():
         prose = re.sub(r"`[^`\n]*`", "", BLOCK.sub("", page.read_text("utf-8")))
         assert waiting.findall(prose) == [], page

@@ -65,16 +65,6 @@ def test_slivers_of_booleans_survive_the_rounding(x, y, angle, gap):
     assert volume == pytest.approx(solid.volume(), abs=64 * printing.resolution(vertices) * solid.surface_area())
 
 
-def test_plain_rounding_is_what_this_guards_against():
-    """The rounding alone leaves faces without area on such a body, so the tests above can fail."""
-    block = manifold3d.Manifold.cube((10, 10, 10)).rotate((0, 0, 20)).translate((40, 40, 0))
-    solid = block + block.translate((2e-7, 1e-7, 3e-7))
-    vertices, faces = arrays(solid)
-    rounded = trimesh.Trimesh(vertices.astype(np.float32).astype(float), faces, process=False)
-    assert (rounded.area_faces < 1e-9).any()
-    assert measured(*printing.print_ready(vertices, faces))[0]
-
-
 def test_a_body_thinner_than_single_precision_is_refused():
     vertices, faces = arrays(manifold3d.Manifold.cube((100, 100, 1e-7)))
     with pytest.raises(UnitcadError, match="single precision"):
@@ -107,13 +97,6 @@ def test_the_body_and_the_next_step_are_named_if_a_design_has_no_such_mesh(forma
         build(spec, tmp_path / "out", only=("unit",))
     assert (caught.value.field, caught.value.value) == ("design", "edge.py:unit")
     assert "layer1: " in str(caught.value)
-
-
-def test_ready_mesh_does_not_depend_on_the_order_of_faces():
-    vertices, faces = arrays(realise(cup().shape, 96))
-    first = printing.print_ready(vertices, faces)
-    again = printing.print_ready(*first)
-    assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
 
 
 def test_stl_bytes_are_the_format(tmp_path):

@@ -54,12 +54,6 @@ def test_the_nearer_face_is_seen_and_a_cut_takes_it_away() -> None:
     assert set(np.unique(raster.rasterise(vertices, faces, view(), 0.5)[2])) == {-1, 0, 1}
 
 
-def test_of_two_faces_in_one_place_the_later_one_is_seen() -> None:
-    faces = np.concatenate([FRONT, FRONT[:, [1, 2, 0]]])
-    for size in (100, 1200):  # in one block of pixels and in several
-        assert set(np.unique(raster.look(SQUARE, faces, view((size, size)))[0])) == {-1, 2, 3}
-
-
 @pytest.mark.parametrize("towards", [(1, -1.4, 0.9), (0, 0, 1), (0, 0, -1), (-0.1, 1, 0.15)])
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_view_keeps_lengths_and_hands(towards: tuple[float, float, float], turned: bool) -> None:
@@ -70,14 +64,6 @@ def test_a_view_keeps_lengths_and_hands(towards: tuple[float, float, float], tur
     assert camera.project(np.array([3.0, 4.0, 5.0])).tolist() == [[200.0, 100.0, 0.0]]
     assert camera.scale == pytest.approx(10)
     assert turned == (camera.up[2] < 0 or (camera.up[2] == 0 and camera.up[1] < 0))
-
-
-def test_points_fit_into_their_view() -> None:
-    points = np.random.default_rng(1).uniform(-7, 30, (50, 3))
-    at = raster.aim((1, -1.4, 0.9), points, (300, 200)).project(points)
-    assert (at[:, :2] > 0).all()
-    assert (at[:, :2] < [300, 200]).all()
-    assert ((np.ptp(at[:, :2], axis=0) / [300, 200]).max()) == pytest.approx(1 / 1.1)
 
 
 def test_front_back_and_background_have_their_colours() -> None:
@@ -142,18 +128,6 @@ def faults(owner: np.ndarray, boxes: dict[int, Box], ends: dict[int, tuple[float
     return found
 
 
-def test_the_judge_sees_faults() -> None:
-    owner = np.full((400, 600), -1)
-    owner[100:300, 150:400], owner[190:205, 400:560] = 0, 1
-    end = (200.0, 200.0)
-    assert faults(owner, {0: (0, 90, 10, 40), 1: (80, 100, 30, 50)}, {0: end, 1: end}) == [
-        "0 over 1",
-        "1's leader ends elsewhere",
-    ]
-    assert faults(owner, {0: (100, 160, 110, 140)}, {0: end}) == ["0 over a part"]
-    assert faults(owner, {0: (-5, 90, 10, 40)}, {0: end}) == ["0 off the page"]
-
-
 SETS = [(name, []) for name in sorted(templates())] + [
     ("encapsulating", ["moulds.cavities=[2, 2]", 'moulds.pour="injected"']),
     ("encapsulating", ['moulds.printer="sla"']),
@@ -195,16 +169,6 @@ def test_letters_lie_in_their_box_and_any_name_can_be_written() -> None:
         assert label.left <= columns.min()
         assert columns.max() < label.left + label.width
         assert np.ptp(rows) < label.height
-
-
-def test_names_of_one_place_meet_neither_each_other_nor_the_drawing() -> None:
-    owner = np.full((400, 600), -1)
-    owner[120:280, 200:400] = 0
-    names = [raster.Name(f"name {i}", (0.01 * i, 0.0, 0.0)) for i in range(20)]
-    labels = raster.place_names(names, owner >= 0, view((600, 400)))
-    boxes = {i: (one.left, one.left + one.width, one.top, one.top + one.height) for i, one in enumerate(labels)}
-    ends = {i: one.start for i, one in enumerate(labels)}
-    assert [fault for fault in faults(owner, boxes, ends) if "elsewhere" not in fault] == []
 
 
 @pytest.mark.parametrize("seed", range(6))

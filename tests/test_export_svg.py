@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sample_bodies import base, cup, layers, tube
 
-from unitcad.export import chart, svg
+from unitcad.export import svg
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, moved
 from unitcad.shape.body import Body
@@ -70,18 +70,6 @@ def test_main_dimensions_and_every_layer_are_there(template):
     assert wanted <= said
 
 
-CUSTOM = templates()["embedded"].parent / "custom"
-
-
-@pytest.mark.parametrize(
-    ("name", "wanted"),
-    [("strap-lugs", {"15", "4.61", "Ø7"}), ("film-closed", {"14", "4.36", "Ø7"}), ("dome", {"14", "4", "Ø7"})],
-)
-def test_a_custom_design_has_the_dimensions_of_its_sections(name, wanted):
-    said = {text.split("#")[0] for text in texts(ElementTree.fromstring(Variant.of(CUSTOM / f"{name}.toml").section()))}
-    assert {text for text in said if text.strip("ØR").replace(".", "").isdigit()} == wanted
-
-
 def test_regions_are_the_profiles():
     """Layer 1 of the sample: twice its half profile, less the slot through one wall and into the cap above the core."""
     first, second = svg.cut(layers(), 96)
@@ -133,12 +121,3 @@ def test_spread_keeps_order_and_distance(items):
     for left, right in pairwise(order):
         assert wanted[left] <= wanted[right]
         assert found[right] - found[left] >= (sizes[left] + sizes[right]) / 2 + 4 - 1e-6
-
-
-def test_spread_leaves_alone_what_has_room():
-    assert svg.spread([100, 0, 50], [10, 10, 10]) == [100, 0, 50]
-
-
-@pytest.mark.parametrize(("value", "shown"), [(-0.001, "0"), (1.25, "1.25"), (12.0, "12"), (1 / 3, "0.33")])
-def test_numbers_have_one_form(value, shown):
-    assert chart.number(value) == shown

@@ -62,17 +62,6 @@ def test_read_back_equals_written(parts):
         assert shown == tuple(round(255 * channel) for channel in part.colour)
 
 
-def test_parts_stand_on_the_bed_apart_from_each_other(parts):
-    boxes = placed_boxes(model(threemf.content(parts)))
-    for i, (low, high) in enumerate(boxes):
-        assert low[2] == 0
-        assert (low[:2] >= 0).all()
-        assert (high[:2] <= 220).all()
-        for other_low, other_high in boxes[:i]:
-            clear = np.maximum(low - other_high, other_low - high)[:2].max()
-            assert clear >= threemf.GAP_MM - 1e-5
-
-
 @given(st.lists(st.tuples(st.floats(0.1, 150), st.floats(0.1, 150)), min_size=1, max_size=12))
 def test_layout_never_overlaps(footprints):
     corners = threemf.layout(footprints, (220, 220))

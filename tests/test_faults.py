@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 from unitcad.cli import app
 from unitcad.errors import Refusal
+from unitcad.spec.toml_lines import line_of
 from unitcad.validation import load, put, read, templates
 from unitcad.validation.dotted import ABSENT, at
-from unitcad.validation.faults import line_of
 
 BAD = """\
 name = "bad"
@@ -212,6 +212,6 @@ def test_init_writes_no_python_and_names_the_schema_that_schema_writes(tmp_path:
 
 def test_the_shipped_sweeps_are_listed() -> None:
     done = CliRunner().invoke(app, ["list", "sweeps"])
-    assert [line.split("\t")[0] for line in done.output.splitlines()] == ["all-materials", "paper", "thickness"]
+    assert [line.split("\t")[0] for line in done.output.splitlines()] == ["all-materials", "published", "thickness"]
     assert all(len(line.split("\t")[1]) > 20 for line in done.output.splitlines())
     assert all(line.endswith(".") for line in done.output.splitlines())

@@ -123,11 +123,6 @@ def _circles(graph: dict[str, set[str]]) -> dict[str, set[str]]:
     return left
 
 
-def test_a_circle_of_files_is_seen() -> None:
-    assert _circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}) == {"b": {"c"}, "c": {"b"}}
-    assert _circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == {}
-
-
 def test_no_files_import_each_other_in_a_circle() -> None:
     graph = _file_imports(PACKAGE)
     assert len(graph) > 250
@@ -159,11 +154,6 @@ def _names_of_designs(text: str) -> list[str]:
     """The words of a file's code, texts and comments that are a shipped design's name, each with its line."""
     word = re.compile(rf"(?<![a-z])({'|'.join(shipped())})(?![a-z])", re.IGNORECASE)
     return [f"{line}: {named[0]}" for line, row in enumerate(text.splitlines(), 1) for named in word.finditer(row)]
-
-
-def test_a_design_that_is_named_is_seen() -> None:
-    lines = ["if EMBEDDED_RING:", "# a single-encapsulating unit", "embeddings = encapsulated", '"like encapsulating"']
-    assert _names_of_designs("\n".join(lines)) == ["1: EMBEDDED", "2: encapsulating", "4: encapsulating"]
 
 
 def test_no_design_is_named_outside_its_own_file() -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import sys
-from importlib import metadata
+from importlib import metadata, util
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from unitcad import errors
 from unitcad.errors import install_command
 
 
@@ -46,7 +48,25 @@ def test_an_address_is_installed_from_again(installed_from) -> None:
     assert installed_from(archive)[-1] == "unitcad[lab] @ https://git.example/unitcad-1.whl"
 
 
+def test_every_command_to_install_comes_from_the_one_function() -> None:
+    """Messages that spell one fail where the package came from elsewhere."""
+    package = Path(errors.__file__).parent
+    spelled = {
+        str(file.relative_to(package))
+        for file in package.rglob("*.py")
+        if re.search(r"pip[\"', ]+install|in a clone", file.read_text("utf-8"))
+    }
+    assert spelled == {"errors.py"}
+
+
 def test_a_folder_that_is_gone_is_a_clone_to_be_found(installed_from, tmp_path: Path) -> None:
     gone = {"url": (tmp_path / "gone").as_uri(), "dir_info": {}}
     assert installed_from(gone)[:3] == ["in", "a", "clone,"]
     assert installed_from(gone)[-1] == ".[lab]"
+
+
+def test_an_environment_without_pip_uses_uv(installed_from, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(util, "find_spec", lambda name: None)
+    source = {"url": "https://git.example/unitcad-1.whl", "archive_info": {}}
+    command = ["uv", "pip", "install", "--python", sys.executable]
+    assert installed_from(source) == [*command, "unitcad[lab] @ https://git.example/unitcad-1.whl"]

@@ -3,9 +3,11 @@
 import shlex
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
+import unitcad
 from unitcad.errors import UnitcadError
 from unitcad.kernels import ocp
 from unitcad.validation import load
@@ -73,3 +75,23 @@ def test_a_default_build_leaves_step_out_where_no_kernel_is(monkeypatch):
     assert load("embedded", ["output.formats=['step']"]).output.formats == ("step",)
     monkeypatch.undo()
     assert load("embedded").output.formats == ("step", "stl", "3mf")
+
+
+def test_show_uses_the_viewer_that_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[tuple[tuple, dict]] = []
+    viewer = SimpleNamespace(show=lambda *objects, **options: shown.append((objects, options)))
+    variant = unitcad.Variant.of("embedded")
+    names = list(variant.bodies)
+    installed: set[str] = set()
+    monkeypatch.setattr("unitcad.kernels.build123d.find_spec", lambda name: name in installed or None)
+    with pytest.raises(UnitcadError, match=r"no viewer is installed: .* install ocp-vscode"):
+        variant.show()
+    installed.add("yacv_server")
+    monkeypatch.setitem(sys.modules, "yacv_server", viewer)
+    variant.show()
+    assert shown[0][1] == {"names": names} == {"names": [child.label for child in shown[0][0]]}
+    installed.add("ocp_vscode")  # before YACV: it has the tree
+    monkeypatch.setitem(sys.modules, "ocp_vscode", viewer)
+    variant.show()
+    (assembly,) = shown[1][0]
+    assert [child.label for child in assembly.children] == names

@@ -31,7 +31,7 @@ def _direct() -> list[tuple[str, str]]:
 
 
 def test_the_page_has_every_dependency() -> None:
-    rows = re.findall(r"(?m)^\| (\S*) ?\| (\S+) \| (.+) \|$", (ROOT / "docs/licences.md").read_text("utf-8"))
+    rows = re.findall(r"(?m)^\| (\S*) ?\| (\S+) \| (.+) \|$", (ROOT / "docs/reference/licences.md").read_text("utf-8"))
     assert [(extra, package) for extra, package, _ in rows if package not in ("package", "---")] == _direct()
 
 

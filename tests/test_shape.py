@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from unitcad.kernels.mesh import area_true, arrays, realise, segment_count
+from unitcad.kernels.mesh import arrays, realise
 from unitcad.shape import (
     Extrude,
     Place,
@@ -30,12 +30,10 @@ from unitcad.shape import (
     rectangle,
     ring,
     rotated,
-    rounded_rectangle,
     turned,
     union,
 )
 from unitcad.shape.lettering import CHARACTERS, engraving
-from unitcad.shape.profile import points
 from unitcad.shape.tree import Turn
 
 lengths = st.floats(0.25, 50).map(mm)
@@ -96,14 +94,6 @@ def test_a_taper_has_the_volume_of_its_frustum() -> None:
     assert realise(frustum, 32).volume() == pytest.approx(28, rel=1e-12)
 
 
-@given(st.floats(0.5, 100), st.sampled_from([0.2, 0.05, 0.01, 0.002]))
-def test_a_meshed_circle_stays_within_the_tolerance(radius: float, tolerance: float) -> None:
-    n = segment_count(radius, tolerance)
-    corner = radius * area_true(n)
-    side = corner * math.cos(math.pi / n)
-    assert max(corner - radius, radius - side) <= tolerance
-
-
 def test_equal_trees_hash_equal_in_another_process_and_unequal_ones_do_not() -> None:
     tree = cut(union((ring(1, 2, 0, 1), moved(box(0, 1, 0, 1, 0, 1), x=3))), [turned(cylinder(0.5, 0, 2), "x", 1)])
     code = (
@@ -116,12 +106,6 @@ def test_equal_trees_hash_equal_in_another_process_and_unequal_ones_do_not() -> 
     assert content_hash(pickle.loads(pickle.dumps(tree))) == other
     assert content_hash(cylinder(1, 0, 1)) != content_hash(cylinder(1, 0, 1 + 1 / 1024))
     assert content_hash(union((tree,))) == content_hash(tree)
-
-
-def test_quarter_turns_are_exact() -> None:
-    body = box(0, 1, 0, 2, 0, 3)
-    assert realise(turned(body, "z", 1), 32).bounding_box() == pytest.approx((-2, 0, 0, 0, 1, 3), abs=0)
-    assert turned(body, "y", 4) is body
 
 
 def test_turns_by_any_angle_are_rotations_and_opposite_ones_mirror_each_other() -> None:
@@ -166,16 +150,3 @@ def test_every_character_is_one_piece_of_sound_outline(character: str) -> None:
     cells = solid.volume() / 0.4 / 0.64
     assert cells == pytest.approx(round(cells), abs=0.05)
     assert solid.genus() == {"0": 1, "6": 1, "8": 2, "9": 1, "A": 1, "B": 1, "D": 1}.get(character, 0)
-
-
-def test_characters_differ() -> None:
-    shapes = {content_hash(engraving(c, 0.8, 0, 1)) for c in CHARACTERS}
-    assert len(shapes) == len(CHARACTERS) == 17
-
-
-def test_arcs_get_their_share_of_a_turn() -> None:
-    section = points(rounded_rectangle(10, 8, 2), 64)
-    assert len(section) == 4 * 17
-    assert rounded_rectangle(10, 8, 2, key=5).area == pytest.approx(
-        20 * 16 - 3 * 4 * (1 - math.pi / 4) - 12.5, rel=1e-9
-    )

@@ -58,11 +58,3 @@ def test_a_lost_link_fails_the_site(tmp_path: Path) -> None:
     assert done.returncode != 0
     assert "nowhere.md" in done.stdout + done.stderr
     assert "#nothing" in done.stdout + done.stderr
-
-
-def test_what_is_loaded_from_outside_is_seen(tmp_path: Path) -> None:
-    (tmp_path / "a.html").write_text(
-        '<script defer src="https://a.b/c.js"></script><link rel="stylesheet" href="//a.b/c.css"><a href="https://a.b">'
-    )
-    (tmp_path / "a.css").write_text('@import "https://a.b/d.css"; x { background: url(https://a.b/e.png) }')
-    assert sorted(loaded(tmp_path)) == ["//a.b/c.css", "https://a.b/c.js", "https://a.b/d.css", "https://a.b/e.png"]

@@ -197,7 +197,7 @@ def _written(data: dict[str, Any]) -> dict[str, str]:
     own = {path: digest(content) for path, content in product.own.items()}
     for path in ("spec.toml", "manifest.json"):
         del own[path]
-    found = {key: repr(product.manifest[key]) for key in ("laws", "check", "warnings")}
+    found = {key: repr(product.manifest[key]) for key in ("mould_checks", "check", "warnings")}
     return {**own, **product.shared, **found}
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import subprocess
 import sys
 from pathlib import Path, PureWindowsPath
 
@@ -158,3 +160,14 @@ def test_a_name_that_the_terminal_lacks_is_shown_by_its_code(encoding: str, word
     else:  # click writes UTF-8 to a stream that claims to be ASCII
         shown = done.stdout + done.stderr
         assert any(name in shown for name in ("Größe Ω".encode(encoding, "backslashreplace"), "Größe Ω".encode()))
+
+
+def test_the_job_file_for_three_systems_fits_its_schema_and_names_what_there_is() -> None:
+    root = Path(__file__).parent.parent
+    job = root / ".github" / "workflows" / "systems.yml"
+    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.github-workflows", str(job)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    named = re.findall(r"tests/[\w/.]+", job.read_text())
+    assert len(named) > 3
+    assert [name for name in named if not (root / name).exists()] == []

@@ -14,7 +14,7 @@ numpy nor a CAD library.
 
 # pyright: strict
 
-# Nothing is imported here: with `python -m unitcad` the working directory is still where Python looks first.
+# Nothing is imported here: with `python -m unitcad` Python still looks in the working directory first.
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ _PLACES = {
     "templates": "validation:templates",
     "tissue": "catalogue:tissue",
 }
-"""Where each name is defined: a room, or a module and the name there."""
+"""Place of each name: a room, or a module and the name in it."""
 
 
 def __getattr__(name: str) -> object:

@@ -1,4 +1,4 @@
-"""Arguments of Python functions: what is of another type than a function takes is refused in one sentence."""
+"""Arguments of Python functions: a wrong type is refused in one sentence."""
 
 # pyright: strict
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copyreg
+import importlib.util
 import json
 import math
 import re
@@ -15,11 +16,11 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
-from unitcad.text import toml
+from unitcad.text import some, toml
 
 NEAREST = "; nearest accepted: "
-"""What a refusal's sentence names the nearest accepted value after."""
-UNIT_ALONE = "; --only unit makes the unit alone"
+"""The words before the nearest accepted value in a refusal."""
+UNIT_ALONE = "; --only unit makes only the unit"
 """How a refusal of moulds ends that leaves the unit possible."""
 
 
@@ -33,7 +34,7 @@ class UnitcadError(Exception):
         return {"message": str(self)}
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Come back from a worker as it was, whatever arguments the class takes."""
+        """Unpickle as it was, for any arguments of the class."""
         return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
 
@@ -46,6 +47,13 @@ def missing_extra(extra: str, need: str) -> Missing:
     return Missing(f"{need}: {install_command(extra)}")
 
 
+def pip_install() -> list[str]:
+    """Return the command that installs packages into this installation."""
+    if importlib.util.find_spec("pip") is None:  # an environment made by uv
+        return ["uv", "pip", "install", "--python", sys.executable]
+    return [sys.executable, "-m", "pip", "install"]
+
+
 def install_command(extras: str) -> str:
     """Return the command that adds extras to this installation, from the folder or address that it came from."""
 
@@ -56,7 +64,7 @@ def install_command(extras: str) -> str:
     url = source.get("url", "")
     local = url.startswith("file:")
     folder = Path(url2pathname(urlsplit(url).path)) if local else Path(__file__).parent.parent
-    command = [sys.executable, "-m", "pip", "install"]
+    command = pip_install()
     if (local or not url) and (folder / "pyproject.toml").is_file():
         if (folder / "constraints.txt").is_file():
             command += ["-c", str(folder / "constraints.txt")]
@@ -64,8 +72,10 @@ def install_command(extras: str) -> str:
         return shlex.join([*command, f"{folder}[{extras}]"])
     if vcs := source.get("vcs_info"):
         return shlex.join([*command, f"unitcad[{extras}] @ {vcs['vcs']}+{url}@{vcs['commit_id']}"])
-    if "archive_info" in source and not local:
+    if "archive_info" in source and (not local or folder.is_file()):
         return shlex.join([*command, f"unitcad[{extras}] @ {url}"])
+    if not url:
+        return shlex.join([*command, f"unitcad[{extras}]"])
     return f"in a clone, {shlex.join([*command, f'.[{extras}]'])}"
 
 
@@ -79,7 +89,7 @@ class Refusal(UnitcadError):
     """A value that is refused: its field, the value, the limit that it breaks and the nearest accepted value.
 
     `nearest` is a value that may be typed in `field`'s place and that meets this limit (it may then meet another one).
-    `value` is None for a field that is missing. `file` and `line` are where the value stands, `others` are further
+    `value` is None for a field that is missing. `file` and `line` are the place of the value, `others` are further
     faults of the same data; `unitcad.validation.load` fills them in.
     """
 
@@ -125,16 +135,14 @@ def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusa
 
     known = sorted(known)
     close = get_close_matches(value, known, n=3, cutoff=0.6)
-    most = _shown_of(known, _MOST_NAMES)
-    more = f" and {len(known) - most} more" if len(known) > most else ""
-    names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known[:most])}{more}"
+    names = f"closest: {', '.join(close)}" if close else f"known: {some(known)}"
     return kind(field, value, f"not known; {names}", close[0] if close else None)
 
 
 def unknown_key(field: str, value: object, known: Iterable[str], lists: str = "") -> UnknownKey:
     """Return a refusal of a key that no table has; `field` is its whole path, `known` the keys of that table.
 
-    The limit names the most similar keys first, and the command `lists`, which prints all, where it leaves any out.
+    The limit names the most similar keys first, and the command `lists`, which prints all, if it omits any.
     """
 
     table, _, key = field.rpartition(".")
@@ -148,26 +156,19 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
     )
     nearest = f"{table}.{best}" if table and best else best
     alike = sorted(known, key=lambda name: -SequenceMatcher(None, key, name).ratio())
-    most = _shown_of(known, _MOST_KEYS)
-    more = len(known) - most
-    rest = f" and {more} more{f' ({lists} lists all)' if lists else ''}" if more > 0 else ""
-    return UnknownKey(field, value, f"unknown key; known here: {', '.join(alike[:most])}{rest}", nearest)
-
-
-def _shown_of(names: list[str], most: int) -> int:
-    """Return how many names to show: the last one rather than its number."""
-    return most + 1 if len(names) == most + 1 else most
+    rest = f" ({lists} lists all)" if lists and len(known) > _MOST_KEYS + 1 else ""
+    return UnknownKey(field, value, f"unknown key; known here: {some(alike, _MOST_KEYS)}{rest}", nearest)
 
 
 def misfit(error: Exception) -> str:
-    """Say where data differs from what this program writes, from msgspec's error about it."""
-    # msgspec gives the place in its sentence alone. For what a person types `unitcad.spec.convert` walks the types
+    """Return the difference of data from this program's format, from msgspec's error."""
+    # msgspec gives the place only in its sentence. For typed files `unitcad.spec.convert` walks the types
     # instead; here the data is this program's own, and a sentence that reads otherwise only loses its detail.
-    what, _, place = str(error).partition(" - at `$")
-    if (byte := re.search(r"byte (\d+)", what)) or not re.match("Expected|Object|Invalid", what):
+    message, _, place = str(error).partition(" - at `$")
+    if (byte := re.search(r"byte (\d+)", message)) or not re.match("Expected|Object|Invalid", message):
         return f"it is not JSON{f' (byte {byte[1]})' if byte else ''}"
     place = place.rstrip("`").lstrip(".").replace("[...]", ".*") or "its top level"
-    if key := re.search(r"(missing|unknown)[^`]*`([^`]*)`", what):
+    if key := re.search(r"(missing|unknown)[^`]*`([^`]*)`", message):
         return f"{place} {'lacks the' if key[1] == 'missing' else 'has an unknown'} key {key[2]!r}"
     return f"{place} has a value of the wrong kind"
 
@@ -181,7 +182,7 @@ def shown(value: object) -> str:
 
 
 def _plain(value: object) -> bool | int | float | str | None:
-    """Return a value as JSON has it, and short: numbers that JSON lacks and whatever is long become text."""
+    """Return a value for JSON, shortened: long values and numbers that JSON lacks become text."""
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**_LONGEST:
@@ -201,7 +202,5 @@ def _text(value: object) -> str:
 
 _MOST_KEYS = 5
 """Keys of a table that are named for one that it does not have."""
-_MOST_NAMES = 10
-"""Names that are listed where none is close to one that is not known."""
 _LONGEST = 200
 """Characters of a value that are shown."""

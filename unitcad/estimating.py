@@ -36,9 +36,9 @@ def estimate_spec(
     """Return the estimate of a spec as JSON-ready data (`attenuation.edge.estimates`); same spec, same data.
 
     The model `fem` is a range for each drive and reading, under the key "fem"; it costs seconds and needs scikit-fem.
-    `say` is told how far it is.
+    `say` gets the progress.
 
-    Raises `Refusal` where no frequency is known, for an unknown material or tissue, and for values no body has.
+    Raises `Refusal` if no frequency is known, for an unknown material or tissue, and for values no body has.
     """
     variant, asked = estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models)
     data = estimate(variant, closed_forms(asked), layered, fit_of(spec))
@@ -84,7 +84,7 @@ def frequency_table_of_spec(
 def neighbours_of_specs(specs: Sequence[Spec], pitch_mm: float, frequencies_hz: Sequence[float] = ()) -> dict[str, Any]:
     """Return how far the first unit moves the others of a row, `pitch_mm` apart, on bare skin and with their masses.
 
-    At the first unit's frequency where none are given. Raises `Refusal` as `attenuation.receivers.neighbours_block`.
+    At the first unit's frequency if none are given. Raises `Refusal` as `attenuation.receivers.neighbours_block`.
     """
     variants = [estimate_input(spec) for spec in specs]
     return rounded(neighbours_block(variants, pitch_mm * 1e-3, frequencies_hz))
@@ -193,7 +193,7 @@ def _youngs_modulus(material: Material, frequency: Quantity) -> Quantity:
 
 
 def _quasistatic(material: Material) -> Quantity:
-    """Return the modulus of a slow pull in Pa, which says what it is; not known where nobody pulled the silicone."""
+    """Return the modulus of a slow pull in Pa, with its source; unknown if nobody pulled the silicone."""
     value = material.quasistatic_modulus_kpa
     if value is None:
         return Quantity(None, note="no quasistatic_modulus_kpa is known, which estimate.moduli asks for")

@@ -1,6 +1,6 @@
 """Reading of files that others may have written, and writing of whole files.
 
-Reading refuses what is not a regular file, before it is opened, and what is larger than allowed. Writing goes to a
+Reading refuses files that are not regular, before they are opened, and files that are too large. Writing goes to a
 fresh file in a scratch folder of an unpredictable name, then renames: nothing is written through a link at the target
 or at a temporary name, and the target is the old file or the new one, never half of it.
 """
@@ -16,6 +16,7 @@ import os
 import re
 import secrets
 import stat
+import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
@@ -29,12 +30,15 @@ LARGEST_TABLE = 256_000_000
 _PIECE = 1 << 20
 TEMPORARY = ".tmp-"
 MARK, LOCK = "unitcad-scratch", "unitcad-lock"
-"""The files in every scratch folder: the mark holds FORMAT, the folder's token, a name; the lock is held while its
-maker lives. They are two files, since nobody can read a locked file on Windows.
+"""Files in every scratch folder: the mark has FORMAT, the folder's token, a name; its running maker has the lock.
+
+They are two files, since nobody can read a locked file on Windows.
 """
 FORMAT = "unitcad scratch 1"
 _TOKEN = re.compile(re.escape(TEMPORARY) + "[0-9a-f]{16}")
 OLD, NEW = "old", "new"
+EMPTY_S = 60.0
+"""After this time an empty scratch folder belongs to no process that is just making or removing it."""
 _DEVICE = re.compile(r"con|prn|aux|nul|com[0-9]|lpt[0-9]", re.IGNORECASE)
 
 
@@ -45,7 +49,7 @@ class NotThere(UnitcadError):
 def read(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> bytes:
     """Return the content of a regular file of at most `largest` bytes; without `links` a symbolic link is refused.
 
-    Raises NotThere where there is no such file, UnitcadError for whatever else keeps it from being read.
+    Raises NotThere if there is no such file, UnitcadError for any other reason.
     """
     try:
         with open(path, "rb", opener=regular(links)) as file:
@@ -79,7 +83,7 @@ def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bo
 
 
 def sha256(path: str | os.PathLike[str]) -> str:
-    """Return the SHA-256 of a file of any size, read in pieces. Raises UnitcadError where it can't be read."""
+    """Return the SHA-256 of a file of any size, read in pieces. Raises UnitcadError if it can't be read."""
     found = hashlib.sha256()
     try:
         with open(path, "rb", opener=regular()) as file:
@@ -119,12 +123,12 @@ def regular(links: bool = True) -> Callable[[str, int], int]:
 def in_the_way(folder: Path) -> UnitcadError:
     """Return the error for a folder that can't be made since it, or one above it, is a file."""
     file = next(path for path in (*reversed(folder.parents), folder) if os.path.lexists(path) and not path.is_dir())
-    what = "a file, not a folder" if file.exists() else "a link to a folder that is missing"
-    return UnitcadError(f"{file}: is {what}; choose another with -o")
+    kind = "a file, not a folder" if file.exists() else "a link to a folder that is missing"
+    return UnitcadError(f"{file}: is {kind}; choose another with -o")
 
 
 def write(path: Path, content: bytes, *, sync: bool = False) -> None:
-    """Write a file in place of what is at `path`; with `sync` it is on the disk at the end. Raises OSError."""
+    """Write a file, replacing the one at `path`; with `sync` it is on the disk at the end. Raises OSError."""
     with writing(path, sync=sync) as file:
         file.write(content)
 
@@ -152,7 +156,7 @@ def replace_all(
     """Write files into a folder in place of those of a former run: of names that match `former`, none other is left.
 
     All are written under another name first. The file `last` is removed before anything is changed and put in place
-    at the end: it stands for a whole result. Raises OSError.
+    at the end: it marks a whole result. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with scratch(folder) as fresh:
@@ -171,7 +175,7 @@ def replace_all(
 
 
 def write_new(path: str | os.PathLike[str], content: bytes, *, sync: bool = False) -> None:
-    """Make a file that is not there yet; none is left where that fails.
+    """Make a file that is not there yet; none is left if that fails.
 
     Raises FileExistsError, also for a link, or OSError.
     """
@@ -191,7 +195,7 @@ def write_new(path: str | os.PathLike[str], content: bytes, *, sync: bool = Fals
 
 
 def seen_from(path: str | os.PathLike[str], folder: str | os.PathLike[str] = ".") -> str:
-    """Return a path as seen from a folder, with slashes; the whole path where that is on another drive of Windows."""
+    """Return a path as seen from a folder, with slashes; the whole path if that is on another drive of Windows."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:
@@ -204,7 +208,7 @@ def names_device(name: str) -> bool:
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring a folder's names to the disk; nothing where the system can't. Raises OSError."""
+    """Bring a folder's names to the disk; nothing if the system can't. Raises OSError."""
     if os.name != "posix":
         return
     handle = os.open(folder, os.O_RDONLY)
@@ -218,7 +222,7 @@ def sync_folder(folder: Path) -> None:
 def scratch(parent: Path, name: str = "") -> Iterator[Path]:
     """Make a folder in `parent` with an unpredictable name and our mark inside, removed with the block.
 
-    `name` is what in `parent` the work is for; `leftovers` yields it with the folder of a killed process.
+    `name` is the entry of `parent` that the work is for; `leftovers` yields it with the folder of a killed process.
     """
     from filelock import FileLock
 
@@ -240,7 +244,7 @@ def scratch(parent: Path, name: str = "") -> Iterator[Path]:
 
 
 def _remove_scratch(folder: Path) -> None:
-    """Remove a scratch folder: quickly where its work has left nothing but lock and mark."""
+    """Remove a scratch folder: quickly if its work has left only lock and mark."""
     try:
         for name in (MARK, LOCK):
             with contextlib.suppress(FileNotFoundError):
@@ -255,8 +259,8 @@ def _remove_scratch(folder: Path) -> None:
 def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
     """Yield the scratch folders in `parent` whose process is gone, each with its name, locked meanwhile.
 
-    Only real folders with our mark and their own token inside are yielded, and those that hold an empty lock alone:
-    their process ended before it wrote the mark, or after it had removed it.
+    Only real folders with our mark and their own token inside are yielded, and those without a mark that contain an
+    empty lock, or nothing for EMPTY_S: their process ended before it wrote the mark, or after it had removed it.
     """
     from filelock import FileLock
 
@@ -281,8 +285,10 @@ def _marked(folder: Path) -> str | None:
     try:
         if not stat.S_ISDIR(folder.lstat().st_mode):
             return None
-        if _TOKEN.fullmatch(folder.name) and [(e.name, e.lstat().st_size) for e in folder.iterdir()] == [(LOCK, 0)]:
-            return ""
+        if _TOKEN.fullmatch(folder.name):
+            inside = [(entry.name, entry.lstat().st_size) for entry in folder.iterdir()]
+            if inside == [(LOCK, 0)] or (not inside and time.time() - folder.lstat().st_mtime > EMPTY_S):
+                return ""
         form, token, name, rest = read_text(folder / MARK, largest=1000, links=False).split("\n")
     except (UnitcadError, ValueError, OSError):
         return None

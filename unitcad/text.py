@@ -11,7 +11,7 @@ from typing import Any, SupportsFloat
 
 _INVISIBLE = re.compile(
     "[\x00-\x1f\x7f-\x9f"  # control characters, escape among them
-    "\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"  # which turn the direction of what follows
+    "\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"  # which turn the direction of the following text
     "\u2028\u2029\ufeff\ufff9-\ufffb\ufffe\uffff"
     "\ud800-\udfff\U000e0000-\U000e007f]"  # halves of characters, tags
 )
@@ -43,19 +43,19 @@ def markdown(text: str) -> str:
 
 
 def cell(text: str) -> str:
-    """Return a text for a cell of a CSV table, quoted where a spreadsheet would take it for a formula."""
+    """Return a text for a cell of a CSV table, quoted if a spreadsheet would take it for a formula."""
     return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
 
 
 @lru_cache(maxsize=4096)
 def toml_key(key: str) -> str:
-    """Write a key as TOML has it: in quotes where it must be."""
+    """Write a key as TOML has it: in quotes if needed."""
     plain = key.isascii() and key.replace("-", "").replace("_", "").isalnum()
     return key if plain else toml(key)
 
 
 def toml(value: Any) -> str:
-    """Write a value as TOML has it, in one line: tables and lists inline; what TOML lacks as its text.
+    """Write a value as TOML has it, in one line: tables and lists inline; other values as text.
 
     tomli-w writes whole files, and lists over several lines.
     """
@@ -71,7 +71,7 @@ def toml(value: Any) -> str:
 def number(value: SupportsFloat, digits: int = 6, zeros: bool = False) -> str:
     """Return a number as a person reads it, to so many significant digits: never -0, no power of ten.
 
-    `zeros` keeps those at its end, as an instrument shows them: 1.00. What is below a millionth is 0; from 1e15 on a
+    `zeros` keeps those at its end, as an instrument shows them: 1.00. Numbers below a millionth are 0; from 1e15 on a
     power of ten has to say it.
     """
     return _number(float(value), digits, zeros)
@@ -90,6 +90,14 @@ def listed(words: Iterable[str]) -> str:
     """Return words as a list in a sentence: "base, cups and lids"."""
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last
+
+
+def some(words: Iterable[object], most: int = 10) -> str:
+    """Return the first words of a list, each cut at 60 characters, and the number of the others: "a, b and 7 more"."""
+    every = list(words)
+    shown = [str(word) for word in (every if len(every) <= most + 1 else every[:most])]
+    more = f" and {len(every) - len(shown)} more" if len(every) > len(shown) else ""
+    return ", ".join(word if len(word) <= 63 else f"{word[:60]}..." for word in shown) + more
 
 
 def spaced(name: str) -> str:

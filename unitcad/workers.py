@@ -128,7 +128,7 @@ class Pool(Executor):
         heard: Callable[[Any], object] = lambda value: None,
         **kwargs: Any,
     ) -> Call:
-        """Call a function, which a worker imports by its name; "module:name" where this process need not load it.
+        """Call a function, which a worker imports by its name; "module:name" if this process need not load it.
 
         The result raises what the function raises, WorkerEnded also after `seconds`, and NoWorker. `heard` takes each
         value that the function passes to `tell`, in a thread of this pool.
@@ -266,7 +266,7 @@ class _Worker:
         returned, value = message
         if returned == "raised":
             if isinstance(value, MemoryError):
-                self.end("is out of memory")  # memory that its objects hold is not free for the next call
+                self.end("is out of memory")  # memory of its objects is not free for the next call
             raise value
         return value
 
@@ -352,7 +352,7 @@ def tell(value: object) -> None:
 
 @contextlib.contextmanager
 def limit(seconds: float | None) -> Iterator[None]:
-    """End this worker if the block takes longer: by a C thread, which runs even while a kernel holds the GIL."""
+    """End this worker if the block takes longer: by a C thread, which runs even while a kernel has the GIL."""
     if seconds is not None:
         faulthandler.dump_traceback_later(seconds, exit=True, file=_answers or sys.__stderr__ or sys.stderr)
     try:
@@ -403,7 +403,7 @@ def _serve() -> None:
     _die_with_parent()
     # Not SIG_IGN, which programs that are started here would inherit.
     signal.signal(signal.SIGINT, lambda number, frame: None)
-    # What a kernel reads or prints is kept off the messages.
+    # Input and output of a kernel are kept off the messages.
     requests, _answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)

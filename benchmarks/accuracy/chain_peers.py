@@ -9,7 +9,7 @@ import numpy as np
 
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.chains import CHAINS as SHIPPED
-from unitcad.lab.chains import paper
+from unitcad.lab.chains import bandpass
 from unitcad.lab.chains.chain import Chain, ChainTable
 from unitcad.lab.chains.line import fit_line
 
@@ -55,14 +55,14 @@ def _of(chain: Chain) -> Callable[[Floats, float], float]:
 
 
 CHAINS: dict[str, Callable[[Floats, float], float]] = {
-    "paper, zero-phase, half peak-to-peak, whole record": partial(
-        paper.amplitude, ChainTable(measure="peak", trim_s=0.0)
+    "bandpass, zero-phase, half peak-to-peak, whole record": partial(
+        bandpass.amplitude, ChainTable(measure="peak", trim_s=0.0)
     ),
-    "same, ends trimmed": partial(paper.amplitude, ChainTable(measure="peak")),
-    "paper, zero-phase, RMS, trimmed": partial(paper.amplitude, ChainTable()),
-    "paper, causal, RMS, trimmed": partial(paper.amplitude, ChainTable(zero_phase=False)),
+    "same, ends trimmed": partial(bandpass.amplitude, ChainTable(measure="peak")),
+    "bandpass, zero-phase, RMS, trimmed": partial(bandpass.amplitude, ChainTable()),
+    "bandpass, causal, RMS, trimmed": partial(bandpass.amplitude, ChainTable(zero_phase=False)),
     "FFT peak, rectangular window": fft_peak,
     "FFT, flat-top window": flat_top,
     "lock-in, fixed frequency": lock_in,
-    **{name: _of(make(ChainTable())) for name, make in SHIPPED.items() if name != "paper"},
+    **{name: _of(make(ChainTable())) for name, make in SHIPPED.items() if name != "bandpass"},
 }

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Cell, Result, Say, Table
-from unitcad.accuracy.left_out import EVERYTHING, REQUESTS, Request, time_requests
+from unitcad.accuracy.skipped import EVERYTHING, REQUESTS, Request, time_requests
+from unitcad.pipeline.make import Subject
 from unitcad.pipeline.plan import OUTPUTS
 from unitcad.validation import default_template, load, templates
 
@@ -21,10 +22,10 @@ def run(quick: bool, say: Say) -> Result:
     rows: list[tuple[Cell, ...]] = []
     for name in chosen:
         say(name)
-        times = time_requests(load(name), _REQUESTS, 1 if quick else 3)
+        times = time_requests(Subject(load(name)), _REQUESTS, 1 if quick else 3)
         whole = times[EVERYTHING].median
         for request, time in times.items():
-            left = "; ".join(f"{entry['what']} ({entry['why']})" for entry in time.value["left_out"])
+            left = "; ".join(f"{entry['output']} ({entry['reason']})" for entry in time.value["skipped"])
             rows.append((name, request, str(time), time.median / whole, left or "nothing"))
     return Result(
         suite="left-out",

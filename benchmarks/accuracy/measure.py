@@ -20,7 +20,7 @@ from benchmarks.accuracy.synthetic_records import (
     synthetic,
 )
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE
-from unitcad.lab.chains import paper
+from unitcad.lab.chains import bandpass
 from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.chains.line import Mains, fit_line
 from unitcad.lab.measuring import level
@@ -62,13 +62,13 @@ def run(quick: bool, say: Say) -> Result:
         coverage.append(_coverage(scenario, trials))
     say("levels")
     repeats = [_level_coverage(count, 1000 if quick else 10000) for count in (3, 5)]
-    gains = [(hz, paper.gain(ChainTable(), hz), paper.gain(ChainTable(zero_phase=False), hz)) for hz in _GAIN_HZ]
+    gains = [(hz, bandpass.gain(ChainTable(), hz), bandpass.gain(ChainTable(zero_phase=False), hz)) for hz in _GAIN_HZ]
     return Result(
         suite="measure",
         title="Signal chains of a measurement",
         text=(
             f"Amplitudes of synthetic records of {LENGTH_S:g} s at {RATE / 1000:g} kHz whose truth is known, by this "
-            "program's chains `line` and `paper` and by four that are in use, all on the same records: 12 to 300 um, "
+            "program's chains `line` and `bandpass` and by four in use, all on the same records: 12 to 300 um, "
             f"100 to 150 Hz, drift of the frequency {100 * WHOLE.drift:g} %, wander of the amplitude "
             f"{100 * WHOLE.wander:g} %, mains, harmonics, spin-up, noise of 1/{WHOLE.snr:g}. The truth is the "
             "amplitude's mean over the record once the motor runs. A comb at 50 Hz takes 100 and 150 Hz away: there "
@@ -146,8 +146,12 @@ def run(quick: bool, say: Say) -> Result:
                 "Hz",
                 "gain",
                 {
-                    "forwards and backwards": tuple((hz, max(paper.gain(ChainTable(), hz), 1e-4)) for hz in _FINE_HZ),
-                    "forwards": tuple((hz, max(paper.gain(ChainTable(zero_phase=False), hz), 1e-4)) for hz in _FINE_HZ),
+                    "forwards and backwards": tuple(
+                        (hz, max(bandpass.gain(ChainTable(), hz), 1e-4)) for hz in _FINE_HZ
+                    ),
+                    "forwards": tuple(
+                        (hz, max(bandpass.gain(ChainTable(zero_phase=False), hz), 1e-4)) for hz in _FINE_HZ
+                    ),
                 },
                 curves=("forwards and backwards", "forwards"),
                 linear_x=True,
@@ -165,7 +169,7 @@ def run(quick: bool, say: Say) -> Result:
             ),
             *(Promise(f"level from {r[0]} + {r[0]}: part outside 95 %", round(1 - r[1], 6), 0.06) for r in repeats),
             *(Promise(f"level from {r[0]} + {r[0]}: part within 95 %", r[1], 0.98) for r in repeats),
-            Promise("paper: gain at 100 Hz", paper.gain(ChainTable(), 100.0), 1e-6),
+            Promise("bandpass: gain at 100 Hz", bandpass.gain(ChainTable(), 100.0), 1e-6),
         ),
         measured={**machine("numpy", "scipy"), "records": trials, "seed": SEED},
         summary=_summary(rows, coverage),

@@ -16,7 +16,7 @@ from unitcad.attenuation.edge.ranges import Predictive, lead_on
 
 JUDGED = (RULE, BASELINE, "published")
 LEVELS = (0.03, 0.06, 0.12, 0.25, 0.5)
-"""Wishes "at most this much at the edge"."""
+"""Targets "at most this much at the edge"."""
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 RANGE = 0.8
 """What the range from 10 to 90 % should hold."""
@@ -104,7 +104,7 @@ def pairs(own: Sequence[Judged]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def score(own: Sequence[Judged]) -> float:
-    """Return the Brier score over that of saying, for each wish, the share of the other units that met it."""
+    """Return the Brier score over that of saying, for each target, the share of the other units that met it."""
     p, met = pairs(own)
     shape = (len(own), len(LEVELS))
     share = (met.reshape(shape).sum(axis=0) - met.reshape(shape)) / (len(own) - 1)
@@ -150,12 +150,12 @@ def _reliability(judged: dict[str, list[Judged]]) -> Table:
             shares = (float(p[inside].mean()), float(met[inside].mean())) if count else (None, None)
             ends = "{:.2f} to {:.2f}".format(*interval(int(met[inside].sum()), count)) if count else "-"
             rows.append((name, f"{low:g} to {high:g}", count, *shares, ends))
-    wishes = ", ".join(f"{100 * level:g} %" for level in LEVELS)
+    targets = ", ".join(f"{100 * level:g} %" for level in LEVELS)
     return Table(
-        "Reliability: probabilities of meeting a wish, and how often it was met",
+        "Reliability: probabilities of meeting a target, and how often it was met",
         ("model", "probability", "judgements", "mean probability", "share met", "95 % interval of the share"),
         tuple(rows),
-        f"Wishes: at most {wishes} at the edge, of each of the nine units. The judgements of one unit hang together, "
+        f"Targets: at most {targets} at the edge, of each of the nine units. The judgements of one unit hang together, "
         "so the true intervals are wider than these.",
     )
 
@@ -171,7 +171,7 @@ def _coverage(judged: dict[str, list[Judged]]) -> Table:
         ("model", "ranges that held", "95 % interval of the share", "nominal", "Brier score over the share's"),
         tuple(rows),
         "Nine units can't tell 0.8 from much of what is near it: the interval says how much. A score below 1 says more "
-        "than the share of the other units that met the wish.",
+        "than the share of the other units that met the goals.",
     )
 
 

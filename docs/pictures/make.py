@@ -24,6 +24,7 @@ from live import WALL, Live  # noqa: E402
 from PIL import Image  # noqa: E402
 from running import serving  # noqa: E402
 
+from unitcad import Variant  # noqa: E402
 from unitcad.arrays.array_file import load_array  # noqa: E402
 from unitcad.arrays.crosstalk_maps import crosstalk_files  # noqa: E402
 from unitcad.arrays.patch import patch_moulds  # noqa: E402
@@ -32,11 +33,10 @@ from unitcad.cache import MemoryStore  # noqa: E402
 from unitcad.lab.phantom import phantom_set  # noqa: E402
 from unitcad.lab.phantom.phantom_files import box_picture  # noqa: E402
 from unitcad.lab.phantom.recipe import load_phantom  # noqa: E402
-from unitcad.pipeline import Variant  # noqa: E402
 from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # noqa: E402
 from unitcad.pipeline.write import build  # noqa: E402
 from unitcad.report import write_report  # noqa: E402
-from unitcad.validation import load  # noqa: E402
+from unitcad.validation import compound_kind, load  # noqa: E402
 
 ARRAY_PICTURES = {"skin-side": "patch-skin-side", "tools": "tools"}
 MOST_BYTES = 250_000
@@ -49,7 +49,11 @@ def main() -> None:
     parser.add_argument("--look", type=Path, metavar="DIR", help="screenshots of the pages into DIR")
     look = parser.parse_args().look
     with tempfile.TemporaryDirectory() as scratch:
-        made = screenshots(look, Path(scratch)) if look else {**pictures(), **arrays(), **pages(Path(scratch))}
+        made = (
+            screenshots(look, Path(scratch))
+            if look
+            else {**pictures(), **gallery(), **arrays(), **pages(Path(scratch))}
+        )
     for name, content in sorted(made.items()):
         target = (look or HERE) / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -76,6 +80,17 @@ def pictures() -> dict[str, bytes]:
     return {name: small(image) for name, image in made.items()}
 
 
+def gallery() -> dict[str, bytes]:
+    """The cards of docs/gallery: units cut open, arrays seen from the skin's side."""
+    made = {}
+    for path in sorted((HERE.parent / "gallery").glob("*.toml")):
+        if compound_kind(path):
+            made[path.stem] = patch_pictures(patch_moulds(load_array(str(path))))["pictures/patch-skin-side.png"]
+        else:
+            made[path.stem] = unit_cut_open(Variant.of(str(path)))
+    return {f"gallery-{name}.png": small(image) for name, image in made.items()}
+
+
 def arrays() -> dict[str, bytes]:
     """Patches from the skin's side, and their tools taken apart."""
     array = load_array("forearm-pockets")
@@ -91,7 +106,7 @@ def arrays() -> dict[str, bytes]:
             for kind, files in drawn.items()
             for name, path in ARRAY_PICTURES.items()
         },
-        "array-band-worn.png": band["pictures/patch-worn.png"],
+        "array-band-bent.png": band["pictures/patch-bent.png"],
         "array-band-tools.png": band["pictures/tools.png"],
         "array-curved-tools.png": sleeve["pictures/tools.png"],
         "array-curved-pour2.png": sleeve["pictures/pour2.png"],

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 from benchmarks.accuracy import ball_reference
 from unitcad.accuracy import survey
 from unitcad.accuracy.amplification import amplifications, extremes
-from unitcad.accuracy.left_out import left_out_rows
 from unitcad.accuracy.meshes import mesh_rows, tolerances_of
 from unitcad.accuracy.responses import COMPONENTS, REFERENCE, RTOLS, compare, respond, response_rows
+from unitcad.accuracy.skipped import skipped_rows
 from unitcad.attenuation.inputs import Quantity, body
 from unitcad.attenuation.layered import LayeredMedium
 from unitcad.attenuation.layered.loads import UniformDisc
@@ -24,6 +24,8 @@ from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
 from unitcad.kernels.mesh import area_true
+from unitcad.pipeline.make import Subject
+from unitcad.pipeline.subjects import load_subject
 from unitcad.shape import Revolve
 from unitcad.shape.profile import Profile
 from unitcad.validation import load
@@ -126,12 +128,28 @@ def test_the_specs_own_tolerance_is_among_the_five() -> None:
 
 def test_a_request_leaves_out_what_it_does_not_ask_for() -> None:
     spec = load("single-embedded", ["output.formats=['stl']"])
-    rows = {row["request"]: row for row in left_out_rows(spec)}
-    left = {name: {one["what"] for one in row["left_out"]} for name, row in rows.items()}
+    rows = {row["request"]: row for row in skipped_rows(Subject(spec))}
+    left = {name: {one["output"] for one in row["skipped"]} for name, row in rows.items()}
     assert {"moulds", "estimate", "casting"} <= left["unit only"]
     assert left["STL, no checks"] >= {"mould checks", "mesh checks"}
     assert "boundary representation" in left["as the spec asks"] - left["everything"]
     assert rows["unit only"]["s"] + rows["unit only"]["saved_s"] == pytest.approx(rows["everything"]["s"])
+
+
+def test_an_array_is_measured_as_it_is_cast(monkeypatch: pytest.MonkeyPatch) -> None:
+    pair = ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3, 10]"]
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.skipped_rows", lambda subject: [])
+    sets = [word for change in pair for word in ("--set", change)]
+    done = CliRunner().invoke(app, ["accuracy", "forearm-pockets", *sets, "--json"])
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert len(found["meshes"]) == 5
+    assert all(row["within_bounds"] for row in found["meshes"])
+    subject = load_subject("forearm-pockets", pair)
+    bodies = {body.name for body in (*subject.moulds.unit, *subject.moulds.plan.tools)}
+    assert {row["body"] for row in found["meshes"]} <= bodies
+    triangles = [row["triangles"] for row in found["meshes"]]
+    assert triangles == sorted(triangles)
 
 
 def test_a_survey_repeats_by_its_seed_and_names_what_is_worst() -> None:
@@ -187,13 +205,13 @@ def test_options_of_the_survey_are_refused_for_a_spec(words: list[str], field: s
 def test_the_command_shows_every_part(form: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     mesh_row = {"tolerance_mm": 0.1, "distance_mm": None, "triangles": 12, "within_bounds": False}
     monkeypatch.setattr("unitcad.accuracy.accuracy_command.mesh_rows", lambda *_: [mesh_row])
-    monkeypatch.setattr("unitcad.accuracy.accuracy_command.left_out_rows", lambda spec: [])
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.skipped_rows", lambda spec: [])
     done = CliRunner().invoke(app, ["accuracy", "single-embedded", *form])
     assert done.exit_code == 1, done.stderr
     assert "an error exceeds its bound" in done.stderr
     if form:
         assert list(json.loads(done.stdout)) == [
-            "spec", "meshes", "response", "extremes", "amplification", "left_out"
+            "spec", "meshes", "response", "extremes", "amplification", "skipped"
         ]  # fmt: skip
     else:
         for part in ("meshes of unit", "Response of the skin", "Stiff or extreme", "motion of the skin", "Left out"):

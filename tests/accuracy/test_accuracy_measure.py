@@ -24,7 +24,7 @@ def test_the_suite_keeps_its_promises(monkeypatch: pytest.MonkeyPatch) -> None:
     result = measure.run(True, lambda stage: None)
     by_chain = {row[0]: row for row in result.tables[0].rows}
     assert by_chain["line"][1] < 0.2
-    assert by_chain["paper, zero-phase, RMS, trimmed"][3] < -30
+    assert by_chain["bandpass, zero-phase, RMS, trimmed"][3] < -30
     assert by_chain["FFT peak, rectangular window"][2] > 10
-    assert {promise.what: promise.ok for promise in result.promises}["paper: gain at 100 Hz"]
+    assert {promise.what: promise.ok for promise in result.promises}["bandpass: gain at 100 Hz"]
     assert RATE == 2000.0

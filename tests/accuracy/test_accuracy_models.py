@@ -2,14 +2,11 @@
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from benchmarks.accuracy.level_scores import simulated
-from benchmarks.accuracy.plot import LEGEND_LETTERS, svg
-from benchmarks.accuracy.result import Plot
 from benchmarks.accuracy.unexplained import NineLevels, unexplained
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.edge.models import assessments
@@ -58,27 +55,6 @@ def test_who_gives_the_measured_orders_is_found_and_a_tie_is_no_order():
     text = unexplained(measured_table(), solved, {"table": ordered}, assessments()["published"])
     assert "D10 < E10 < D30, is given by table." in text
     assert text.count("is given by table.") == 3
-
-
-PLOT = Plot("p", "x", "y", {"one": ((1.0, 1.0), (10.0, 0.1)), "other": ((2.0, 1.0), (1.0, 1.0))}, frontier=True)
-
-
-def test_markers_off_the_frontier_are_hollow():
-    markers = re.findall(r"<(circle|polygon) [^>]*?(fill=\"[^\"]*\")", svg(PLOT))
-    # "other" is drawn first, below; then "one", then both in the legend.
-    hollow = 'fill="none"'
-    assert [fill == hollow for _, fill in markers] == [False, True, False, False, False, False]
-    assert [kind for kind, _ in markers] == ["polygon", "polygon", "circle", "circle", "circle", "polygon"]
-    assert hollow not in "".join(re.findall(r"<(?:circle|polygon)[^>]*>", svg(replace(PLOT, frontier=False))))
-
-
-def test_a_long_legend_is_wrapped():
-    name = "finite elements, without the circuit"
-    lines = re.findall(r">([^<]+)</text>", svg(Plot("p", "x", "y", {name: ((1.0, 1.0),)})))
-    assert name not in lines
-    start = next(i for i, line in enumerate(lines) if line.startswith("finite"))
-    assert f"{lines[start]} {lines[start + 1]}" == name
-    assert len(lines[start]) <= LEGEND_LETTERS
 
 
 def test_the_estimates_page_says_how_often_the_range_misses():

@@ -9,10 +9,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from benchmarks.accuracy import kernel_agreement, runner
+from benchmarks.accuracy import runner
 from benchmarks.accuracy.command import accuracy
 from benchmarks.accuracy.pages import front
 from benchmarks.accuracy.plot import svg
@@ -27,7 +26,6 @@ from benchmarks.accuracy.result import (
     kept,
     markdown,
     shown,
-    stars,
 )
 from unitcad.accuracy.timing import PROCESSOR, interleaved, timing
 from unitcad.errors import Refusal, UnitcadError
@@ -49,13 +47,6 @@ def test_a_promise_is_kept_up_to_its_limit_and_never_by_nan():
     assert not Promise("", 1.1, 1.0).ok
     assert not Promise("", math.nan, 1.0).ok
     assert not RESULT.ok
-
-
-def test_a_promise_about_a_numpy_number_can_be_written():
-    result = Result("a", "A", "", promises=(Promise("error", np.float64(1e-3), 1e-2),))
-    assert json.loads(json.dumps(result.as_dict()))["promises"] == [
-        {"what": "error", "value": 1e-3, "limit": 1e-2, "ok": True}
-    ]
 
 
 def test_fastest_of_what_is_exact_enough():
@@ -81,17 +72,6 @@ def test_promises_are_a_line_with_the_tightest():
     promises = [Promise("none", 0, 0), Promise("loose", 0.1, 1.0), Promise("tight", 0.09, 0.1)]
     assert kept(promises) == "3 promises, all kept; the tightest: tight (0.09, limit 0.1)"
     assert kept(promises[:1]) == "1 promise, all kept"
-
-
-def test_an_error_beyond_use_has_no_star():
-    points = [(1.0, 0.96), (2.0, 0.5), (3.0, 1e-3), (4.0, 1e-3)]
-    assert stars(points) == ["*", "*", "*", ""]
-    assert stars(points, most=0.1) == ["", "", "*", ""]
-
-
-def test_lines_of_text_are_unchanged():
-    text = markdown(Result("speed", "Speed", "", (Table("it prints", (), (("a | b   c",), ("d",))),)))
-    assert "**it prints**\n\n```text\na | b   c\nd\n```" in text
 
 
 def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
@@ -128,15 +108,6 @@ def test_the_front_page_has_picks_plots_and_a_line_for_every_suite():
     assert "| [Mould checks](accuracy/moulds.md) | - | - |  |" in text
 
 
-def test_the_front_page_has_the_faster_b_rep_library_alone():
-    worst = {name: {"volume": 1e-15} for name in ("manifold3d", "build123d", "CadQuery")}
-    times = [("build123d", "0.5 s", 1.25), ("CadQuery", "0.4 s", 1.0), ("manifold3d", "6 ms", 0.015)]
-    picks = kernel_agreement.summary(worst, times, 0.2).picks
-    assert [pick for what, _, pick in picks if "B-reps" in what] == ["CadQuery: 0.4 s"]
-    picks = kernel_agreement.summary(worst, [("build123d", "0.3 s", 0.75), *times[1:]], 0.2).picks
-    assert [pick for what, _, pick in picks if "B-reps" in what] == ["build123d: 0.3 s"]
-
-
 def test_the_worst_case_on_the_front_page_is_that_of_every_table_of_its_page():
     """The Hankel line once said 0.20 of a bound where its page had 0.306."""
     results = {result.suite: result for result in runner.read(Path(__file__).parents[2] / "docs")}
@@ -158,10 +129,6 @@ def test_the_worst_case_on_the_front_page_is_that_of_every_table_of_its_page():
     assert said
     assert float(said[1]) == pytest.approx(max(over), abs=0.006)
     assert "A plus after a commit" in front(list(results.values()))
-
-
-def test_the_front_page_shows_four_pictures():
-    assert front(runner.read(Path(__file__).parents[2] / "docs")).count("[![") == 4
 
 
 def test_a_bad_option_or_folder_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -1,7 +1,5 @@
 """Tessellation: the libraries' own meshes, the exact volume of what is revolved alone, and the text that cites rows."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -56,20 +54,3 @@ def test_the_text_cites_rows():
     text = tessellation._default({"layer2": ROWS}, (0.1, 0.01, 0.003))
     assert "1.0e-06 of volume, 0.007 mm, 400 triangles, 2 ms (at 0.003 mm: 1.0e-07, 0.001 mm, 900, 4 ms)" in text
     assert "1/15 of the play between printed faces (0.15 mm)" in text
-
-
-def test_the_front_page_has_the_fastest_mesh_for_all_bodies():
-    by_body = {
-        "motor": ROWS,
-        "layer2": [replace(r, distance=2 * r.distance, time=timing([3 * r.time.median])) for r in ROWS],
-    }
-    plot, summary = tessellation.overall(by_body), tessellation.summary(by_body)
-    assert plot.series["CadQuery"] == ((pytest.approx(0.2), 0.004), (pytest.approx(0.24), 0.004))
-    assert (
-        "meshes of 2 bodies: distance from the exact surface",
-        "0.1 mm",
-        "manifold3d, area-true at 0.01 mm: 8 ms",
-    ) in (summary.picks)
-    assert "0.01 mm" in [error for _, error, _ in summary.picks]
-    assert "0.002 mm: manifold3d, area-true at 0.003 mm: 16 ms" in [f"{e}: {pick}" for _, e, pick in summary.picks]
-    assert summary.worst == "layer2 at 0.01 mm: 0.014 mm, 0.93 of its limit"

@@ -129,34 +129,6 @@ def test_errors_hold_on_random_media(kind):
     assert max(_off(one.medium, one.load, one.omega, one.r, one.z, (0.1, 1e-3, 1e-5, 1e-7, 1e-9))) <= 1
 
 
-@pytest.mark.parametrize(
-    ("kind", "seed"), [("undamped", 140), ("wide contrast", 124), ("extreme contrast", 202611220002)]
-)
-def test_the_reference_has_bits_enough_for_every_medium(kind, seed):
-    """With 320 bits it was off by 2 % on the last one, and found too many panels to halve on all three."""
-    one = trial(kind, seed)
-    assert max(_off(one.medium, one.load, one.omega, one.r, one.z, (0.1, 1e-5, 1e-9))) <= 1
-    for k in (10.0, 500.0):
-        kernel = Kernel(one.medium, one.omega, one.z, one.load)
-        value = kernel(np.array([k]))[0]
-        kernel.bits *= 2
-        kernel._describe()
-        assert np.max(np.abs(kernel(np.array([k]))[0] - value)) < 1e-15 * np.max(np.abs(value))
-
-
-@pytest.mark.parametrize("omega", [0.0, 785.0])
-@pytest.mark.parametrize("kind", ["nearly fluid film", "extreme contrast", "wide contrast"])
-def test_the_bits_that_it_starts_with_change_no_value(kind, omega):
-    """Balls hold whatever the precision is, and one that is too wide is computed again with more bits."""
-    for seed in range(3):
-        medium, k = trial(kind, seed).medium, np.array([3.0, 300.0, 3e4])
-        kernels = [Kernel(medium, omega, 1e-3, Point("tangential")) for _ in range(2)]
-        kernels[1].bits = 2048
-        kernels[1]._describe()
-        few, many = (kernel(k) for kernel in kernels)
-        assert np.all(np.abs(few - many) <= 1e-15 * np.max(np.abs(many), axis=1, keepdims=True))
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("kind", CLASSES)
 @pytest.mark.parametrize("seed", range(100, 190))

@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.linalg import solve_circulant
-from scipy.stats import norm
 
 from benchmarks.accuracy import cramer_rao
 from benchmarks.accuracy.cramer_rao import amplitude_bound
@@ -44,27 +42,6 @@ def test_mains_beside_the_line_raise_the_bound(hz: float) -> None:
     mains = (0.0, part, part)
     scenario = replace(PLAIN, mains=mains)
     assert amplitude_bound(scenario, hz) == pytest.approx(expected, rel=0.01)
-
-
-@pytest.mark.parametrize("mean", [0.0, 0.5, 0.79, 0.8, 0.83, 1.0])
-def test_what_a_cut_off_sample_tells_of_its_mean(mean: float) -> None:
-    """The expected square of the score by quadrature."""
-    limit, deviation = 0.8, 1 / 30
-
-    def density(x: float) -> float:
-        return float(norm.pdf(x, mean, deviation))
-
-    inside = quad(lambda x: ((x - mean) / deviation**2) ** 2 * density(x), -limit, limit, limit=500, points=[mean])[0]
-    sides = [(density(limit), norm.sf(limit, mean, deviation)), (density(-limit), norm.cdf(-limit, mean, deviation))]
-    outside = sum(d**2 / p for d, p in sides if p > 1e-200)
-    found = cramer_rao._left_by_clipping(np.array([mean]), limit, deviation)[0] / deviation**2
-    assert found == pytest.approx(inside + outside, rel=1e-4)
-
-
-def test_clipping_takes_two_thirds_of_the_information_and_more() -> None:
-    """The third harmonic of a line that is cut off at 0.8 hides in what is cut off."""
-    assert 3.2 < amplitude_bound(replace(PLAIN, clip=0.8), 127.3) / amplitude_bound(PLAIN, 127.3) < 3.5
-    assert amplitude_bound(replace(PLAIN, clip=2.0), 127.3) == pytest.approx(amplitude_bound(PLAIN, 127.3), rel=1e-6)
 
 
 def test_the_bound_in_coloured_noise_is_that_of_its_covariance() -> None:

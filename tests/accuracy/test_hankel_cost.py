@@ -7,7 +7,6 @@ import pytest
 
 from benchmarks.accuracy import hankel_cost
 from benchmarks.accuracy.hankel import RADII, cases
-from unitcad.accuracy.timing import Timing
 
 FOREARM = cases()[0].medium
 
@@ -35,21 +34,3 @@ def test_every_load_at_the_surface_and_at_depth_keeps_its_bound(monkeypatch):
     (table,) = hankel_cost.tables(costs, [])
     assert len(table.rows) == 4
     assert hankel_cost.plots(costs, []) == []
-
-
-def test_tables_and_plots_by_number():
-    time = Timing(1e-3, 1e-3, 1e-3)
-    numbers = {"radii": (1, 13, 100, 1000), "layers": (1, 4, 10, 100), "frequencies": (1, 10, 100)}
-    costs = [
-        hankel_cost.Cost(name, 0.0, of, count, rtol, {"r": rtol / 9}, 0.1, time)
-        for name in hankel_cost.LOADS
-        for of, counts in numbers.items()
-        for count in counts
-        for rtol in hankel_cost.TOLERANCES
-    ]
-    loads = [replace(cost, z=z) for cost in costs if cost.count == 13 for z in (0.0, 3e-3)]
-    tables, plots = hankel_cost.tables(loads, costs), hankel_cost.plots(loads, costs)
-    assert [len(table.rows) for table in tables] == [12, 6, 6, 6]
-    assert tables[1].rows[0][1] == "1 ms, 1.1e-07"
-    assert [len(plot.series) for plot in plots] == [6, 8, 8, 6]
-    assert len(plots[1].series["disc, tangential, 1000"]) == 3

@@ -14,22 +14,18 @@ from hypothesis import strategies as st
 
 from benchmarks.accuracy import extremes
 from benchmarks.accuracy.runner import JOURNALS
-from unitcad.accuracy import outcomes
 from unitcad.accuracy.outcomes import (
     BUILT,
-    CIRCLE,
     GOOD,
-    MOULD_CHECK,
     REFUSED,
     Outcome,
-    build_outcome,
     outcome,
     put_in,
     refusal_of,
 )
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, Seeded, random_spec, seeded_spec
 from unitcad.checks import check_moulds
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec.toml import text_of
 from unitcad.validation import from_data
@@ -113,36 +109,8 @@ def test_the_docs_have_the_documented_ranges():
         assert f"| `{name}` | {low:g} | {high:g} |" in page, name
 
 
-def test_a_refusal_without_a_field_is_a_fault(monkeypatch):
-    def refuse(data):
-        raise Refusal("", 1, "nothing may be")
-
-    monkeypatch.setattr(outcomes, "from_data", refuse)
-    assert build_outcome(seeded_spec(0)).kind not in GOOD
-
-
 def test_a_seed_is_a_spec():
     assert seeded_spec(5) == seeded_spec(5) != seeded_spec(6)
-
-
-def test_faults_are_seen(monkeypatch):
-    """A refusal whose value changes nothing is a circle; a failed mould check is no build."""
-    import unitcad.accuracy.outcomes as outcomes
-    from unitcad.moulds import concentric
-
-    monkeypatch.setattr(outcomes, "put_in", lambda data, where, value: data)
-    refused = next(data for data in map(seeded_spec, range(50)) if refusal_of(data) is not None)
-    assert outcomes.outcome(refused).kind == CIRCLE
-    monkeypatch.setattr(concentric, "seals", lambda *_: [])
-    data = {
-        "name": "leaks",
-        "design": "encapsulating",
-        "diameter_mm": 14.0,
-        "fpcb": {},
-        "layers": [{"material": "ecoflex-00-30", "wall_mm": 2.5, "cap_mm": 2.5}],
-        "output": {"formats": ["stl"], "tolerance_mm": 0.1},
-    }
-    assert build_outcome(data).kind == MOULD_CHECK
 
 
 @pytest.mark.long

@@ -136,19 +136,3 @@ def test_the_path_goes_around_a_pole_on_its_other_side(height, moves, corner):
     assert 100.0 < foot.real < 103.3 < end.real < 110.0
     assert top.real == pytest.approx(103.3)
     assert np.sign(top.imag) == corner
-
-
-def test_the_path_stays_where_the_side_of_a_pole_is_not_known():
-    kernel, _ = _sampled(103.3, PANEL)
-    found = poles(kernel, NODES, TO_LEGENDRE, np.array([20.0]))
-    which, _ = around(PANEL[None], found, np.inf, lambda panel, loss: found)
-    assert not which[0]
-
-
-def test_two_poles_are_not_taken_for_one():
-    one, _ = _sampled(103.3, PANEL)
-    two, _ = _sampled(103.3 + 1e-6, PANEL)
-    other, _ = _sampled(107.0, PANEL)
-    assert np.max(poles(one + other, NODES, TO_LEGENDRE, np.array([20.0])).rest) > 1e-2
-    opposite = one - np.array([[[1.0]], [[-1.0]]]) * two
-    assert np.max(poles(opposite, NODES, TO_LEGENDRE, np.array([20.0])).rest) > 1e-8

@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.cli import app
 from unitcad.errors import Refusal
-from unitcad.sweeps.sweep import load_sweep
 
 run = CliRunner()
 
@@ -87,21 +86,3 @@ def test_build_writes_an_array_and_its_page(tmp_path: Path) -> None:
     assert (folder / "bench.html").is_file()
     assert (folder / "units/encapsulating/report.html").is_file()
     assert "1 unit on a sheet" in done.stderr
-
-
-@pytest.mark.parametrize("command", ["build", "estimate"])
-def test_an_unknown_name_is_told_the_arrays_too(command: str) -> None:
-    done = run.invoke(app, [command, "ankle-cuff"])
-    assert isinstance(done.exception, Refusal)
-    assert all(name in done.exception.limit for name in ("encapsulating", "forearm-patch", "hex-19"))
-    near = run.invoke(app, [command, "forearm-pocket"])
-    assert isinstance(near.exception, Refusal)
-    assert near.exception.nearest == "forearm-pockets"
-
-
-def test_a_batch_tells_the_arrays_too(tmp_path: Path) -> None:
-    file = tmp_path / "sweep.toml"
-    file.write_text('base = "hex-20"\n[sweep]\nmode = "product"\n"sheet.margin_mm" = [3, 4]\n')
-    with pytest.raises(Refusal) as refused:
-        load_sweep(file)
-    assert (refused.value.field, refused.value.nearest) == ("base", "hex-19")

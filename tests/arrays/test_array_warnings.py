@@ -16,9 +16,7 @@ from unitcad.arrays.patch import patch_moulds
 from unitcad.checks.gap import play_missing
 from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.groove_depths import shallow_grooves
-from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build as build_array
-from unitcad.validation import load
 
 
 def test_144_motors_need_a_tail_of_29_mm() -> None:
@@ -60,11 +58,3 @@ def test_manifest_and_page_say_it(tmp_path: Path, only: str) -> None:
     page = write_array_page(built.folder, print).read_text("utf-8")
     assert escape(circuit) in page
     assert escape(groove) in page
-
-
-def test_a_single_units_set_says_it_too() -> None:
-    moulds = MouldSet(load("encapsulating", {"moulds.groove_depth_mm": 3.3}))
-    (said,) = shallow_grooves(moulds)
-    assert "moulds.groove_depth_mm = 3.3 mm" in said
-    assert "on cup 1 and" in said
-    assert shallow_grooves(MouldSet(load("encapsulating", {"moulds.groove_depth_mm": 0.6}))) == []

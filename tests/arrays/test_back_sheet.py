@@ -9,19 +9,13 @@ from functools import cache
 
 import pytest
 
+from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds, mould_checks
-from unitcad.checks.draw import blocked
 from unitcad.errors import Refusal
-from unitcad.export import stl
-from unitcad.export.printing import print_ready
-from unitcad.kernels.mesh import arrays
-from unitcad.meshcheck import Options, check_bytes
-from unitcad.moulds.cavities import united
 from unitcad.moulds.removal import Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, union
-from unitcad.spec import printer_of
 
 Change = Callable[[Shape], Shape]
 
@@ -53,11 +47,7 @@ def test_every_mould_check_holds(overrides: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("overrides", VARIANTS[:4], ids=[" ".join(v) for v in VARIANTS[:4]])
 def test_every_tool_prints_without_support(overrides: tuple[str, ...]) -> None:
-    moulds = patch(*overrides)
-    for body in (*moulds.unit, *moulds.plan.tools):
-        content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
-        printer = printer_of(moulds.spec) if body.made == "printed" else None
-        assert check_bytes(content, f"{body.name}.stl", Options(printer=printer)).findings == ()
+    assert mesh_findings(patch(*overrides)) == []
 
 
 def test_the_silicone_has_the_volume_of_its_lengths() -> None:
@@ -80,17 +70,6 @@ def test_the_silicone_has_the_volume_of_its_lengths() -> None:
     inner = 9 * math.pi * (5.75**2 * 3.36 - 4.5**2 * 2.11) - 12 * notch(4.5, 5.75) * 2.11
     assert layer2 == pytest.approx(sheet + rings, rel=1e-3)
     assert layer1 == pytest.approx(inner, rel=2e-3)
-
-
-def test_the_base_goes_down_since_the_last_cup_can_not_go_up() -> None:
-    moulds = patch()
-    last = moulds.plan.steps[-1]
-    order = [(removal.piece, removal.direction) for removal in last.removals]
-    assert order[-2:] == [("base", (0, 0, -1)), ("cast", (0, 0, 1))]
-    assert all(piece.startswith("stub") for piece, _ in order[:-2])
-    # The sheet lies on the cup between the units: its area, less the bores and the posts of the strap slots.
-    held = blocked(moulds.solids["cup2"], united(moulds.meshes(last.layer)), (0, 0, 1))
-    assert held == pytest.approx(moulds.mesh(moulds.unit[1]).slice(4.0).area() - 9 * math.pi * 7**2, rel=1e-3)
 
 
 def test_a_cup_goes_on_the_pins_in_one_attitude_only() -> None:
@@ -155,16 +134,6 @@ def test_an_impossible_order_is_caught() -> None:
         steps = (*plan.steps[:-1], replace(last, removals=order))
         found = mould_checks()["C300"].findings(patch_moulds(moulds.arranged, replace(plan, steps=steps)))
         assert not all(f.ok for f in found)
-
-
-def test_a_tail_into_a_neighbour_is_an_overlap() -> None:
-    """A unit's own tail of 10 mm reaches x = 17, and the neighbour begins at 13."""
-    moulds = patch_moulds(load_array("forearm-patch"))
-    circuit = moulds.laid_later[-1]
-    tail = box(-1.5, 1.5, 0, 17, 2.0, 2.11)
-    moulds.__dict__["laid_later"] = (*moulds.laid_later[:-1], replace(circuit, shape=union((circuit.shape, tail))))
-    found = [f.where for f in mould_checks()["C200"].findings(moulds) if not f.ok]
-    assert found == ["unit: layer1 and circuit", "unit: layer2 and circuit"]
 
 
 def test_corners_of_the_circuit_that_reach_into_silicone_are_refused_before_they_overlap() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import asdict
 from itertools import pairwise
@@ -12,11 +11,10 @@ import pytest
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import back_sheet_procedure
 from unitcad.arrays.patch import patch_moulds
-from unitcad.casting.drawings import HELD, TAPE_WIDTH, side_places, tape_places
+from unitcad.casting.drawings import HELD, TAPE_WIDTH, tape_places
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import pour_warnings
 from unitcad.casting.written import to_markdown
-from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.shape.lettering import seen
 
 
@@ -40,19 +38,6 @@ def test_the_silicone_of_all_units_is_mixed_once(made: Procedure) -> None:
     net = [next(f.value for f in pour.figures if f.name == "in the cavities, net") for pour in made.pours]
     assert net == [pytest.approx(1.90, abs=0.02), pytest.approx(7.35, abs=0.02)]
     assert any("1.90 + 7.35 = 9.25 g" in line for line in made.measure)
-
-
-def test_words_speak_of_the_pieces_that_are_there(made: Procedure) -> None:
-    steps = [*made.preparation, *(step for pour in made.pours for step in pour.steps), *made.release, *made.assembly]
-    words = " ".join(step.text for step in steps)
-    assert "plinth" not in words
-    assert "tongue" not in words
-    assert "over the pins" in words
-    assert "Solder the 9 motors to the circuit's pads" in words
-    (circuit,) = [item for item in made.bill if item.item == "flexible circuit"]
-    assert circuit.quantity == 1
-    assert "cup 1 and blade upside down" in " ".join(made.printing)
-    assert "unitcad build array.toml --slice -o sliced" in " ".join(made.printing)
 
 
 def test_every_step_has_its_own_title_and_what_joins_all_units_counts_once(made: Procedure) -> None:
@@ -90,21 +75,6 @@ def test_the_words_name_marks_faces_and_lengths_of_this_set(made: Procedure) -> 
     assert all("leave it in the middle" in text and "towards that corner" not in text for text in on)
 
 
-def test_the_level_is_asked_for_the_longest_surface(made: Procedure) -> None:
-    """0.1 mm over 76 mm are 0.075 degrees: finer than a phone shows."""
-    (level,) = [step.text for step in made.preparation if step.title == "Level the bench"]
-    assert f"at {math.degrees(math.atan(0.1 / 76)):.2g} degrees" in level
-    assert "long spirit level" in level
-
-
-def test_pieces_of_split_tools_have_readable_names() -> None:
-    moulds = patch_moulds(load_array("wrist-band"))
-    made = back_sheet_procedure(moulds, [100.0] * 2, 1000.0)
-    printed = [item.item for item in made.bill if item.made.startswith("printed")]
-    assert printed[:4] == ["base, piece 1", "base, piece 2", "cup 1, piece 1", "cup 1, piece 2"]
-    assert f"at {math.degrees(math.atan(0.1 / 271.82)):.2g} degrees" in " ".join(s.text for s in made.preparation)
-
-
 def test_each_piece_of_a_long_tool_is_held_down() -> None:
     """A strip of tape for each 60 mm, and one between any two seams of base and cups, clear of the filaments."""
     moulds = patch_moulds(load_array("wrist-band"))
@@ -140,48 +110,6 @@ def test_a_pour_that_outlasts_its_pot_life_is_warned_of() -> None:
         assert [line.split(" in pour")[0] for line in warned] == ["mixing and pouring outlast the pot life"] * late
 
 
-def test_each_piece_of_a_base_in_three_is_held_and_levered() -> None:
-    """The middle piece is too narrow for a strip beside its filaments: one reaches 1 mm over a seam."""
-    moulds = patch_moulds(load_array("forearm-patch", ["moulds.bed_x_mm=60"]))
-    (base, *_), places = moulds.plan.splits, tape_places(moulds)
-    half = moulds.plan.layout.cup[0]
-    assert len(base.pieces) == 3
-    for low, high in pairwise((-half, *(seam.line[0][0] for seam in base.seams), half)):
-        assert max(min(high, at + TAPE_WIDTH) - max(low, at) for at in places) >= TAPE_WIDTH - 1
-    made = back_sheet_procedure(moulds, [100.0] * 2, 1000.0)
-    (off,) = [step.text for step in made.release if step.title == "Base off, downwards"]
-    assert "in every pry slot; at a piece that has none" in off
-    assert "Leave the tape over the seams of the underside on" in off
-    assert "The tape stays on until the base is off" in " ".join(step.text for step in made.preparation)
-
-
-def test_pieces_between_others_have_tape_on_the_other_sides() -> None:
-    """A base in three rows: the middle one reaches neither front nor back; its strip leaves the pry slot free."""
-    moulds = patch_moulds(load_array("forearm-patch", ["layout.rows=12", "moulds.bed_y_mm=100"]))
-    (base, *_) = moulds.plan.splits
-    assert (len(base.pieces), base.columns) == (3, 1)
-    assert side_places(moulds)
-    for at in side_places(moulds):
-        assert at >= PRY_HALF_WIDTH or at + TAPE_WIDTH <= -PRY_HALF_WIDTH
-    low, high = (seam.line[0][0] for seam in base.seams)
-    assert any(low <= at and at + TAPE_WIDTH <= high for at in side_places(moulds))
-    made = back_sheet_procedure(moulds, [100.0] * 2, 1000.0)
-    hold = next(step.text for step in made.pours[0].steps if step.title == "Hold cup 1 down")
-    assert "On each of the two other sides" in hold
-    (tape,) = [item for item in made.bill if item.item == "adhesive tape"]
-    assert tape.quantity == 2 * 2 * (len(tape_places(moulds)) + len(side_places(moulds)))
-
-
-@pytest.mark.parametrize(
-    ("changes", "cut_alike"), [(["layout.columns=8", "moulds.bed_x_mm=140"], False), (["moulds.bed_x_mm=60"], True)]
-)
-def test_pins_hold_no_cup_in_line_that_is_cut_where_the_base_is(changes: list[str], cut_alike: bool) -> None:
-    made = back_sheet_procedure(patch_moulds(load_array("forearm-patch", changes)), [100.0] * 2, 1000.0)
-    (join,) = [step.text for step in made.preparation if step.title == "Join the pieces"]
-    assert ("The pins hold the pieces of each cup in line" in join) is not cut_alike
-    assert ("cut at the same gap" in join) is cut_alike
-
-
 def test_agent_goes_into_the_last_cup_alone(made: Procedure) -> None:
     """Nothing bonds to the sheet's skin side; Layer 1 and the core's face bond later."""
     assert [[(face.tool, face.face) for face in pour.agent] for pour in made.pours] == [[], [("cup2", "bore")]]
@@ -191,12 +119,3 @@ def test_agent_goes_into_the_last_cup_alone(made: Procedure) -> None:
     assert "none on base or Layer 1, ever" in on[1]
     assert "release agent" in {item.item for item in made.bill}
     assert not any(bond.face.tool == "cup2" for bond in made.bonds)
-
-
-def test_the_smear_is_bought_and_has_a_cup(made: Procedure) -> None:
-    """2 g of Layer 1's silicone on top of its pour, and a mixing cup beside those of the two pours."""
-    inner, pour = made.pours[0].material, made.pours[0]
-    bought = {item.item: item.quantity for item in made.bill}
-    assert bought[f"{inner} part A"] == pytest.approx(pour.part_a_g + 1.0)
-    assert bought[f"{inner} part B"] == pytest.approx(pour.part_b_g + 1.0)
-    assert bought["mixing cups and sticks"] == 3

@@ -11,7 +11,8 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.crosstalk import pairs
 from unitcad.arrays.limb import bending
 from unitcad.arrays.patch import patch_moulds
-from unitcad.arrays.patch_pictures import FINEST, picture_names, worn, wrapped
+from unitcad.arrays.patch_pictures import FINEST, picture_names, wrapped
+from unitcad.arrays.patch_pictures import bent as bent_mesh
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
 from unitcad.shape import box
@@ -63,8 +64,8 @@ def test_strains_and_sagitta_are_those_of_the_geometry() -> None:
     ("template", "overrides", "field"),
     [
         ("wrist-band", ["sheet.margin_mm=8"], "layout.count"),
-        ("wrist-band", ["body.radius_mm=30"], "layout.count"),
-        ("forearm-patch", ["layout.columns=4", "body.radius_mm=10"], "body.radius_mm"),
+        ("wrist-band", ["limb.radius_mm=30"], "layout.count"),
+        ("forearm-patch", ["layout.columns=4", "limb.radius_mm=10"], "limb.radius_mm"),
     ],
 )
 def test_a_sheet_longer_than_its_way_round_is_refused(template: str, overrides: list[str], field: str) -> None:
@@ -77,13 +78,13 @@ def test_a_sheet_longer_than_its_way_round_is_refused(template: str, overrides: 
     assert bent.ends > -1e-2
 
 
-def test_the_worn_sheet_has_the_flat_ones_volume() -> None:
+def test_the_bent_sheet_has_the_flat_ones_volume() -> None:
     """Pappus: round its own middle a plate keeps its volume. The ends meet but for what is left between them."""
     moulds = patch_moulds(load_array("wrist-band"))
     array, drawn = moulds.arranged, moulds.arranged.sheet
     x0, y0, x1, y1 = drawn.outline
     plate = realise(box(x0, x1, y0, y1, drawn.low, drawn.high), 24)
-    vertices, faces = worn(array, plate)
+    vertices, faces = bent_mesh(array, plate)
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
     bent = bending(array)
@@ -94,8 +95,8 @@ def test_the_worn_sheet_has_the_flat_ones_volume() -> None:
     ends = wrapped(np.array([[x0, 0, middle], [x1, 0, middle]]), 40, bent.middle_radius)
     chord = 2 * bent.middle_radius * math.sin(bent.ends / 2 / bent.middle_radius)
     assert math.dist(*ends) == pytest.approx(chord, rel=1e-6)
-    assert "pictures/patch-worn.png" in picture_names(moulds)
-    assert "pictures/patch-worn.png" not in picture_names(patch_moulds(load_array("forearm-patch")))
+    assert "pictures/patch-bent.png" in picture_names(moulds)
+    assert "pictures/patch-bent.png" not in picture_names(patch_moulds(load_array("forearm-patch")))
 
 
 def test_a_bent_sheet_stretches_and_c310_compares_it() -> None:

@@ -17,7 +17,6 @@ from unitcad.arrays.circuit.circuit_files import circuit_dxf, circuit_svg, kicad
 from unitcad.arrays.circuit.outline import circuit_body, outline
 from unitcad.arrays.circuit.wiring import Wiring, wiring
 from unitcad.errors import Missing, Refusal
-from unitcad.geometry.segments import to_segment
 from unitcad.shape import Profile, exact_volume, mm
 from unitcad.shape.profile import arc_centre, points, sides
 
@@ -89,30 +88,6 @@ def test_the_outline_holds_pads_and_strips_and_rounds_what_lies_between(name: st
         if abs(fits - corner) > 0.02 * corner + 5e-3:
             assert inside[i] == (fits < corner), (at[i], fits)
     assert np.any(inside[between])
-
-
-@pytest.mark.parametrize("name", ARRAYS)
-def test_arcs_are_pads_or_inner_corners(name: str) -> None:
-    array = ARRAYS[name]
-    laid, drawn = wiring(array), outline(array)
-    corner = array.circuit.corner_mm if array.circuit else 1.0
-    radii = {pad.radius for pad in laid.pads} | {strip.half for strip in laid.spine[:-1]}
-    for start, end in sides(drawn.vertices):
-        if start[2] < 0:
-            assert arc_centre(start[:2], end[:2], start[2])[2] == pytest.approx(corner, abs=0.01)
-        elif start[2] > 0:
-            x, y, radius = arc_centre(start[:2], end[:2], start[2])
-            assert min(abs(radius - known) for known in radii) < 0.01
-            if abs(radius - laid.pads[0].radius) < 0.01:
-                assert min(math.hypot(pad.x - x, pad.y - y) for pad in laid.pads) < 0.02
-
-
-def test_a_tail_ends_square_where_it_is_asked_for() -> None:
-    array = ARRAYS["grid"]
-    drawn, laid = outline(array), wiring(array)
-    end = [(x, y) for x, y, _ in drawn.vertices if y == drawn.bounds[1]]
-    assert sorted(end) == [(8.5, laid.end[1]), (11.5, laid.end[1])]
-    assert to_segment(laid.end, *end) == 0
 
 
 def test_a_corner_that_reaches_into_a_units_wall_is_refused_with_what_fits() -> None:

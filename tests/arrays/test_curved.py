@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
 import pytest
 
+from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import curved_procedure
-from unitcad.arrays.array_view import patch_model
-from unitcad.arrays.circuit.outline import circuit_body
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
-from unitcad.casting.figures import RESIN_LAYER_S
 from unitcad.casting.procedure import Procedure
-from unitcad.casting.views import views
-from unitcad.checks import air, balance, check_moulds, mould_checks
+from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
-from unitcad.export import stl
-from unitcad.export.printing import print_ready
-from unitcad.kernels.mesh import arrays, realise
-from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
-from unitcad.spec import printer_of
 
 Change = Callable[[Shape], Shape]
 R = 40.0
@@ -56,7 +46,7 @@ HEX = {
     "unit": "encapsulating",
     "layout": {"kind": "hex", "rings": 1, "pitch_mm": 20},
     "circuit": {"row_width_mm": 2},
-    "body": {"radius_mm": 45, "cast": "curved"},
+    "limb": {"radius_mm": 45, "cast": "curved"},
 }
 SLOTS = {
     "name": "slots",
@@ -64,7 +54,7 @@ SLOTS = {
     "unit": {"like": "three-layer"},
     "layout": {"kind": "list", "points_mm": [[-12, -3], [13, 4]]},
     "sheet": {"strap_slot_mm": [3, 8]},
-    "body": {"radius_mm": 61.7, "cast": "curved"},
+    "limb": {"radius_mm": 61.7, "cast": "curved"},
 }
 
 
@@ -75,23 +65,8 @@ def test_every_mould_check_holds_on_other_layouts(data: dict[str, object]) -> No
     assert [f for f in findings if not f.ok] == []
 
 
-def test_air_leaves_a_narrow_sheet_whose_round_corners_hold_vents_off_its_ends() -> None:
-    found = list(air.findings(sleeve("layout.columns=1", "layout.rows=1", "body.radius_mm=86")))
-    assert [f for f in found if not f.ok] == []
-
-
-def test_vents_that_stand_aside_on_a_large_limb_begin_in_the_sheet() -> None:
-    moulds = sleeve("layout.columns=2", "layout.rows=1", "body.radius_mm=220")
-    found = [f for check in (balance, air) for f in check.findings(moulds)]
-    assert [f for f in found if not f.ok] == []
-
-
 def test_every_tool_prints_without_support() -> None:
-    moulds = sleeve()
-    for body in (*moulds.unit, *moulds.plan.tools):
-        content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
-        printer = printer_of(moulds.spec) if body.made == "printed" else None
-        assert check_bytes(content, f"{body.name}.stl", Options(printer=printer)).findings == ()
+    assert mesh_findings(sleeve()) == []
 
 
 def test_the_silicone_has_the_volume_of_its_lengths() -> None:
@@ -222,9 +197,9 @@ def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap() -> None:
 @pytest.mark.parametrize(
     ("override", "field"),
     [
-        ("body.radius_mm=20", "body.radius_mm"),
-        ("body.radius_mm=27", "body.radius_mm"),
-        ("unit=single-encapsulating", "body.cast"),
+        ("limb.radius_mm=20", "limb.radius_mm"),
+        ("limb.radius_mm=27", "limb.radius_mm"),
+        ("unit=single-encapsulating", "limb.cast"),
         ("unit=embedded", "unit.design"),
         ("sheet.thickness_mm=4", "sheet.thickness_mm"),
         ("moulds.bed_z_mm=20", "moulds.bed_z_mm"),
@@ -280,68 +255,11 @@ def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> No
     assert "flat pliers" not in items  # for tongues that are cut
 
 
-def test_the_syringe_takes_the_whole_mix_and_the_filaments_go_in_before_the_base_stands(made: Procedure) -> None:
-    """9.7 ml are mixed for cavities of 6.1 ml: the next syringe that is sold has 10."""
-    text = {step.title: step.text for step in made.pours[1].steps}
-    assert text["Draw up"].startswith("Draw all of it into a syringe of 10 ml")
-    (syringe,) = [item for item in made.bill if item.item == "syringe"]
-    assert syringe.note.startswith("10 ml")
-    filament = text["Filament into base 2"]
-    assert filament.index("push one up") < filament.index("Then stand it down")
-
-
-def test_the_flat_circuit_goes_whole_into_the_sleeve_laid_flat(made: Procedure) -> None:
-    solder, lay_in, _ = made.assembly
-    assert "until it lies flat" in solder.text
-    view = views(sleeve())[lay_in.picture.removeprefix("steps/").removesuffix(".png")]
-    flat = replace(sleeve().arranged, cast="flat")
-    (circuit,) = [extra for extra in view.extras if extra.colour == circuit_body(flat).colour]
-    there, whole = realise(circuit.shape, 64), realise(circuit_body(flat).shape, 64)
-    assert there.volume() == pytest.approx(whole.volume(), rel=1e-9)
-    assert len(there.decompose()) == 1
-
-
-def test_the_pages_3d_view_lists_motors_and_circuit_once() -> None:
-    parts = patch_model(sleeve().arranged)["unit_apart"]
-    assert list(parts) == ["layer1", "layer2", "motor", "circuit"]
-    assert parts["motor"][2] < parts["layer1"][2] == 0
-
-
-def test_fins_of_the_flat_base_are_greased_and_the_curved_base_is_levelled_under_its_lid(made: Procedure) -> None:
-    """A fin ends 1.2 mm outside its unit; from the wall of the outer layer on it lies in the slot of cup 1."""
-    grease = next(step for step in made.pours[0].steps if step.title == "Grease the flanks")
-    outer = sleeve().arranged.unit.layers[-1].wall_mm
-    (length,) = re.findall(r"outermost ([0-9.]+) mm", grease.text)
-    assert float(length) == pytest.approx(outer + 1.2)
-    (level,) = [step for step in made.pours[1].steps if step.title == "Level base 2"]
-    assert "small spirit level, on lid 2" in level.text
-    assert "less than 5 degrees" in level.text
-
-
-def test_resin_prints_as_long_as_the_tallest_piece_takes() -> None:
-    """Every layer takes the same time: those of the highest printed file, which is the curved base or its lid."""
-    moulds = sleeve("layout.columns=2", "layout.rows=1", "moulds.printer=sla")
-    heights = {}
-    for tool in moulds.plan.tools:
-        if tool.made == "printed":
-            points, _ = print_ready(*arrays(moulds.mesh(tool)), tool.upside_down)
-            heights[tool.name] = float(np.ptp(points[:, 2]))
-    assert max(heights, key=lambda name: heights[name]) in ("base2", "lid2")
-    minutes = max(heights.values()) / moulds.spec.moulds.layer_mm * RESIN_LAYER_S / 60
-    (said,) = [line for line in printing_of(moulds) if line.startswith("Takes")]
-    hours, rest = divmod(5 * round(minutes / 5), 60)
-    assert said.startswith(f"Takes about {hours} h {rest} min" if hours else f"Takes about {rest} min")
-
-
-def printing_of(moulds: PatchMoulds) -> tuple[str, ...]:
-    return curved_procedure(moulds, [100.0] * 2, 1000.0).printing
-
-
 def test_pockets_are_cast_flat() -> None:
     asked = load_array("forearm-pockets").asked
     with pytest.raises(Refusal) as refused:
-        load_array({**asked, "body": {"radius_mm": 40.0, "cast": "curved"}})
-    assert (refused.value.field, refused.value.nearest) == ("body.cast", "flat")
+        load_array({**asked, "limb": {"radius_mm": 40.0, "cast": "curved"}})
+    assert (refused.value.field, refused.value.nearest) == ("limb.cast", "flat")
 
 
 @pytest.mark.parametrize(

@@ -49,13 +49,13 @@ REFUSED: list[tuple[str, dict[str, Any], str, object]] = [
     ("forearm-pockets", {"sheet.strap_slot_mm": [0.1, 5]}, "sheet.strap_slot_mm.0", 0.8),
     ("forearm-patch", {"sheet.strap_slot_mm": [5, 0.1]}, "sheet.strap_slot_mm.1", 0.8),
     ("forearm-patch", {"moulds.bed_x_mm": 57}, "moulds.bed_x_mm", 58.9),
-    ("sleeve-curved", {"body.radius_mm": 500}, "body.radius_mm", 339.7),
-    ("sleeve-curved", {"body.radius_mm": 5000}, "body.radius_mm", 339.7),
+    ("sleeve-curved", {"limb.radius_mm": 500}, "limb.radius_mm", 339.7),
+    ("sleeve-curved", {"limb.radius_mm": 5000}, "limb.radius_mm", 339.7),
     ("hex-19", {"layout.pitch_mm": 500}, "layout.pitch_mm", 370),
     ("hex-19", {"layout.pitch_mm": 1e9}, "layout.pitch_mm", 370),
     ("forearm-pockets", {"layout.pitch_mm": [20, 900]}, "layout.pitch_mm.1", 740),
     ("forearm-pockets", {"sheet.strap_slot_mm": [1000, 20]}, "sheet.strap_slot_mm.0", 715),
-    ("wrist-band", {"body.radius_mm": 1000}, "body.radius_mm", None),
+    ("wrist-band", {"limb.radius_mm": 1000}, "limb.radius_mm", None),
 ]
 
 
@@ -69,28 +69,10 @@ def test_what_can_not_be_made_is_refused(name: str, changes: dict[str, Any], fie
     assert isinstance(refused.value.nearest, float)
 
 
-def test_the_corner_that_fits_a_circuit_is_found_in_few_tries(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A corner of 20 mm, far above what fits: tenths are halved, not counted down."""
-    from unitcad.arrays.circuit import outline as module
-
-    tries: list[float] = []
-    rounded = module._rounded
-    monkeypatch.setattr(
-        module, "_rounded", lambda laid, walls, corner: tries.append(corner) or rounded(laid, walls, corner)
-    )
-    module._outline.cache_clear()
-    with pytest.raises(Refusal) as refused:
-        module.outline(load_array("forearm-patch", {"circuit.corner_mm": 20}))
-    fits = refused.value.nearest
-    assert isinstance(fits, float)
-    assert len(tries) < 12
-    assert module.outline(load_array("forearm-patch", {"circuit.corner_mm": fits}))
-
-
 NUMBERS = {
     "layout.pitch_mm": 20.0, "layout.columns": 3, "layout.rows": 3, "layout.rings": 2, "layout.count": 8,
     "sheet.thickness_mm": 1.5, "sheet.margin_mm": 3.0, "sheet.corner_mm": 5.0, "sheet.strap_web_mm": 5.0,
-    "sheet.strap_slot_mm": [3.0, 20.0], "sheet.hold_mm": 0.2, "body.radius_mm": 40.0, "circuit.row_width_mm": 3.0,
+    "sheet.strap_slot_mm": [3.0, 20.0], "sheet.hold_mm": 0.2, "limb.radius_mm": 40.0, "circuit.row_width_mm": 3.0,
     "circuit.spine_mm": 10.0, "circuit.tail_mm": 10.0, "circuit.corner_mm": 1.0, "moulds.bed_x_mm": 100.0,
     "moulds.bed_y_mm": 100.0, "moulds.bed_z_mm": 100.0, "moulds.plate_mm": 4.0, "moulds.land_mm": 1.0,
     "moulds.groove_width_mm": 2.0, "moulds.plinth_clearance_mm": 0.15, "moulds.layer_mm": 0.2,

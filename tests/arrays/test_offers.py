@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -117,12 +116,6 @@ def test_a_pitch_out_of_range_is_refused_before_what_follows_from_it(name: str, 
         "must be at least 1",
         None,
     )
-
-
-def test_the_docs_quote_refusals_as_they_are() -> None:
-    text = " ".join((Path(__file__).parents[2] / "docs" / "arrays.md").read_text("utf-8").split())
-    for name, changes in (("hex-19", {"layout.pitch_mm": 12}), ("sleeve-curved", {"body.radius_mm": 25})):
-        assert f"is refused: `{refusal_of(name, changes)}`" in text
 
 
 @pytest.mark.parametrize(("unit", "tail", "pitch"), [("three-layer", 5.6, 21), ("chain", 7.1, 21.7)])

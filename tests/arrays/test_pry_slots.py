@@ -8,18 +8,14 @@ from typing import Any
 
 import pytest
 
+from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.constructions.back_sheet import _base_letters, drawing_of, pieces
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
-from unitcad.export import stl
-from unitcad.export.printing import print_ready
-from unitcad.kernels.mesh import arrays
-from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.shape import box, union
-from unitcad.spec import printer_of
 
 THREE = {"moulds.bed_x_mm": 60}
 CUT: list[dict[str, Any]] = [
@@ -71,9 +67,7 @@ def test_the_middle_piece_of_three_keeps_every_check_and_prints_without_support(
     moulds = three()
     assert [f for f in check_moulds(moulds) if not f.ok] == []
     assert [slot[:2] for slot in moulds.plan.pry_slots] == [(1, "left"), (2, "front"), (2, "back"), (3, "right")]
-    for piece in moulds.plan.pieces_of("base"):
-        content = stl.content(*print_ready(*arrays(moulds.mesh(piece)), piece.upside_down), piece.name)
-        assert check_bytes(content, f"{piece.name}.stl", Options(printer=printer_of(moulds.spec))).findings == ()
+    assert mesh_findings(moulds) == []
 
 
 def test_the_slots_reach_under_the_cup_from_the_plates_edge() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.construction import constructions
 from unitcad.arrays.patch import patch_moulds
@@ -39,7 +40,7 @@ def drawn(seed: int) -> dict[str, Any]:
         "layout": {"kind": kind, **layouts[kind]},
     }
     changes: dict[str, Any] = {
-        "body.radius_mm": pick.randint(10, 60),
+        "limb.radius_mm": pick.randint(10, 60),
         "sheet.thickness_mm": round(pick.uniform(0.6, 3.5), 2),
         "sheet.margin_mm": round(pick.uniform(1, 12), 2),
         "sheet.corner_mm": round(pick.uniform(0.5, 15), 2),
@@ -56,16 +57,16 @@ def drawn(seed: int) -> dict[str, Any]:
     for path in pick.sample(sorted(changes), pick.randint(0, 6)):
         put(data, path, changes[path])
     if kind == "ring" and pick.random() < 0.8:
-        put(data, "body.radius_mm", pick.randint(20, 60))
+        put(data, "limb.radius_mm", pick.randint(20, 60))
     if pick.random() < 0.3:
         put(data, "moulds.bed_x_mm", pick.randint(80, 180))
     if pick.random() < 0.3:
         put(data, "moulds.bed_y_mm", pick.randint(80, 180))
     if pick.random() < 0.2:
-        put(data, "body.cast", "curved")
+        put(data, "limb.cast", "curved")
         if pick.random() < 0.8:  # what a curved cast needs, or nearly all of them would stop at its first condition
             data["array"], data["unit"]["like"] = "back-sheet", default_template()
-            put(data, "body.radius_mm", pick.randint(25, 90))
+            put(data, "limb.radius_mm", pick.randint(25, 90))
             if kind == "ring":
                 data["layout"] = {"kind": "grid", **layouts["grid"]}
     return data
@@ -103,3 +104,4 @@ def judge(data: dict[str, Any]) -> None:
     broken = [f"{f.code} {f.where}: {f.value:.3g}, limit {f.limit:.3g} {f.unit}" for f in findings if not f.ok]
     assert broken == []
     assert len(findings) > 8
+    assert mesh_findings(moulds) == []  # both kinds of checks agree

@@ -18,8 +18,8 @@ def refusal_of(source: Any, changes: list[str]) -> Refusal:
 
 
 def test_a_distance_just_too_small_is_told_with_enough_digits() -> None:
-    refused = refusal_of("sleeve-curved", ["body.radius_mm=34.4"])
-    assert "stand 3.9957 mm apart and need 4 mm" in refused.limit
+    refused = refusal_of("sleeve-curved", ["limb.radius_mm=34.4"])
+    assert "are 3.9957 mm apart and need 4 mm" in refused.limit
 
 
 def test_of_equally_close_keys_the_first_of_the_table_is_offered() -> None:

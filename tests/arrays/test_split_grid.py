@@ -10,6 +10,7 @@ from itertools import combinations, pairwise
 
 import pytest
 
+from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import back_sheet_procedure
 from unitcad.arrays.constructions.back_sheet import drawing_of
@@ -18,16 +19,12 @@ from unitcad.arrays.patch_pictures import taken_apart
 from unitcad.arrays.piece_seams import weep
 from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
-from unitcad.export import stl
-from unitcad.export.printing import print_ready
 from unitcad.geometry.segments import between_convex, to_segment
-from unitcad.kernels.mesh import arrays, bounds, realise
-from unitcad.meshcheck import Options, check_bytes
+from unitcad.kernels.mesh import bounds, realise
 from unitcad.moulds.cuts import BESIDE
 from unitcad.moulds.dovetails import Split, split, straight
 from unitcad.moulds.pieces import base_piece
 from unitcad.shape import Shape, box, cut, moved
-from unitcad.spec import printer_of
 
 TWO = ["layout.rows=2", "layout.columns=2"]
 BED = {"x": "moulds.bed_x_mm", "y": "moulds.bed_y_mm"}
@@ -57,10 +54,7 @@ def test_every_mould_check_holds(name: str) -> None:
 @pytest.mark.parametrize("name", ARRAYS)
 def test_every_piece_prints_without_support_and_has_its_number(name: str) -> None:
     moulds = made(name)
-    for body in moulds.plan.pieces:
-        if body.made == "printed":
-            content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
-            assert check_bytes(content, f"{body.name}.stl", Options(printer=printer_of(moulds.spec))).findings == ()
+    assert mesh_findings(moulds) == []
     for each in moulds.plan.splits:
         assert [piece.name for piece in each.pieces] == [f"{each.tool}-{i + 1}" for i in range(len(each.pieces))]
         middles = [bounds(moulds.mesh(piece)) for piece in each.pieces]

@@ -90,10 +90,10 @@ def test_a_narrow_limb_bends_the_circuit_between_two_pads_too_much() -> None:
     array = nine(unit=thick, layout=close, body={"radius_mm": 10.0})
     with pytest.raises(Refusal, match="bent") as refused:
         wiring(array)
-    assert refused.value.field == "body.radius_mm"
+    assert refused.value.field == "limb.radius_mm"
     pad = wiring(nine(unit=thick, layout=close)).pads[0].radius
     assert refused.value.nearest == pytest.approx(LEAST_BEND * 0.6 * 18 / (18 - 2 * pad), abs=1e-3)
-    wiring(over(array, f"body.radius_mm={refused.value.nearest}"))
+    wiring(over(array, f"limb.radius_mm={refused.value.nearest}"))
 
 
 def test_every_way_that_is_found_is_clear_by_points() -> None:

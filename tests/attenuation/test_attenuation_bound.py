@@ -61,26 +61,6 @@ def test_error_at_depth_under_a_disc_at_low_frequency():
     assert _off(found, truth) <= found.error
 
 
-@pytest.mark.parametrize("omega", [0.0, 785.0])
-def test_a_longer_integral_counts_no_piece_twice(omega):
-    """Incompressible, at depth: the first guess of where the tail may be cut off is too short."""
-    medium = LayeredMedium([], HalfSpace(1800.0, 736910.0, 0.5, LossFactor(0.33)))
-    load, r = UniformDisc(1.42e-3, "radial"), [6.1e-3, 11e-3, 23e-3, 28e-3, 80e-3, 84e-3]
-    found, truth = (medium.response(load, omega, r, z=5e-3, rtol=rtol) for rtol in (1e-3, 1e-10))
-    assert _off(found, truth) <= found.error
-
-
-def test_a_stiff_layer_below_a_thin_one():
-    """Static, contrast 60: layers used to be left out per wavenumber by a bound that this one broke."""
-    medium = LayeredMedium(
-        [Layer(1.0885e-4, 1098, 91993.6, 0.49), Layer(0.013613, 1427, 5.4091e6, 0.4999)],
-        HalfSpace(1128, 196607, 0.0, LossFactor(0.376)),
-    )
-    r = [5.5516e-4, 1.87628e-3, 0.01585, 0.03048, 0.0576, 0.074]
-    found, truth = (medium.response(Point(), 0.0, r, rtol=rtol) for rtol in (1e-6, 1e-11))
-    assert _off(found, truth) <= found.error
-
-
 @pytest.mark.parametrize("moduli", [(1e160, 1e4), (1e4, 1e300), (1e307, 1e307)])
 def test_moduli_that_would_overflow_are_refused_before_any_work(moduli):
     top, below = moduli

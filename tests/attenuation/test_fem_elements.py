@@ -155,29 +155,6 @@ def test_a_motor_in_next_to_nothing_moves_as_a_free_body():
         assert abs(moved.turning) * soft.geometry.motor_radius < 1e-4 * abs(free)
 
 
-def test_a_motor_turns_about_its_middle_as_its_inertia_asks():
-    """On a stiffness known from the elements: force and moment balance solved by hand for two masses."""
-    variant = estimate_input(load("embedded"))
-    fields = unit_fields(variant, "flat", Setting(), 0.5)
-    k = fields.stiffness
-    omega, mass = 2 * math.pi * variant.frequency.middle, variant.geometry.motor_mass.middle
-    radius, height = variant.geometry.motor_radius, variant.geometry.motor_height
-    moved = motion(variant, "flat", Setting(), 0.5)
-    moment = k[1, 0] * moved.motor + (k[1, 1] - omega**2 * mass * (radius**2 / 4 + height**2 / 12)) * moved.turning
-    force = (k[0, 0] - omega**2 * mass) * moved.motor + k[0, 1] * moved.turning
-    assert force == pytest.approx(1.0, rel=1e-9)
-    assert abs(moment) < 1e-9 * abs(k[1, 1] * moved.turning)
-
-
-def test_the_motors_stiffness_is_symmetric_and_passive():
-    for drive in ("axial", "flat"):
-        for contact in ("bonded", "resting"):
-            k = unit_fields(estimate_input(load("encapsulating")), drive, Setting(contact), 0.5).stiffness
-            assert np.allclose(k, k.T, rtol=1e-9, atol=1e-12 * np.abs(k).max())
-            scale = np.diag(1 / np.sqrt(np.abs(np.diag(k))))
-            assert np.linalg.eigvalsh((scale @ k @ scale).imag).min() > 0  # it takes energy in whatever it does
-
-
 def test_the_power_of_the_motor_is_what_the_materials_dissipate():
     """Im(F conj(u)) against the loss moduli times the strains, summed over the elements."""
     mu, eta = 2e4, 0.3

@@ -5,7 +5,6 @@ import pytest
 
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import Point, UniformDisc
-from unitcad.attenuation.layered import loads as module
 from unitcad.attenuation.layered.loads import kept
 from unitcad.estimating import estimate_input
 from unitcad.validation import load as load_spec
@@ -49,32 +48,6 @@ def test_what_is_kept_cannot_be_changed():
     double, _ = _counted()
     with pytest.raises(ValueError, match="read-only"):
         double("a", np.array([1.0]))[0][0] = 3.0
-
-
-def test_large_results_and_those_met_long_ago_are_not_kept(monkeypatch):
-    monkeypatch.setattr(module, "_RESULTS", 2)
-    double, made = _counted()
-    large = np.zeros(module._MOST_BYTES // 8 + 1)
-    for _ in range(2):
-        double("large", large)
-    assert made == ["large", "large"]
-    for name in ("a", "b", "a", "c", "a", "b"):  # b makes room for c
-        double(name, np.zeros(1))
-    assert made[2:] == ["a", "b", "c", "b"]
-
-
-def test_a_small_result_of_large_arrays_is_not_kept():
-    """The arrays would be kept with it, to tell it by."""
-    made = []
-
-    @kept
-    def largest(values: np.ndarray) -> tuple[np.ndarray]:
-        made.append(values.size)
-        return (values.max(keepdims=True),)
-
-    for size in (1, 1, module._MOST_BYTES // 8, module._MOST_BYTES // 8):
-        largest(np.zeros(size))
-    assert made == [1, module._MOST_BYTES // 8, module._MOST_BYTES // 8]
 
 
 @pytest.mark.parametrize("load", [DISC, UniformDisc(3.5e-3, "radial"), Point("tangential")], ids=str)

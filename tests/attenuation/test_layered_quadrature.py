@@ -7,9 +7,7 @@ import pytest
 from scipy import special
 
 from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, Load, LossFactor, Point, UniformDisc
-from unitcad.attenuation.layered.integral import Body, Problem, grid
-from unitcad.attenuation.layered.propagation import Material
-from unitcad.attenuation.layered.quadrature import evaluate, from_origin, halved_towards, nodes, poles
+from unitcad.attenuation.layered.quadrature import evaluate, halved_towards, nodes
 
 PHASE = 8.0 * np.pi
 
@@ -88,63 +86,6 @@ def test_a_damped_medium_takes_few_nodes_for_a_loose_tolerance():
         assert np.all(np.abs(loose.u_z - tight.u_z) <= loose.error_z + tight.error_z)
         assert np.all(np.abs(loose.u_r - tight.u_r) <= loose.error_r + tight.error_r)
         assert (loose.wavenumbers < 200) == (layers is damped and r == 45e-3)
-
-
-def test_a_tail_is_sampled_at_the_last_wavenumber_that_can_be_afforded():
-    disc, r = UniformDisc(3.5e-3), np.array([1e-3, 30e-3])
-    loose, tight = (grid(disc, r, 0.0, 900.0, 1e-3, 8.765e5, rtol) for rtol in (0.1, 1e-6))
-    assert 8.765e5 in loose
-    assert 8.765e5 in tight
-    assert loose.size < tight.size
-    assert (loose[0], loose[-1]) == pytest.approx((tight[0], tight[-1]))
-    assert np.all(np.diff(loose) > 0)
-    assert 1e9 not in grid(disc, r, 0.0, 900.0, 1e-3, 1e9, 0.1)
-
-
-def test_panels_near_0_grow_fourfold_beyond_the_least_wave():
-    """The half-space's wave ends at 0.1 /m: the first panel is shorter, its pole lies in panels of a factor of two."""
-    soft, hard = Material(1e4 + 1e3j, 0.01, 400.0**2 + 0j), Material(1e9 + 1e7j, 1.0, 0.1**2 - 1e-4j)
-    panels = from_origin(1200.0, 1500.0, 1e-3, (soft, hard))[:, :2].real
-    near = panels[panels[:, 1] <= 100.0]
-    assert near[0, 1] < 0.1 <= 2.0 * near[0, 1] * 2.0
-    assert near[1:, 1] / near[1:, 0] == pytest.approx([2.0, 2.0, 2.0, 4.0, 4.0, 4.0, 4.0])
-    assert panels[len(near) - 1, 1] == pytest.approx(100.0)
-    assert np.all(panels[1:, 0] == panels[:-1, 1])
-
-
-def test_a_tight_tolerance_far_out_takes_few_wavenumbers():
-    """A point load's integral goes to 1e5 /m and beyond: 17,632 wavenumbers at rtol 1e-8 when waves cut the panels."""
-    medium = LayeredMedium([Layer(1.5e-3, 1100, 130e3, 0.49)], HalfSpace(1050, 12e3, 0.495))
-    assert medium.response(Point(), 785.0, [1e-3, 30e-3], rtol=1e-8).wavenumbers < 3_000
-
-
-@pytest.mark.parametrize("chunk", [1, 7])
-def test_the_kernel_is_the_same_in_chunks(monkeypatch, chunk):
-    medium = LayeredMedium([Layer(1.5e-3, 1100, 130e3, 0.49)], HalfSpace(1050, 12e3, 0.495))
-    problem = Problem((Body(medium, 785.0),), (UniformDisc(3.5e-3),), np.array([7e-3]), 0.0)
-    k = np.geomspace(1.0, 1e5, 20).astype(complex)
-    whole = problem.kernel(k)
-    monkeypatch.setattr("unitcad.attenuation.layered.integral._MOST_SAMPLES", chunk)
-    assert np.allclose(problem.kernel(k), whole, rtol=1e-12, atol=0.0)
-
-
-def test_panels_are_longer_beyond_the_waves():
-    """Waves end at 100 /m, the last pole may lie at 240: panels of 20, then of 80, and as long as they are far."""
-    soft, hard = Material(1e4 + 1e3j, 0.01, 100.0**2 + 0j), Material(1e9 + 1e7j, 0.3, 144.0 - 1j)
-    panels = from_origin(240.0, 500.0, 1e-3, (soft, hard))[:, :2].real
-    ends = [0, 20, 40, 60, 80, 100, 120, 160, 240, 480, 500]
-    assert panels[panels[:, 1] >= 20, 1] == pytest.approx(ends[1:])
-    assert np.all(panels[1:, 0] == panels[:-1, 1])
-
-
-def test_poles_are_looked_for_only_where_a_panel_is_bad(monkeypatch):
-    medium = LayeredMedium([Layer(4e-3, 1000, 9e3, 0.49, LossFactor(0.5))], HalfSpace(1000, 9e4, 0.49, LossFactor(0.5)))
-    calls = []
-    monkeypatch.setattr("unitcad.attenuation.layered.quadrature.poles", lambda *args: calls.append(0) or poles(*args))
-    medium.response(UniformDisc(3.5e-3), 785.0, [1e-3, 30e-3], rtol=1e-2)
-    assert not calls
-    medium.response(UniformDisc(3.5e-3), 785.0, [1e-3, 30e-3], rtol=1e-10)
-    assert calls
 
 
 def test_panels_are_halved_towards_their_poles():

@@ -19,8 +19,8 @@ from unitcad.search.candidates import candidates
 from unitcad.search.proposals import leads_block
 from unitcad.search.target_file import target_of
 from unitcad.sweeps.estimate_table import evaluate
+from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.sweep import from_file
-from unitcad.sweeps.unread_keys import swept_estimate
 from unitcad.validation import load
 
 SLOW = ["layers.0.wall_mm=1.3", "estimate.moduli=quasi-static"]

@@ -89,25 +89,6 @@ def test_a_sideways_force_and_a_normal_one_are_reciprocal(hertz, z):
         assert np.all(wrong <= getattr(deep, f"error_{name}") + getattr(fine, f"error_{name}"))
 
 
-def test_a_slow_load_is_the_static_one():
-    slow, static = (FOREARM.response(UniformDisc(3.5e-3, "tangential"), omega, [7e-3, 2e-2]) for omega in (1e-3, 0.0))
-    assert np.max(np.abs(slow.u_theta - static.u_theta)) < 1e-5 * np.max(np.abs(static.u_theta))
-
-
-def test_under_the_load_all_moves_one_way():
-    """On the axis u_x is the same in every direction: u_r = -u_theta, and nothing is lifted."""
-    response = FOREARM.response(UniformDisc(3.5e-3, "tangential"), 785.0, [0.0], rtol=1e-8)
-    assert abs(response.u_r[0] + response.u_theta[0]) <= response.error_r[0] + response.error_theta[0]
-    assert abs(response.u_z[0]) <= response.error_z[0]
-
-
-def test_an_axisymmetric_load_turns_nothing():
-    response = FOREARM.response(UniformDisc(3.5e-3), 785.0, [[7e-3], [2e-2]])
-    assert response.u_theta.shape == (2, 1)
-    assert np.all(response.u_theta == 0)
-    assert np.all(response.error_theta == 0)
-
-
 def _layers_in_mpmath(layers, base, k, omega):
     """SH compliance at the surface and at the last interface by Thomson and Haskell's matrices, in 60 digits."""
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from casting_rules import broken_rules
 
+from tests.sample_bodies import LEADLESS
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import back_sheet_procedure, curved_procedure
 from unitcad.arrays.patch import patch_moulds
@@ -23,6 +24,7 @@ RESIN = ("three-layer", "moulds.printer=sla")
 PATCH, BAND = ("forearm-patch",), ("wrist-band",)
 CURVED = ("sleeve-curved", "layout.columns=2", "layout.rows=1")
 ARRAYS = (PATCH, BAND, CURVED)
+LOOSE = (LEADLESS, "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]")
 
 
 def casting(*source: str) -> Procedure:
@@ -76,7 +78,7 @@ def untested_cure(made: Procedure) -> Procedure:
     )
 
 
-def smear_left_wet(made: Procedure) -> Procedure:
+def adhesive_left_wet(made: Procedure) -> Procedure:
     return replace(made, assembly=made.assembly[:-1])
 
 
@@ -104,11 +106,11 @@ def reworded(made: Procedure, old: str, new: str) -> Procedure:
 
 
 def unpropped(made: Procedure) -> Procedure:
-    return reworded(made, "Its grip hangs free: put", "It can't sag: leave out")
+    return reworded(made, "stacked card", "nothing")
 
 
 def looks_through_layer_1(made: Procedure) -> Procedure:
-    return reworded(made, "under Layer 1.", "no gap at the core, none under it on the ledge.")
+    return reworded(made, "under Layer 1,", "no gap at the core, none under it,")
 
 
 def spatula_forgotten(made: Procedure) -> Procedure:
@@ -123,14 +125,14 @@ def no_time_to_prepare(made: Procedure) -> Procedure:
     return replace(made, preparation=tuple(replace(s, minutes=0.0, wait_min=0.0) for s in made.preparation))
 
 
-def smear_not_bought(made: Procedure) -> Procedure:
+def ring_not_bought(made: Procedure) -> Procedure:
     """The bill of the pours alone: 2 g of Layer 1's silicone, half of each part, are missing."""
     inner = made.pours[0].material
     bill = [replace(i, quantity=i.quantity - 1.0) if i.item.startswith(f"{inner} part") else i for i in made.bill]
     return replace(made, bill=tuple(bill))
 
 
-def smear_of_another(made: Procedure) -> Procedure:
+def adhesive_in_a_hurry(made: Procedure) -> Procedure:
     *steps, cure = made.assembly
     return replace(made, assembly=(*steps, replace(cure, wait_min=60 * made.pours[-1].cure_h)))
 
@@ -186,14 +188,14 @@ PLANTED = {
     "no spatula": (("embedded",), spatula_forgotten, "blunt spatula"),
     "no varnish": (RESIN, varnish_forgotten, "acrylic varnish"),
     "no preparation": (RESIN, no_time_to_prepare, "Wash: takes no time"),
-    "smear not bought": (PATCH, smear_not_bought, "the bill lacks silicone"),
-    "smear of another silicone": (("encapsulating",), smear_of_another, "another's time"),
+    "ring not bought": (LOOSE, ring_not_bought, "the bill lacks silicone"),
+    "adhesive not cured for a day": (("encapsulating",), adhesive_in_a_hurry, "another's time"),
     "no picture": (("encapsulating",), without_pictures, "has no picture"),
     "not levelled": (("encapsulating",), unlevelled, "levelled"),
     "opened before the cure": (("encapsulating",), opened_first, "opened before the cure"),
     "cured too short": (("encapsulating",), short_cure, "less than the silicone takes"),
     "tacky is not told": (("embedded",), untested_cure, "tacky"),
-    "smear not cured": (("encapsulating",), smear_left_wet, "smear"),
+    "adhesive not cured": (("encapsulating",), adhesive_left_wet, "what holds the motor is not cured"),
     "too little mixed": (("encapsulating",), too_little, "mixes less"),
     "syringe holds back": (LIDS, syringe_forgotten, "syringe holds back"),
     "no grip": (RESIN, no_grip, "nothing to pull it by"),

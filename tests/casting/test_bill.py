@@ -6,16 +6,19 @@ import re
 
 import pytest
 
+from tests.sample_bodies import LEADLESS
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import back_sheet_procedure
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.procedure import Procedure, procedure
+from unitcad.casting.written import to_markdown
 from unitcad.catalogue import materials
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.spec import assumed_lengths
 from unitcad.validation import load, warnings
 
-LOOSE = ("no-fpcb", "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]", "motor.fill=false")
+LOOSE = (LEADLESS, "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]", "motor.fill=false")
 
 
 def moulds_of(*source: str) -> MouldSet:
@@ -40,7 +43,7 @@ def test_the_silicone_of_a_filled_ring_is_bought(cells: int) -> None:
     bought = quantities(casting(*LOOSE, gang, "casting.minimum_mix_g=0.1"))
     of_pour = sum(pour.part_a_g for pour in casting(*LOOSE, gang, "casting.minimum_mix_g=0.1").pours)
     grams = cells * (filled - loose) / 1000 * float(materials()["ecoflex-00-10"].density_g_cm3)
-    waste = 1 + load("no-fpcb").casting.waste
+    waste = 1 + load(LEADLESS).casting.waste
     ring = max(grams * waste, 0.1)
     assert bought["ecoflex-00-10 part A"] - of_pour == pytest.approx(ring / 2, rel=1e-4)
     assert bought["petroleum jelly"] == 1
@@ -94,7 +97,7 @@ def test_a_pour_s_faults_are_data_and_its_words_agree(change: tuple[str, ...], s
 @pytest.mark.parametrize(
     ("motor", "item", "note"),
     [
-        ({}, "LCM0720A3463F", "7 x 2 mm, assumed: motor.thickness_mm = 2 (2 to 2.65)"),
+        ({}, "LCM0720A3463F", "7 x 2 mm (assumed)"),
         ({"thickness_mm": 2.3}, "LCM0720A3463F", "7 x 2.3 mm"),
         ({"thickness_mm": 3.0}, "own motor", "7 x 3 mm"),
         ({"diameter_mm": 8.0}, "own motor", "8 x 2 mm"),
@@ -108,21 +111,59 @@ def test_a_motor_of_other_sizes_has_no_part_number(motor: dict[str, str | float]
 
 
 def test_the_sheet_begins_with_what_to_measure() -> None:
+    """Step 0 has the lengths of the bought parts, as drawn, and a command that builds with them."""
     spec = load("encapsulating")
     assert spec.fpcb
-    sizes = [spec.motor.diameter_mm, spec.motor.thickness_mm, spec.fpcb.thickness_mm, spec.moulds.filament_mm]
-    first = casting("encapsulating").printing[0]
-    assert first.startswith("Measure first, with calipers (mm): ")
-    assert [float(number) for number in re.findall(r"_mm = ([0-9.]*[0-9])", first)[:4]] == sizes
-    assert "Nobody has measured motor.thickness_mm = 2 (2 to 2.65)." in first
-    (change,) = re.findall(r"--set (motor[^ ]*)", first)
-    assert "Nobody has measured" not in casting("encapsulating", change).printing[0]
+    drawn = {
+        "motor.diameter_mm": spec.motor.diameter_mm,
+        "motor.thickness_mm": spec.motor.thickness_mm,
+        "fpcb.thickness_mm": spec.fpcb.thickness_mm,
+        "moulds.filament_mm": spec.moulds.filament_mm,
+    }
+    made = casting("encapsulating")
+    assert {size.key: size.value_mm for size in made.printing.sizes} == drawn
+    text = to_markdown(made)
+    (command,) = re.findall(r"^unitcad build spec.toml (.*)$", text, re.MULTILINE)
+    assert text.index("## 0. Measure first") < text.index("## Print") < text.index("## Before the first pour")
+    assert load("encapsulating", command.replace("--set ", "").split()) == spec
+    assert "motor thickness: 2 mm (assumed; 2 to 2.65: up to 0.65 mm out of the skin's plane)" in text
+    wires = {size.key for size in casting("no-fpcb").printing.sizes}
+    assert "wires.diameter_mm" in wires
+    assert "fpcb.thickness_mm" not in wires
+
+
+def test_a_length_that_is_given_is_not_assumed() -> None:
+    """Planted: what the catalogue assumes is typed as measured."""
+    measured = casting("encapsulating", "motor.thickness_mm=2.3", "fpcb.thickness_mm=0.13")
+    assert not any(size.assumed for size in measured.printing.sizes)
+    assert assumed_lengths(load("encapsulating")).keys() == {"motor.thickness_mm", "fpcb.thickness_mm"}
+    assert assumed_lengths(load("embedded", ["motor.part=VC0720B001F"])).keys() == {"fpcb.thickness_mm"}
+
+
+def test_both_designs_fix_the_motor_by_the_same_words_and_bill() -> None:
+    fixed = {name: casting(name) for name in ("encapsulating", "embedded")}
+    sentences = {
+        re.sub(r"where it touches [^:]*:", "where it touches ...:", step.text.split("thinly")[1].split(".")[0])
+        for made in fixed.values()
+        for step in made.assembly
+        if "adhesive" in step.needs or "silicone adhesive" in step.text
+    }
+    assert len(sentences) == 1
+    for made in fixed.values():
+        assert "silicone adhesive" in {item.item for item in made.bill}
+        assert made.assembly[-1].wait_min == 24 * 60
+
+
+def test_warnings_lead_the_sheet() -> None:
+    """Planted: a closed cavity, and a roof of 25 mm; the sheets of the templates have none."""
+    for source, words in (((LEADLESS,), "no way out"), (("encapsulating", "diameter_mm=30"), "ring of air of 9 mm")):
+        text = to_markdown(casting(*source))
+        assert words in text[: text.index("## 0. Measure first")]
+    assert "Warning" not in to_markdown(casting("encapsulating"))
 
 
 def test_a_cavity_without_a_way_out_for_leads_is_a_warning() -> None:
-    leads = ["no way out for the motor's leads: they lie between unit and skin; add a table [wires] or [fpcb]"]
-    assert warnings(load("no-fpcb")) == leads
-    assert warnings(load("no-fpcb", ["wires={ diameter_mm = 0.6 }"])) == []
-    assert warnings(load("encapsulating")) == []
+    leads = warnings(load(LEADLESS))
+    assert "no way out for the motor's leads" in leads[0]
     open_ring = load(LOOSE[0], LOOSE[1:])  # leads leave upwards
     assert leads[0] not in warnings(open_ring)

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from tests.sample_bodies import LEADLESS
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.bill import mould_plates
@@ -20,7 +21,7 @@ from unitcad.validation import load
 
 
 def _gang(*settings: str) -> MouldSet:
-    return MouldSet(load("no-fpcb", settings))
+    return MouldSet(load(LEADLESS, settings))
 
 
 SETS = {
@@ -76,7 +77,7 @@ def test_a_piece_goes_on_the_first_plate_with_room() -> None:
 
 
 def test_the_procedure_says_what_is_on_each_plate() -> None:
-    first = " ".join(printing(SETS["split"](), 1000.0))
+    first = " ".join(printing(SETS["split"](), 1000.0).how)
     named = ("moulds/moulds-1.3mf with base piece 1", "moulds/moulds-2.3mf with", "cup 2 piece 2")
     places = [first.index(words) for words in named]
     assert all(one < other for one, other in pairwise(places))

@@ -110,5 +110,7 @@ def test_in_short_names_the_pours_whose_bubbles_stay() -> None:
     assert last.startswith("warning: without a vacuum bubbles stay in pour ")
     assert all(f"pour {pour.index} ({pour.material})" in last for pour in stay)
     lines = list(in_short(asdict(casting("encapsulating"))))
-    assert lines[1:] == ["to mix: 4 g of ecoflex-00-10, 2 g of dragon-skin-30"]  # 2 g of it for the smear
-    assert lines[0].startswith("2 pours, ready ")
+    assert lines[0].startswith("print moulds/moulds.3mf: about ")
+    assert lines[1] == "mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
+    assert lines[2].startswith("ready ")
+    assert len(lines) == 3

@@ -1,12 +1,8 @@
 """One recording in every format, each column around a value of its own, so that a shifted column shows."""
 
-from __future__ import annotations
-
 import warnings
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 RATE = 2000.0
 COUNT = 300
@@ -14,21 +10,21 @@ CENTRES = {"motor": 100.0, "edge": 300.0, "skin": 500.0}
 """Each channel lies within 50 of its centre."""
 
 
-def columns(count: int = COUNT) -> NDArray[np.float64]:
+def columns(count=COUNT):
     """Three channels (count, 3); whole numbers of 1/64, which every format holds exactly."""
     time = np.arange(count) / RATE
     waves = [np.sin(2 * np.pi * 125.0 * time + k) for k in range(3)]
     return np.round(np.column_stack([c + 50 * w for c, w in zip(CENTRES.values(), waves, strict=True)]) * 64) / 64
 
 
-def write_text(path: Path, delimiter: str = ",", decimal: str = ".", end: str = "", quote: str = "") -> None:
+def write_text(path, delimiter=",", decimal=".", end="", quote=""):
     rows = np.column_stack([np.arange(COUNT) / RATE, columns()])
     lines = ["Device;X 1", "Comment: made up", delimiter.join(["Time (s)", *(f"{name} (um)" for name in CENTRES)])]
     lines += [delimiter.join(f"{quote}{v:.6f}{quote}".replace(".", decimal) for v in row) + end for row in rows]
     path.write_text("\n".join(lines) + "\n")
 
 
-def write_universal(path: Path, binary: int = 1) -> None:
+def write_universal(path, binary=1):
     import pyuff
 
     with warnings.catch_warnings():
@@ -48,7 +44,7 @@ def write_universal(path: Path, binary: int = 1) -> None:
         pyuff.UFF(str(path)).write_sets(sets, mode="add")
 
 
-def write_tdms(path: Path) -> None:
+def write_tdms(path):
     from nptdms import ChannelObject, TdmsWriter
 
     with TdmsWriter(str(path)) as writer:
@@ -58,13 +54,13 @@ def write_tdms(path: Path) -> None:
         )
 
 
-def write_mat(path: Path) -> None:
+def write_mat(path):
     from scipy.io import savemat
 
     savemat(path, {name: columns()[:, i : i + 1] for i, name in enumerate(CENTRES)}, do_compression=True)
 
 
-def write_hdf5(path: Path, matlab: bool = False) -> None:
+def write_hdf5(path, matlab=False):
     import h5py
 
     with h5py.File(path, "w", userblock_size=512 if matlab else 0) as file:
@@ -77,7 +73,7 @@ def write_hdf5(path: Path, matlab: bool = False) -> None:
             file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
 
 
-def write_wav(path: Path, kind: str = "<f4") -> None:
+def write_wav(path, kind="<f4"):
     from scipy.io import wavfile
 
     data = columns() if kind == "<f4" else columns() * 50
@@ -101,7 +97,7 @@ FORMATS = {
 }
 
 
-def hangs(*asked: object) -> None:
+def hangs(*asked):
     """Stand in for a library that never returns."""
     import time
 

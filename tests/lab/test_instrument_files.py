@@ -1,28 +1,24 @@
 """One recording in the layouts of instruments: names, units, time and numbers are the same in each."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
-from recordings import COUNT, RATE, columns, write_tdms
+from recordings import COUNT, RATE, columns
 
 from unitcad.lab.campaign import RecordingTable, SensorTable
 from unitcad.lab.columns import column_of
 from unitcad.lab.columns import columns as columns_of_test
-from unitcad.lab.readers import AS_FOUND, Layout, Recording, open_recording
+from unitcad.lab.readers import AS_FOUND, Layout, open_recording
 from unitcad.lab.record import open_signal
 
 TIME, MOTOR, EDGE = np.arange(COUNT) / RATE, columns()[:, 0] / 100, columns()[:, 1] / 100
 
 
-def rows(*table: np.ndarray, delimiter: str = ",", decimal: str = ".", form: str = "{:.6f}") -> list[str]:
+def rows(*table, delimiter=",", decimal=".", form="{:.6f}"):
     lines = (delimiter.join(form.format(value) for value in row) for row in zip(*table, strict=True))
     return [line.replace(".", decimal) if decimal != "." else line for line in lines]
 
 
-def lvm() -> list[str]:
+def lvm():
     top = ["LabVIEW Measurement\t", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tOne"]
     keys = [
         "Channels\t2\t\t",
@@ -41,12 +37,12 @@ def lvm() -> list[str]:
     ]
 
 
-def lvm_without_x() -> list[str]:
+def lvm_without_x():
     lines = [line.replace("X_Columns\tOne", "X_Columns\tNo") for line in lvm()]
     return [line if not line[0].isdigit() else "\t" + line.partition("\t")[2] for line in lines]
 
 
-def tektronix() -> list[str]:
+def tektronix():
     said = [["Record Length", f"{COUNT}"], ["Sample Interval", "5e-4"], ["Trigger Point", "0"], ["", ""], ["", ""]]
     said += [["Source", "CH1"], ["Vertical Units", "V"], ["Vertical Scale", "1.0"], ["Horizontal Units", "s"]]
     said += [["", ""]] * (COUNT - len(said))
@@ -55,7 +51,7 @@ def tektronix() -> list[str]:
     ]
 
 
-def clock(date: str = "") -> list[str]:
+def clock(date=""):
     stamps = [f"{date}09:59:{59 + t:09.6f}" if t < 1 else "" for t in TIME]
     return ["time,motor (V)", *(f"{stamp},{v:.6f}" for stamp, v in zip(stamps, MOTOR, strict=True))]
 
@@ -83,13 +79,13 @@ LAYOUTS = {
 }  # fmt: skip
 
 
-def read(path: Path, lines: list[str], encoding: str = "utf-8", layout: Layout = AS_FOUND) -> Recording:
+def read(path, lines, encoding="utf-8", layout=AS_FOUND):
     path.write_bytes(("\r\n".join(lines) + "\r\n").encode(encoding))
     return open_recording(path, layout)
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_an_instruments_layout_is_read(name: str, tmp_path: Path) -> None:
+def test_an_instruments_layout_is_read(name, tmp_path):
     layout = Layout(skip_lines=3 if name == "several summaries" else 0)
     recording = read(tmp_path / "a.lvm", LAYOUTS[name], layout=layout)
     at = next(i for i, one in enumerate(recording.channels) if i != recording.time)
@@ -105,7 +101,7 @@ def test_an_instruments_layout_is_read(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("sign", ["", "∞", "-∞", "-FFFFFFF", "nan", "-------"])
 @pytest.mark.parametrize("last", [True, False])
-def test_a_value_that_is_missing_or_over_range_is_no_number(sign: str, last: bool, tmp_path: Path) -> None:
+def test_a_value_that_is_missing_or_over_range_is_no_number(sign, last, tmp_path):
     lines = ["Time (ms),motor (V),edge (V)", *rows(1e3 * TIME, MOTOR, EDGE)]
     for i in (1, 7, 8, COUNT):
         time, motor, edge = lines[i].split(",")
@@ -127,7 +123,7 @@ def test_a_value_that_is_missing_or_over_range_is_no_number(sign: str, last: boo
         ("utf-8", ["Time (s)", "Displacement (mm)", "Force (N)"]),
     ],
 )
-def test_columns_of_other_languages_are_known(encoding: str, names: list[str], tmp_path: Path) -> None:
+def test_columns_of_other_languages_are_known(encoding, names, tmp_path):
     recording = read(tmp_path / "a.csv", [",".join(names), *rows(TIME, MOTOR, EDGE)], encoding)
     wanted = {q: column_of(recording, q, {}) for q in ("time", "travel", "force")}
     data, lost = columns_of_test(recording, {q: one for q, one in wanted.items() if one})
@@ -136,22 +132,7 @@ def test_columns_of_other_languages_are_known(encoding: str, names: list[str], t
     np.testing.assert_allclose(data["force"], EDGE, atol=1e-6)
 
 
-@pytest.mark.parametrize("names", ["Dehnung,Spannung\n%,MPa", "Strain;Stress\n%;MPa", "# Strain,Stress\n%,MPa"])
-def test_a_row_of_units_may_begin_with_percent(names: str, tmp_path: Path) -> None:
-    delimiter = ";" if ";" in names else ","
-    recording = read(tmp_path / "a.csv", [*names.split("\n"), *rows(MOTOR, EDGE, delimiter=delimiter)])
-    assert column_of(recording, "strain", {}) == (0, 0.01)
-    assert column_of(recording, "stress", {}) == (1, 1e6)
-
-
-@pytest.mark.parametrize(("decimal", "big", "value"), [(".", "1,001.25", 1001.25), (",", "1.001,25", 1001.25)])
-def test_thousands_in_quotes_are_plain_next_to_a_fraction(decimal: str, big: str, value: float, tmp_path: Path) -> None:
-    lines = ["Load (N);Travel (mm)", *(f'"{i}{decimal}5";"0{decimal}25"' for i in range(8)), f'"{big}";"0{decimal}5"']
-    found = read(tmp_path / "a.csv", lines).columns([0, 1])
-    np.testing.assert_allclose(found[[0, 7, 8]], [[0.5, 0.25], [7.5, 0.25], [value, 0.5]])
-
-
-def test_lost_samples_leave_their_places_empty(tmp_path: Path) -> None:
+def test_lost_samples_leave_their_places_empty(tmp_path):
     kept = np.delete(np.arange(COUNT), [5, 6, 100, 250])
     read(tmp_path / "a.csv", ["Time (s),motor (V)", *rows(TIME[kept], MOTOR[kept])])
     sensor = SensorTable(quantity="velocity", unit="mm/s", scale=2.0)
@@ -162,72 +143,10 @@ def test_lost_samples_leave_their_places_empty(tmp_path: Path) -> None:
     np.testing.assert_allclose(signal.samples[:, 0], expected, atol=1e-5)
 
 
-def test_times_off_every_grid_are_uneven(tmp_path: Path) -> None:
-    times = TIME + np.where(TIME > 0.07, 0.6 / RATE, 0.0)
-    read(tmp_path / "a.csv", ["Time (s),motor (V)", *rows(times, MOTOR)])
-    sensor = SensorTable(quantity="velocity", unit="mm/s", scale=2.0)
-    assert open_signal(tmp_path / "a.csv", RecordingTable(), (sensor,), "a.csv").off_grid > 0.3
-
-
-def big_endian(content: bytes) -> bytes:
-    """Return the bytes of a TDMS file of one segment with its numbers in the other order."""
-    import struct
-
-    out, at = bytearray(content[:4]), 4
-
-    def take(form: str) -> tuple:
-        nonlocal at
-        values = struct.unpack_from("<" + form, content, at)
-        at += struct.calcsize("<" + form)
-        out.extend(struct.pack(">" + form, *values))
-        return values
-
-    def text() -> None:
-        nonlocal at
-        (length,) = take("I")
-        out.extend(content[at : at + length])
-        at += length
-
-    (contents,) = struct.unpack_from("<I", content, at)
-    out.extend(struct.pack("<I", contents | 1 << 6))
-    at += 4
-    _, _, raw = take("IQQ")
-    begin = at
-    for _ in range(take("I")[0]):
-        text()
-        if take("I")[0] not in (0, 0xFFFFFFFF):
-            take("IIQ")
-        for _ in range(take("I")[0]):
-            text()
-            (kind,) = take("I")
-            text() if kind == 0x20 else take({10: "d", 7: "I", 3: "i", 4: "q", 8: "Q"}[kind])
-    assert at == begin + raw
-    return bytes(out) + np.frombuffer(content[at:], "<f8").astype(">f8").tobytes()
-
-
-def test_tdms_of_the_other_byte_order(tmp_path: Path) -> None:
-    pytest.importorskip("nptdms")
-    write_tdms(tmp_path / "a.tdms")
-    (tmp_path / "b.tdms").write_bytes(big_endian((tmp_path / "a.tdms").read_bytes()))
-    one, other = (open_recording(tmp_path / name) for name in ("a.tdms", "b.tdms"))
-    assert [(c.name, c.unit, c.step_s) for c in one.channels] == [(c.name, c.unit, c.step_s) for c in other.channels]
-    np.testing.assert_array_equal(one.columns([0, 1, 2]), other.columns([0, 1, 2]))
-
-
 @pytest.mark.parametrize("unit", ["um", b"um", ["um"], np.array([b"um"]), np.array("um", dtype="S2")])
-def test_hdf5_units_are_text_or_an_array_of_it(unit: object, tmp_path: Path) -> None:
+def test_hdf5_units_are_text_or_an_array_of_it(unit, tmp_path):
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["x"] = MOTOR
         file["x"].attrs["units"] = unit
     assert [one.unit for one in open_recording(tmp_path / "a.h5").channels] == ["um"]
-
-
-def test_a_message_lists_few_of_many_channels(tmp_path: Path) -> None:
-    from unitcad.errors import Refusal
-
-    recording = read(tmp_path / "a.csv", rows(*np.random.default_rng(1).random((5000, 3))))
-    for wanted in ("none", 5001):
-        with pytest.raises(Refusal) as refused:
-            recording.index(wanted, "channel")
-        assert "10 column 10 and 4990 more" in str(refused.value)

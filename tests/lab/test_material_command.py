@@ -1,15 +1,11 @@
 """`unitcad material`: layouts and units, several specimens, a table that a spec takes, refusals, dynamic tests."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
 import tomllib
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,13 +17,13 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_input
 from unitcad.lab.columns import declared
 from unitcad.lab.dynamic import evaluate_dynamic, read_dynamic
-from unitcad.lab.tensile import Specimen, TensileCurve, evaluate, header_of, read_curve
+from unitcad.lab.tensile import Specimen, evaluate, header_of, read_curve
 from unitcad.validation import load
 
 C10 = 1.2e4
 
 
-def neo_hooke(strain: np.ndarray) -> np.ndarray:
+def neo_hooke(strain):
     """The nominal stress of a bar by neo-Hooke's law, Pa."""
     stretch = 1.0 + strain
     return 2.0 * C10 * (stretch - stretch**-2)
@@ -37,44 +33,44 @@ EXACT_15 = float(neo_hooke(np.array(0.15))) / 0.15
 """Secant modulus at 15 % of the synthetic silicone, Pa."""
 
 
-def _table(path: Path, head: str, columns: list[np.ndarray], lines: tuple[str, ...] = (), sign: str = ",") -> Path:
+def _table(path, head, columns, lines=(), sign=","):
     rows = [sign.join(f"{value:.9g}" for value in row) for row in np.stack(columns, axis=1)]
     path.write_text("\n".join([*lines, head, *rows, ""]), "utf-8")
     return path
 
 
-def _curve(factor: float = 1.0, most: float = 1.5) -> tuple[np.ndarray, np.ndarray]:
+def _curve(factor=1.0, most=1.5):
     strain = np.linspace(0.0, most, 301)
     return strain, factor * neo_hooke(strain)
 
 
-def _layouts() -> dict[str, Callable[[Path], tuple[Path, dict[str, str], Specimen]]]:
+def _layouts():
     strain, stress = _curve()
     area, gauge = 18e-6, 33.0
 
-    def plain(folder: Path):
+    def plain(folder):
         return _table(folder / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3]), {}, Specimen()
 
-    def true_values(folder: Path):
+    def true_values(folder):
         head = "Time (s);True Strain (1);True Stress (MPa)"
         columns = [strain / 0.2, np.log1p(strain), stress * (1 + strain) / 1e6]
         return _table(folder / "b.csv", head, columns, sign=";"), {}, Specimen()
 
-    def force_and_travel(folder: Path):
+    def force_and_travel(folder):
         lines = ("Specimen Thickness (mm);3;", "Specimen Width (mm);6;", "Specimen Length (mm);33;", "Load Cell;50 N;")
         head = "Extension (mm);Force (N);Time (s)"
         columns = [12.0 + strain * gauge, stress * area, strain / 0.2]
         return _table(folder / "c.csv", head, columns, lines, ";"), {}, Specimen()
 
-    def given_lengths(folder: Path):
+    def given_lengths(folder):
         columns = [strain * gauge, stress * area * 1e3]
         return _table(folder / "d.csv", "Extension (mm),Load (mN)", columns), {}, Specimen(6.0, 3.0, gauge)
 
-    def declared_columns(folder: Path):
+    def declared_columns(folder):
         path = _table(folder / "e.txt", "a\tb\tc", [strain / 0.2, stress / 6894.757293168, 100 * strain], sign="\t")
         return path, {"stress": "2:psi", "strain": "c:%"}, Specimen()
 
-    def quoted(folder: Path, decimal: str = ".", sign: str = ",", units: tuple[str, ...] = ("(s)", "(mm)", "(N)")):
+    def quoted(folder, decimal=".", sign=",", units=("(s)", "(mm)", "(N)")):
         head = ['"Specimen","a, b"', '"Specimen Width","6{0}0","mm"', '"Specimen Thickness (mm)","3{0}0"']
         rows = [("Time", "Extension", "Force"), units]
         rows += [
@@ -86,16 +82,16 @@ def _layouts() -> dict[str, Callable[[Path], tuple[Path, dict[str, str], Specime
         path.write_text("\n".join(lines) + "\n")
         return path, {}, Specimen(gauge_mm=gauge)
 
-    def quoted_commas(folder: Path):
+    def quoted_commas(folder):
         return quoted(folder, ",")
 
-    def quoted_semicolons(folder: Path):
+    def quoted_semicolons(folder):
         return quoted(folder, ",", ";", ("[s]", "[mm]", "[N]"))
 
-    def quoted_tabs(folder: Path):
+    def quoted_tabs(folder):
         return quoted(folder, ".", "\t", ("s", "mm", "N"))
 
-    def row_of_units(folder: Path):
+    def row_of_units(folder):
         rows = [f"{a:.7f},{b:.7f}" for a, b in zip(strain, stress / 6894.757293168, strict=True)]
         path = folder / "g.csv"
         path.write_text("\n".join(["Strain,Stress", "(mm/mm),(psi)", "", *rows]) + "\n")
@@ -107,7 +103,7 @@ def _layouts() -> dict[str, Callable[[Path], tuple[Path, dict[str, str], Specime
 
 
 @pytest.mark.parametrize("layout", _layouts())
-def test_one_curve_in_every_layout_is_the_same_curve(layout: str, tmp_path: Path) -> None:
+def test_one_curve_in_every_layout_is_the_same_curve(layout, tmp_path):
     path, columns, specimen = _layouts()[layout](tmp_path)
     curve = read_curve(path, declared(f"{q}={c}" for q, c in columns.items()), specimen)
     assert float(np.interp(0.15, curve.strain, curve.stress)) / 0.15 == pytest.approx(EXACT_15, rel=1e-3)
@@ -125,20 +121,12 @@ def test_one_curve_in_every_layout_is_the_same_curve(layout: str, tmp_path: Path
         (['"0,1","0,2"', '"0,2","0,3"', '0,3,"0,4"'], None),
     ],
 )
-def test_quoted_numbers_are_not_guessed(lines: list[str], field: str | None, tmp_path: Path) -> None:
+def test_quoted_numbers_are_not_guessed(lines, field, tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("\n".join(["Strain (%),Stress (kPa)", *lines]) + "\n")
     with pytest.raises(Refusal) as refused:
         read_curve(path, {}, Specimen())
     assert refused.value.field == (field or str(path))
-
-
-def test_names_that_their_spaces_have_split_are_no_columns(tmp_path: Path) -> None:
-    """Four words over four columns, though they name two: Force would be the fourth."""
-    path = tmp_path / "a.txt"
-    path.write_text("Extension (mm) Force (N)\n" + "".join(f"{i}.5 {i}.25 {i} {i}\n" for i in range(1, 9)))
-    with pytest.raises(Refusal, match="declare strain=COLUMN:UNIT; its columns: 1 column 1, 2 column 2"):
-        read_curve(path, {}, Specimen(6.0, 3.0, 33.0))
 
 
 @pytest.mark.parametrize(
@@ -154,18 +142,9 @@ def test_names_that_their_spaces_have_split_are_no_columns(tmp_path: Path) -> No
         ("Width [cm]\t0.65", 6.5),
     ],
 )
-def test_a_width_of_the_header_is_read_whole_or_not(line: str, width: float | None, tmp_path: Path) -> None:
+def test_a_width_of_the_header_is_read_whole_or_not(line, width, tmp_path):
     (tmp_path / "a.csv").write_text(f"{line}\n")
     assert header_of(tmp_path / "a.csv").width_mm == (None if width is None else pytest.approx(width))
-
-
-def test_a_header_says_what_the_machine_is(tmp_path: Path) -> None:
-    path, _, _ = _layouts()["force_and_travel"](tmp_path)
-    assert header_of(path) == Specimen(6.0, 3.0, 33.0, cell_n=50.0)
-    curve = read_curve(path, {}, Specimen(thickness_mm=1.5))
-    assert curve.specimen.thickness_mm == 1.5
-    assert curve.specimen.crosshead is True
-    assert curve.rate == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(
@@ -181,7 +160,7 @@ def test_a_header_says_what_the_machine_is(tmp_path: Path) -> None:
         ("Strain (%),Force (N)", [[1, 2, 3], [1, 2, 3]], "--width-mm", "width and thickness"),
     ],
 )
-def test_what_would_be_a_guess_is_refused(head: str, columns: list, field: str, part: str, tmp_path: Path) -> None:
+def test_what_would_be_a_guess_is_refused(head, columns, field, part, tmp_path):
     path = _table(tmp_path / "a.csv", head, [np.array(column) + 0.25 for column in columns])
     with pytest.raises(Refusal) as refused:
         read_curve(path, {}, Specimen())
@@ -190,7 +169,7 @@ def test_what_would_be_a_guess_is_refused(head: str, columns: list, field: str, 
     assert part in str(refused.value)
 
 
-def test_rows_without_a_number_are_counted_and_a_gap_gives_no_modulus(tmp_path: Path) -> None:
+def test_rows_without_a_number_are_counted_and_a_gap_gives_no_modulus(tmp_path):
     strain, stress = _curve()
     few = stress.copy()
     few[[40, 90, 91]] = np.nan
@@ -207,8 +186,8 @@ def test_rows_without_a_number_are_counted_and_a_gap_gives_no_modulus(tmp_path: 
         assert refused.value.field == "--strain"
 
 
-def test_specimens_that_are_not_one_silicone_s_are_refused_and_an_odd_one_is_named(tmp_path: Path) -> None:
-    def made(factor: float) -> TensileCurve:
+def test_specimens_that_are_not_one_silicone_s_are_refused_and_an_odd_one_is_named(tmp_path):
+    def made(factor):
         x, y = _curve(factor)
         path = _table(tmp_path / f"{factor:g}.csv", "Strain (%),Stress (kPa)", [100 * x, y / 1e3])
         return read_curve(path, {}, Specimen())
@@ -221,7 +200,7 @@ def test_specimens_that_are_not_one_silicone_s_are_refused_and_an_odd_one_is_nam
     assert "scatter" not in {one.code for one in evaluate([made(1.0), made(1.1)], (0.12, 0.24)).warnings}
 
 
-def test_one_specimen_counts_once(tmp_path: Path) -> None:
+def test_one_specimen_counts_once(tmp_path):
     strain, stress = _curve()
     path = _table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3])
     copy = tmp_path / "b.csv"
@@ -233,18 +212,7 @@ def test_one_specimen_counts_once(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_table_that_no_spec_would_load_is_not_written(tmp_path: Path) -> None:
-    strain, stress = _curve()
-    path = _table(tmp_path / "a.csv", "Strain (%),Stress (GPa)", [100 * strain, stress / 1e3])
-    done = _invoke(path, "--like", "ecoflex-00-30", "-o", tmp_path / "out", fails=True)
-    assert isinstance(done.exception, Refusal)
-    assert done.exception.field.startswith("materials.a.")
-    assert not (tmp_path / "out").exists()
-    path = _table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e2])
-    assert "warning: sheet: 8.93 times" in _invoke(path, "--like", "ecoflex-00-30", "--strain", "12:24").output
-
-
-def test_an_option_that_would_have_no_effect_is_refused(tmp_path: Path) -> None:
+def test_an_option_that_would_have_no_effect_is_refused(tmp_path):
     strain, stress = _curve()
     path = _table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3])
     for words in (("--deformation", "shear"), ("--cell-n", "50"), ("--cell-n", "50", "--width-mm", "6")):
@@ -254,7 +222,7 @@ def test_an_option_that_would_have_no_effect_is_refused(tmp_path: Path) -> None:
     _invoke(path, "--like", "ecoflex-00-30", "--cell-n", "50", "--width-mm", "6", "--thickness-mm", "3")
 
 
-def test_a_reversed_or_short_curve_is_refused(tmp_path: Path) -> None:
+def test_a_reversed_or_short_curve_is_refused(tmp_path):
     strain, stress = _curve()
     with pytest.raises(UnitcadError, match="reversed"):
         read_curve(_table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, -stress]), {}, Specimen())
@@ -269,13 +237,13 @@ def test_a_reversed_or_short_curve_is_refused(tmp_path: Path) -> None:
     ("text", "part"),
     [("stress", "QUANTITY=COLUMN"), ("stres=1", "'stres'"), ("stress=1:mm", "'mm'"), ("stress=", "QUANTITY=COLUMN")],
 )
-def test_a_wrong_declaration_is_refused(text: str, part: str) -> None:
+def test_a_wrong_declaration_is_refused(text, part):
     with pytest.raises(Refusal, match="--column") as refused:
         declared([text])
     assert part in str(refused.value)
 
 
-def test_the_range_covers_methods_specimens_and_cross_section(tmp_path: Path) -> None:
+def test_the_range_covers_methods_specimens_and_cross_section(tmp_path):
     factors = (0.9, 1.0, 1.1)
     curves = [
         read_curve(_table(tmp_path / f"{f}.csv", "Strain (%),Stress (kPa)", [100 * x, y / 1e3]), {}, Specimen(6.0, 3.0))
@@ -295,7 +263,7 @@ def test_the_range_covers_methods_specimens_and_cross_section(tmp_path: Path) ->
     assert "specimens" not in {one.code for one in result.warnings}
 
 
-def test_cycles_count_by_their_first_pull(tmp_path: Path) -> None:
+def test_cycles_count_by_their_first_pull(tmp_path):
     strain, stress = _curve(most=0.5)
     there = np.concatenate([strain[:200], strain[199:0:-1], strain])
     back = np.concatenate([stress[:200], 0.7 * stress[199:0:-1], 0.7 * stress[:200], stress[200:]])
@@ -304,7 +272,7 @@ def test_cycles_count_by_their_first_pull(tmp_path: Path) -> None:
     assert "cycles" in {one.code for one in evaluate([curve], (0.12, 0.24)).warnings}
 
 
-def _invoke(*words: str | Path, fails: bool = False):
+def _invoke(*words, fails=False):
     done = CliRunner().invoke(app, ["material", *map(str, words)], catch_exceptions=True)
     assert (done.exception is not None) == fails, done.output
     return done
@@ -318,7 +286,7 @@ PASTED = {
 }
 
 
-def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path: Path) -> None:
+def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path):
     curves = [
         _table(tmp_path / f"{i}.csv", "Strain (%),Stress (kPa)", [100 * x, y / 1e3])
         for i, (x, y) in enumerate((_curve(1.0, 3.5), _curve(1.05, 3.5)))
@@ -352,7 +320,7 @@ def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path: Pa
     assert again == {name: (tmp_path / "two" / name).read_bytes() for name in os.listdir(tmp_path / "two")}
 
 
-def test_a_refusal_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_a_refusal_leaves_nothing_behind(tmp_path):
     strain, stress = _curve(most=0.2)
     path = _table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3])
     for words, field in (
@@ -369,7 +337,7 @@ def test_a_refusal_leaves_nothing_behind(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_damaged_file_is_read_as_it_was_or_refused(tmp_path: Path) -> None:
+def test_a_damaged_file_is_read_as_it_was_or_refused(tmp_path):
     """Bytes changed, cut out or doubled: a curve without gaps, or one clear error."""
     random = np.random.default_rng(7)
     whole = _layouts()["force_and_travel"](tmp_path)[0].read_bytes()
@@ -400,14 +368,14 @@ def test_a_damaged_file_is_read_as_it_was_or_refused(tmp_path: Path) -> None:
 LAW = {"static": 80e3, "tau": 400e-6, "n": 0.31}
 
 
-def _dynamic(path: Path, hertz: np.ndarray, noise: float = 0.0, seed: int = 1) -> Path:
+def _dynamic(path, hertz, noise=0.0, seed=1):
     law, random = FractionalKelvinVoigt(LAW["tau"], LAW["n"]), np.random.default_rng(seed)
     modulus = np.array([law.complex_shear(LAW["static"], 2 * math.pi * f) for f in hertz])
     storage, loss = (part * np.exp(noise * random.standard_normal(len(hertz))) for part in (modulus.real, modulus.imag))
     return _table(path, "Frequency (Hz),E' (kPa),E'' (kPa)", [hertz, storage / 1e3, loss / 1e3])
 
 
-def test_an_exact_law_is_recovered_and_extrapolated(tmp_path: Path) -> None:
+def test_an_exact_law_is_recovered_and_extrapolated(tmp_path):
     curve = read_dynamic(_dynamic(tmp_path / "a.csv", np.geomspace(0.1, 20, 25)), {})
     assert curve.deformation == "tension"
     result = evaluate_dynamic(curve, 125.0)
@@ -423,7 +391,7 @@ def test_an_exact_law_is_recovered_and_extrapolated(tmp_path: Path) -> None:
     assert {one.code for one in result.warnings} == {"specimens"}
 
 
-def test_storage_and_loss_swapped_are_refused(tmp_path: Path) -> None:
+def test_storage_and_loss_swapped_are_refused(tmp_path):
     path = _dynamic(tmp_path / "ecoflex-00-30.csv", np.geomspace(1, 50, 20))
     done = _invoke("--dma", path, "--column", "storage=3", "--column", "loss=2", "-o", tmp_path / "out", fails=True)
     assert isinstance(done.exception, Refusal)
@@ -431,14 +399,7 @@ def test_storage_and_loss_swapped_are_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_law_that_misses_the_points_is_warned_of(tmp_path: Path) -> None:
-    curve = read_dynamic(_dynamic(tmp_path / "a.csv", np.geomspace(1, 200, 20), 0.25), {})
-    assert "misfit" in {one.code for one in evaluate_dynamic(curve, 125.0).warnings}
-    curve = read_dynamic(_dynamic(tmp_path / "a.csv", np.geomspace(1, 200, 20), 0.01), {})
-    assert "misfit" not in {one.code for one in evaluate_dynamic(curve, 125.0).warnings}
-
-
-def test_the_stated_error_covers_the_truth(tmp_path: Path) -> None:
+def test_the_stated_error_covers_the_truth(tmp_path):
     exact = FractionalKelvinVoigt(LAW["tau"], LAW["n"]).complex_shear(LAW["static"], 2 * math.pi * 60)
     held = 0
     for seed in range(20):
@@ -448,7 +409,7 @@ def test_the_stated_error_covers_the_truth(tmp_path: Path) -> None:
     assert held >= 17
 
 
-def test_a_shear_test_gives_three_times_the_modulus_and_must_say_that_it_is_one(tmp_path: Path) -> None:
+def test_a_shear_test_gives_three_times_the_modulus_and_must_say_that_it_is_one(tmp_path):
     path = _dynamic(tmp_path / "a.csv", np.geomspace(1, 200, 20))
     text = path.read_text().replace("E'", "storage modulus", 1).replace("E''", "loss modulus", 1)
     path.write_text(text)
@@ -460,7 +421,7 @@ def test_a_shear_test_gives_three_times_the_modulus_and_must_say_that_it_is_one(
     assert not shear.extrapolated
 
 
-def test_a_dynamic_test_fills_the_modulus_at_the_motor_s_frequency(tmp_path: Path) -> None:
+def test_a_dynamic_test_fills_the_modulus_at_the_motor_s_frequency(tmp_path):
     path = _dynamic(tmp_path / "ecoflex-00-30.csv", np.geomspace(1, 50, 20), 0.01)
     done = _invoke("--dma", path, "-o", tmp_path / "out", "--json")
     entry = tomllib.loads((tmp_path / "out" / "material.toml").read_text("utf-8"))["materials"]["ecoflex-00-30"]
@@ -476,44 +437,9 @@ def test_a_dynamic_test_fills_the_modulus_at_the_motor_s_frequency(tmp_path: Pat
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("lbF", 4.4482216152605), ("LBF", 4.4482216152605), ("KGF", 9.80665)])
-def test_a_unit_s_case_does_not_matter_where_it_can_t_be_another_unit(unit: str, factor: float, tmp_path: Path) -> None:
+def test_a_unit_s_case_does_not_matter_where_it_can_t_be_another_unit(unit, factor, tmp_path):
     strain, stress = _curve()
     head = f"Travel [mm],Load [{unit}]"
     path = _table(tmp_path / "a.csv", head, [33 * strain, stress * 18e-6 / factor])
     curve = read_curve(path, {}, Specimen(6.0, 3.0, 33.0))
     assert curve.stress[-1] == pytest.approx(stress[-1], rel=1e-6)
-
-
-@pytest.mark.parametrize("head", ["Travel [Mm],Load [N]", "Travel [mm],Load [MN]", "Travel [mm],Stress [mPa]"])
-def test_a_unit_s_case_that_may_be_a_prefix_s_is_exact(head: str, tmp_path: Path) -> None:
-    strain, stress = _curve()
-    path = _table(tmp_path / "a.csv", head, [33 * strain, stress])
-    with pytest.raises(Refusal, match="has the unit"):
-        read_curve(path, {}, Specimen(6.0, 3.0, 33.0))
-
-
-def test_a_bare_length_is_the_gauge_length_unless_one_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text('"Width","6.0","mm"\n"Length","33","mm"\n"Grip length","60","mm"\nTime,Load\n1,2\n')
-    assert header_of(path).gauge_mm == 33.0
-    path.write_text('"Length","115","mm"\n"Gauge length","33","mm"\nTime,Load\n1,2\n')
-    assert header_of(path).gauge_mm == 33.0
-
-
-def test_a_file_that_is_not_there_is_named_before_anything_else(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["material", str(tmp_path / "nope.csv")])
-    assert str(done.exception) == f"{tmp_path / 'nope.csv'}: no such file"
-
-
-def test_a_table_of_results_before_the_data_is_skipped(tmp_path: Path) -> None:
-    strain, stress = _curve()
-    rows = [f"{100 * a:.6f},{b:.6f}" for a, b in zip(strain, stress, strict=True)]
-    text = ["Results,Maximum", "1,12.5", "2,13.5", "", "Strain (%),Stress (Pa)", *rows]
-    (tmp_path / "a.csv").write_text("\n".join(text) + "\n")
-    arguments = ["material", str(tmp_path / "a.csv"), "--name", "x", "--like", "ecoflex-00-30"]
-    refused = CliRunner().invoke(app, arguments)
-    assert isinstance(refused.exception, Refusal)
-    assert "looks like data" in str(refused.exception)
-    done = CliRunner().invoke(app, [*arguments, "--skip-lines", "4", "--json"])
-    assert done.exit_code == 0, done.output
-    assert len(json.loads(done.stdout)["tensile"]["methods"]) == 7

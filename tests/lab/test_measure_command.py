@@ -1,7 +1,5 @@
 """`unitcad measure`: levels of a synthetic campaign with known truth, its files, findings and refusals."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -17,7 +15,7 @@ from benchmarks.accuracy.synthetic_records import Scenario, synthetic
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import read_campaign
-from unitcad.lab.measuring import Measured, measure
+from unitcad.lab.measuring import measure
 from unitcad.lab.record import RULES
 
 RATE = 2000
@@ -26,16 +24,16 @@ FULL = 500.0
 HEAD = '[sensor]\nquantity = "displacement"\nunit = "um"\nscale = 500.0\nfull_scale = 500.0\n'
 
 
-def write(path: Path, *channels: np.ndarray, rate: int = RATE) -> None:
+def write(path, *channels, rate=RATE):
     wavfile.write(path, rate, np.column_stack(channels).astype("<f4") / np.float32(FULL))
 
 
-def campaign(folder: Path, text: str, head: str = HEAD) -> Measured:
+def campaign(folder, text, head=HEAD):
     (folder / "c.toml").write_text(f'name = "test"\n{head}{text}')
     return measure(read_campaign(folder / "c.toml"), folder)
 
 
-def repeats(folder: Path, stem: str, amplitude: float, hz: float, scenario: Scenario = SCENARIO, seed: int = 0) -> str:
+def repeats(folder, stem, amplitude, hz, scenario=SCENARIO, seed=0):
     for i in range(3):
         rng = np.random.default_rng([seed, i, round(amplitude)])
         write(folder / f"{stem}{i}.wav", synthetic(scenario, rng, amplitude * (1 + 0.02 * (i - 1)), hz).x)
@@ -43,19 +41,19 @@ def repeats(folder: Path, stem: str, amplitude: float, hz: float, scenario: Scen
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     motor, edge, far = (repeats(tmp_path, *one) for one in (("m", 300, 122), ("e", 120, 122.5), ("s", 30, 121.6)))
     time = np.arange(4000) / RATE
     write(tmp_path / "off.wav", 3 * np.cos(2 * np.pi * 50 * time) + 1.2 * np.cos(2 * np.pi * 100 * time))
     (tmp_path / "c.toml").write_text(
-        f'name = "test"\n{HEAD}[blank]\nrecords = ["off.wav"]\n[chain]\nuse = ["line", "paper"]\n'
+        f'name = "test"\n{HEAD}[blank]\nrecords = ["off.wav"]\n[chain]\nuse = ["line", "bandpass"]\n'
         f'[[unit]]\nname = "a"\nspec = "encapsulating"\nreference = {motor}\nedge = {edge}\n'
         f"[[unit.point]]\ndistance_mm = 10.0\nrecords = {far}\n"
     )
     return tmp_path
 
 
-def test_a_campaign_has_the_levels_of_its_truth(folder: Path) -> None:
+def test_a_campaign_has_the_levels_of_its_truth(folder):
     result = measure(read_campaign(folder / "c.toml"), folder)
     assert result.findings == ()
     truth = {0.0: 120 / 300, 10.0: 30 / 300}
@@ -65,11 +63,11 @@ def test_a_campaign_has_the_levels_of_its_truth(folder: Path) -> None:
     assert len(result.levels) == 4
     for record in result.records["a"]:
         assert record.u_um < 0.02 * record.amplitude_um
-        assert record.gains["paper"] == pytest.approx(1.0, abs=0.01)
+        assert record.gains["bandpass"] == pytest.approx(1.0, abs=0.01)
     assert dict(result.mains)[1] == pytest.approx(3.0, rel=1e-3)
 
 
-def test_the_files_of_a_campaign(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_files_of_a_campaign(folder, monkeypatch):
     monkeypatch.chdir(folder)
     done = CliRunner().invoke(app, ["measure", "c.toml", "-o", "one"])
     assert done.exit_code == 0, done.output
@@ -93,7 +91,7 @@ def test_the_files_of_a_campaign(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     assert again["levels"] == measured["level"]
 
 
-def test_velocity_over_j_omega_is_displacement(tmp_path: Path) -> None:
+def test_velocity_over_j_omega_is_displacement(tmp_path):
     """The same motion as velocity in mm/s, as displacement in um, and as acceleration in m/s2, by construction."""
     rng = np.random.default_rng(1)
     time, hz = np.arange(4000) / RATE, 123.0
@@ -118,7 +116,7 @@ def test_velocity_over_j_omega_is_displacement(tmp_path: Path) -> None:
     assert amplitudes["d"][0] == pytest.approx(300.0, rel=1e-3)
 
 
-def test_a_motor_channel_gives_the_ratio(tmp_path: Path) -> None:
+def test_a_motor_channel_gives_the_ratio(tmp_path):
     for i in range(3):
         motor = synthetic(Scenario("m", snr=100.0, wander=0.04, drift=0.01), np.random.default_rng(i), 250.0, 118.0)
         noise = np.random.default_rng(50 + i).standard_normal(len(motor.x))
@@ -130,7 +128,7 @@ def test_a_motor_channel_gives_the_ratio(tmp_path: Path) -> None:
     assert result.records["a"][1].lag_deg == pytest.approx(0.0, abs=0.2)
 
 
-def _faulty(fault: str) -> tuple[np.ndarray, int, float]:
+def _faulty(fault):
     rng = np.random.default_rng(5)
     time = np.arange(6400) / 3200
     if fault == "L101":  # an accelerometer's line at 62.7 Hz that leaves its range: synthesised
@@ -154,13 +152,13 @@ def _faulty(fault: str) -> tuple[np.ndarray, int, float]:
 
 
 @pytest.mark.parametrize("code", ["L101", "L102", "L104", "L105", "L106", "L107", "L108", "L110", "L111"])
-def test_a_faulty_record_is_a_finding(code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_faulty_record_is_a_finding(code, tmp_path, monkeypatch):
     x, rate, _ = _faulty(code)
     head = HEAD.replace("full_scale = 500.0\n", "")
     for i in range(3):
         write(tmp_path / f"e{i}.wav", x + 1e-4 * i, rate=rate)
     motor = repeats(tmp_path, "m", 300, 122)
-    chain = '[chain]\nuse = ["line", "paper"]\n' if code == "L106" else ""
+    chain = '[chain]\nuse = ["line", "bandpass"]\n' if code == "L106" else ""
     edges = '["e0.wav", "e1.wav", "e2.wav"]'
     if code in ("L101", "L102", "L105", "L106", "L111"):
         for i in range(3):
@@ -178,7 +176,7 @@ def test_a_faulty_record_is_a_finding(code: str, tmp_path: Path, monkeypatch: py
     assert (levels == []) == (RULES[code].severity == "error")
 
 
-def test_an_uneven_time_axis_and_disagreeing_repeats(tmp_path: Path) -> None:
+def test_an_uneven_time_axis_and_disagreeing_repeats(tmp_path):
     time = np.arange(4000) / RATE
     for i in range(7):
         x = (300.0 + 0.1 * i if i < 3 or i == 6 else 100.0 * 1.4**i) * np.cos(2 * np.pi * 120 * time)
@@ -213,7 +211,7 @@ def test_an_uneven_time_axis_and_disagreeing_repeats(tmp_path: Path) -> None:
          "chain.band_hz"),
     ],
 )  # fmt: skip
-def test_what_is_not_known_is_asked_for(text: str, field: str, tmp_path: Path) -> None:
+def test_what_is_not_known_is_asked_for(text, field, tmp_path):
     (tmp_path / "w.csv").write_text("u\n" + "1.5\n0.5\n" * 50)
     (tmp_path / "x.csv").write_text("u\n" + "0.5\n1.5\n" * 50)
     (tmp_path / "t.csv").write_text("u,v\n" + "0.5,2.5\n1.5,1.5\n" * 50)
@@ -224,8 +222,8 @@ def test_what_is_not_known_is_asked_for(text: str, field: str, tmp_path: Path) -
     assert refused.value.field == field
 
 
-def test_the_shipped_campaign_has_the_levels_put_in() -> None:
-    """What docs/measuring.md shows: computed recordings, which say so."""
+def test_the_shipped_campaign_has_the_levels_put_in():
+    """What docs/how-to/measure.md shows: computed recordings, which say so."""
     path = Path(__file__).parents[2] / "templates" / "lab" / "campaign.toml"
     asked = read_campaign(path)
     assert "synthetic" in asked.note
@@ -237,6 +235,6 @@ def test_the_shipped_campaign_has_the_levels_put_in() -> None:
     assert result.levels[0].level.value == pytest.approx(0.418, abs=5e-4)
 
 
-def test_every_finding_is_on_the_page() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "measuring.md").read_text("utf-8")
+def test_every_finding_is_on_the_page():
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "measure.md").read_text("utf-8")
     assert [code for code in RULES if f"| {code} |" not in page] == []

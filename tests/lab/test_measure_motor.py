@@ -1,23 +1,19 @@
 """The motor's side of a level: its channel is judged by the same rules as the unit's."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.io import wavfile
 
 from unitcad.lab import measured_files
 from unitcad.lab.campaign import read_campaign
-from unitcad.lab.measuring import Measured, measure
+from unitcad.lab.measuring import measure
 
 RATE = 2000
 TIME = np.arange(4000) / RATE
 HEAD = 'name = "t"\n[sensor]\nquantity = "displacement"\nunit = "um"\nscale = 500.0\n'
 
 
-def paired(folder: Path, motor: np.ndarray, sensor: str = "") -> Measured:
+def paired(folder, motor, sensor=""):
     for i in range(3):
         unit = (60 + i) * np.cos(2 * np.pi * 121.3 * TIME) + np.random.default_rng(i).standard_normal(len(TIME))
         wavfile.write(folder / f"{i}.wav", RATE, (np.column_stack([unit, motor]) / 500).astype("<f4"))
@@ -41,34 +37,34 @@ RNG = np.random.default_rng(9)
         ("L111", np.zeros(4000), ""),
     ],
 )
-def test_a_bad_motor_channel_gives_no_level(tmp_path: Path, code: str, motor: np.ndarray, sensor: str) -> None:
+def test_a_bad_motor_channel_gives_no_level(tmp_path, code, motor, sensor):
     result = paired(tmp_path, motor, sensor)
     assert result.levels == ()
     found = [one for one in result.findings if one.where == "0.wav, motor"]
     assert (code, "error") in {(one.code, one.severity) for one in found}, result.findings
 
 
-def test_the_motors_range_is_its_sensors(tmp_path: Path) -> None:
+def test_the_motors_range_is_its_sensors(tmp_path):
     sensor = '[motor_sensor]\nquantity = "displacement"\nunit = "um"\nscale = 500.0\nfull_scale = 300.0\n'
     result = paired(tmp_path, MOTOR, sensor)
     found = {(one.code, one.where) for one in result.findings}
     assert found == {*(("L101", f"{i}.wav, motor") for i in range(3)), ("L112", "a, edge")}
 
 
-def apart(folder: Path, edge: np.ndarray, motor: np.ndarray) -> Measured:
+def apart(folder, edge, motor):
     for i in range(3):
         for name, x in (("m", motor), ("e", edge)):
             noise = np.random.default_rng([i, ord(name)]).standard_normal(len(x))
             x_i = x * (1 + 0.005 * i) + noise
             wavfile.write(folder / f"{name}{i}.wav", RATE, (x_i / 500).astype("<f4"))
     (folder / "c.toml").write_text(
-        HEAD + '[chain]\nuse = ["line", "paper"]\n[[unit]]\nname = "a"\n'
+        HEAD + '[chain]\nuse = ["line", "bandpass"]\n[[unit]]\nname = "a"\n'
         'reference = ["m0.wav", "m1.wav", "m2.wav"]\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
     )
     return measure(read_campaign(folder / "c.toml"), folder)
 
 
-def test_two_motors_at_once_give_no_level(tmp_path: Path) -> None:
+def test_two_motors_at_once_give_no_level(tmp_path):
     """Each record names both lines, the strongest first, and shows no amplitude."""
     one, two = (np.cos(2 * np.pi * hz * TIME) for hz in (118.0, 126.0))
     result = apart(tmp_path, 60 * one + 90 * two, 300 * one + 150 * two)
@@ -84,32 +80,7 @@ def test_two_motors_at_once_give_no_level(tmp_path: Path) -> None:
     assert "<td>no</td>" in measured_files.page(result, {})
 
 
-def test_a_unit_at_another_frequency_than_its_motor_has_no_level(tmp_path: Path) -> None:
-    result = apart(tmp_path, 90 * np.cos(2 * np.pi * 137.0 * TIME), MOTOR)
-    assert result.levels == ()
-    assert "L116" in {one.code for one in result.findings}
-
-
-@pytest.mark.parametrize("fault", ["spikes", "null", "short"])
-def test_a_chain_without_a_robust_step_gives_no_level_of_faulty_records(tmp_path: Path, fault: str) -> None:
-    hertz = 100.2 if fault == "null" else 121.3
-    edge, motor = (size * np.cos(2 * np.pi * hertz * TIME) for size in (90, 300))
-    if fault == "spikes":
-        edge[::200] += 900
-    elif fault == "short":
-        edge = edge[:600]
-    result = apart(tmp_path, edge, motor)
-    assert [one.chain for one in result.levels] == ["line"]
-    assert ("L106" if fault == "null" else "L114") in {one.code for one in result.findings}
-
-
-def test_fewer_than_five_periods_are_an_error(tmp_path: Path) -> None:
-    result = apart(tmp_path, 90 * np.cos(2 * np.pi * 121.3 * TIME[:70]), MOTOR)
-    assert result.levels == ()
-    assert all(one.severity == "error" for one in result.findings if one.code in ("L108", "L111", "L112"))
-
-
-def test_a_motor_below_the_band_is_not_measured_by_its_harmonic(tmp_path: Path) -> None:
+def test_a_motor_below_the_band_is_not_measured_by_its_harmonic(tmp_path):
     x = np.cos(2 * np.pi * 44.0 * TIME) + 0.3 * np.cos(2 * np.pi * 88.0 * TIME + 1.0)
     result = apart(tmp_path, 90 * x, 300 * x)
     assert result.levels == ()

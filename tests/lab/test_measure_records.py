@@ -1,7 +1,5 @@
 """What a record is refused or doubted for, and how it is shown."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +10,10 @@ from unitcad.errors import Refusal
 from unitcad.lab import measured_files
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable, read_campaign
 from unitcad.lab.chains import CHAINS
-from unitcad.lab.chains.chain import Chain, ChainTable
+from unitcad.lab.chains.chain import Chain
 from unitcad.lab.chains.line import Mains
-from unitcad.lab.measuring import Measured, measure
-from unitcad.lab.record import RecordResult, measure_record
+from unitcad.lab.measuring import measure
+from unitcad.lab.record import measure_record
 
 RATE = 2000
 TIME = np.arange(2 * RATE) / RATE
@@ -23,19 +21,19 @@ SENSOR = SensorTable(quantity="displacement", unit="um", scale=500.0)
 HEAD = 'name = "t"\n[sensor]\nquantity = "displacement"\nunit = "um"\nscale = 500.0\n'
 
 
-def record(folder: Path, x: np.ndarray) -> RecordResult:
+def record(folder, x):
     wavfile.write(folder / "a.wav", RATE, (x / 500).astype("<f4"))
     campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),))
     return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), (60.0, 250.0), "a.wav")
 
 
-def noise(size: float = 1.0, seed: int = 1) -> np.ndarray:
+def noise(size=1.0, seed=1):
     return size * np.random.default_rng(seed).standard_normal(len(TIME))
 
 
 @pytest.mark.parametrize("rail", [1, -1])
 @pytest.mark.parametrize("at", [60.0, 30.0, 5.0, 0.0, -30.0, -80.0])
-def test_a_clip_at_one_rail_is_clipping_and_nothing_else(tmp_path: Path, rail: int, at: float) -> None:
+def test_a_clip_at_one_rail_is_clipping_and_nothing_else(tmp_path, rail, at):
     """Down to a rail beyond the line's middle: more than half of the samples then lie on the plateau."""
     x = 7.0 + rail * np.minimum(100 * np.cos(2 * np.pi * 121.3 * TIME) + noise(), at)
     result = record(tmp_path, x)
@@ -43,25 +41,8 @@ def test_a_clip_at_one_rail_is_clipping_and_nothing_else(tmp_path: Path, rail: i
     assert not result.usable
 
 
-def test_a_slight_clip_gives_no_amplitude_either(tmp_path: Path) -> None:
-    result = record(tmp_path, np.minimum(100 * np.cos(2 * np.pi * 121.3 * TIME) + noise(), 85.0))
-    assert [(one.code, one.severity) for one in result.findings] == [("L101", "error")]
-    assert result.as_dict()["amplitude_um"] is None
-
-
-@pytest.mark.parametrize("values", [(0.0, 1.0), (0.0, 1.0, 2.0, 3.0)])
-def test_a_converters_few_steps_are_no_clipping(tmp_path: Path, values: tuple[float, ...]) -> None:
-    result = record(
-        tmp_path,
-        np.random.default_rng(1).choice(
-            values, len(TIME), p=np.array([8, 2, 1, 1][: len(values)]) / sum([8, 2, 1, 1][: len(values)])
-        ),
-    )
-    assert {one.code for one in result.findings} == {"L111"}
-
-
 @pytest.mark.parametrize("hz", [0.6, 1.0, 2.5, 5.0, 9.0])
-def test_a_slow_modulation_is_unsteady_and_one_line(tmp_path: Path, hz: float) -> None:
+def test_a_slow_modulation_is_unsteady_and_one_line(tmp_path, hz):
     """Two equal lines to either side of one are one amplitude that goes up and down."""
     swing = 1 + 0.3 * np.cos(2 * np.pi * hz * TIME + 0.4)
     result = record(tmp_path, 100 * swing * np.cos(2 * np.pi * 121.3 * TIME) + noise())
@@ -71,24 +52,16 @@ def test_a_slow_modulation_is_unsteady_and_one_line(tmp_path: Path, hz: float) -
     assert result.amplitude_um == pytest.approx(100.0, abs=max(3 * result.u_um, 1.0))
 
 
-@pytest.mark.parametrize("turn", [1.6, 3.1])
-def test_equal_lines_of_another_phase_are_several(tmp_path: Path, turn: float) -> None:
-    """Three motors at even distances: their phases are not those of a modulation."""
-    parts = [(100, 121.3, 0.0), (20, 119.3, turn), (20, 123.3, 0.0)]
-    x = sum(size * np.cos(2 * np.pi * hz * TIME + phase) for size, hz, phase in parts)
-    assert {one.code for one in record(tmp_path, x + noise()).findings} == {"L104"}
-
-
 @pytest.mark.parametrize(
     ("ratio", "found"), [(12.0, set()), (7.0, {("L118", "warning")}), (1.0, {("L118", "warning")})]
 )
-def test_a_low_signal_to_noise_is_said(tmp_path: Path, ratio: float, found: set[tuple[str, str]]) -> None:
+def test_a_low_signal_to_noise_is_said(tmp_path, ratio, found):
     result = record(tmp_path, 10 * np.cos(2 * np.pi * 121.3 * TIME) + noise(10 / ratio))
     assert {(one.code, one.severity) for one in result.findings} == found
     assert result.usable
 
 
-def test_an_amplitude_below_twice_its_uncertainty_is_an_error(tmp_path: Path) -> None:
+def test_an_amplitude_below_twice_its_uncertainty_is_an_error(tmp_path):
     """A line under mains as large as itself: the noise is small, and yet nothing is known."""
     wavfile.write(tmp_path / "a.wav", RATE, (10 * np.cos(2 * np.pi * 100.0 * TIME) / 500 + noise(1e-4)).astype("<f4"))
     campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),))
@@ -99,32 +72,32 @@ def test_an_amplitude_below_twice_its_uncertainty_is_an_error(tmp_path: Path) ->
     assert not result.usable
 
 
-def test_a_stronger_line_outside_the_band_is_found(tmp_path: Path) -> None:
+def test_a_stronger_line_outside_the_band_is_found(tmp_path):
     x = 50 * np.cos(2 * np.pi * 121.3 * TIME) + 200 * np.cos(2 * np.pi * 47.0 * TIME)
     assert "L117" in {one.code for one in record(tmp_path, x).findings}
 
 
-def test_a_record_of_more_than_a_minute_is_refused(tmp_path: Path) -> None:
+def test_a_record_of_more_than_a_minute_is_refused(tmp_path):
     wavfile.write(tmp_path / "a.wav", 1000, np.zeros(61_000, "<f4"))
     campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),))
     with pytest.raises(Refusal, match=r"a\.wav: lasts 61 s; cut the record to 60 s or less"):
         measure_record(tmp_path / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), (60.0, 250.0), "a.wav")
 
 
-def test_more_than_one_motor_at_a_time_is_refused(tmp_path: Path) -> None:
+def test_more_than_one_motor_at_a_time_is_refused(tmp_path):
     with pytest.raises(Refusal, match="run one motor at a time") as refused:
         campaign_of(tmp_path, RECORDS, UNIT + "lines = 9\n")
     assert (refused.value.field, refused.value.nearest) == ("unit.0.lines", 1)
 
 
-def campaign_of(folder: Path, records: dict[str, np.ndarray], text: str) -> Measured:
+def campaign_of(folder, records, text):
     for name, x in records.items():
         wavfile.write(folder / f"{name}.wav", RATE, (np.atleast_2d(x).T / 500).astype("<f4"))
     (folder / "c.toml").write_text(HEAD + text)
     return measure(read_campaign(folder / "c.toml"), folder)
 
 
-def line(size: float, seed: int, hz: float = 121.3) -> np.ndarray:
+def line(size, seed, hz=121.3):
     return size * np.cos(2 * np.pi * hz * TIME) + noise(seed=seed)
 
 
@@ -132,7 +105,7 @@ UNIT = '[[unit]]\nname = "a"\nreference = ["m0.wav", "m1.wav", "m2.wav"]\nedge =
 RECORDS = {f"{key}{i}": line(size + i, i, 121.3) for key, size in (("m", 300), ("e", 90)) for i in range(3)}
 
 
-def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path: Path) -> None:
+def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path):
     clipped = {**RECORDS, "e1": np.clip(RECORDS["e1"], -30, 30)}
     result = campaign_of(tmp_path, clipped, UNIT)
     lines = {text.split(", ")[2].split(": ")[0]: text for text in measured_files.lines(result)}
@@ -149,7 +122,7 @@ def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path: Path) 
     assert row.split("<td>")[4] == "</td>"
 
 
-def test_a_run_leaves_its_own_files_alone(tmp_path: Path) -> None:
+def test_a_run_leaves_its_own_files_alone(tmp_path):
     """More records first, then fewer; files of other names stay."""
     point = "[[unit.point]]\ndistance_mm = 5.0\nrecords = " + '["e0.wav", "e1.wav", "e2.wav"]\n'.replace("e", "p", 1)
     more = {**RECORDS, **{f"p{i}": line(40 + i, 7 + i) for i in range(3)}}
@@ -165,13 +138,13 @@ def test_a_run_leaves_its_own_files_alone(tmp_path: Path) -> None:
     assert found == own | {"notes.txt", "record-01-time.svg.bak"}
 
 
-def test_an_interrupted_run_leaves_no_measured_toml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_run_leaves_no_measured_toml(tmp_path, monkeypatch):
     """The levels never stand beside another run's charts."""
     out = tmp_path / "out"
     measured_files.write(campaign_of(tmp_path, RECORDS, UNIT), out)
     whole = Path.replace
 
-    def full(self: Path, target: Path) -> Path:
+    def full(self, target):
         if target.name == "measure.html":
             raise OSError("disk full")
         return whole(self, target)
@@ -183,7 +156,7 @@ def test_an_interrupted_run_leaves_no_measured_toml(tmp_path: Path, monkeypatch:
     assert not [path for path in out.iterdir() if path.name.startswith(".tmp")]
 
 
-def test_the_motors_sensor_has_a_blank_of_its_own(tmp_path: Path) -> None:
+def test_the_motors_sensor_has_a_blank_of_its_own(tmp_path):
     """A motor beside 100 Hz: its mains are in its uncertainty once a motor-off record of its sensor tells them."""
     off = {"off": 0.5 * np.cos(2 * np.pi * 100 * TIME) + noise(0.01), "quiet": noise(0.01, 2)}
     records = {**{name: line(300 if name < "f" else 90, i, 100.02) for i, name in enumerate(RECORDS)}, **off}
@@ -199,22 +172,10 @@ def test_the_motors_sensor_has_a_blank_of_its_own(tmp_path: Path) -> None:
     assert "its part is in the uncertainty" in motor[0].findings[0].message
 
 
-def test_the_blanks_motor_channel_tells_the_motors_mains(tmp_path: Path) -> None:
-    pair = {f"e{i}": np.array([line(90, i), line(300, 9 + i)]) for i in range(3)}
-    pair["off"] = np.array([noise(0.01), 0.5 * np.cos(2 * np.pi * 100 * TIME)])
-    head = "[recording]\nchannel = 1\nmotor_channel = 2\n"
-    unit = '[blank]\nrecords = ["off.wav"]\n[[unit]]\nname = "a"\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
-    result = campaign_of(tmp_path, pair, head + unit)
-    assert dict(result.motor_mains)[2] == pytest.approx(0.5, rel=0.01)
-    alone = campaign_of(tmp_path, {**pair, "off": noise(0.01)}, head + unit)
-    assert alone.motor_mains == ()
-    assert len(alone.mains) > 0
-
-
-def test_a_chain_is_one_module_and_one_entry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chain_is_one_module_and_one_entry(tmp_path, monkeypatch):
     """A chain that reads the standard deviation: its name, gain, levels and refusals come with the entry."""
 
-    def rms(table: ChainTable) -> Chain:
+    def rms(table):
         return Chain(
             "rms",
             lambda x, rate, fit: float(np.sqrt(2) * np.std(x)),

@@ -1,9 +1,6 @@
 """What a campaign says that can't be: refused before the first measurement, with the field."""
 
-from __future__ import annotations
-
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +15,7 @@ UNIT = '[[unit]]\nname = "a"\nreference = ["m0.wav", "m1.wav", "m2.wav"]\nedge =
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     time = np.arange(4000) / 2000
     for k, name in enumerate(("m0", "m1", "m2", "e0", "e1", "e2")):
         x = (0.6 if name < "m" else 0.3) * (1 + 0.01 * k) * np.cos(2 * np.pi * 121.3 * time)
@@ -44,9 +41,7 @@ def folder(tmp_path: Path) -> Path:
         ("[[unit]]", '[motor_sensor]\nquantity = "velocity"\nunit = "um"\n[[unit]]', "motor_sensor.unit", None),
     ],
 )
-def test_what_a_campaign_names_is_checked_first(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, old: str, new: str, field: str, nearest: object
-) -> None:
+def test_what_a_campaign_names_is_checked_first(folder, monkeypatch, old, new, field, nearest):
     monkeypatch.setattr(measuring, "measure_record", lambda *_: pytest.fail("a record was measured"))
     (folder / "c.toml").write_text(HEAD + UNIT.replace(old, new))
     with pytest.raises(Refusal) as refused:
@@ -58,7 +53,7 @@ def test_what_a_campaign_names_is_checked_first(
 
 @pytest.mark.parametrize(("rate", "accepted"), [(2000.0, True), (2001.0, True), (2010.0, False), (1000.0, False)])
 @pytest.mark.parametrize("ending", ["wav", "csv"])
-def test_a_rate_that_the_file_contradicts_is_refused(folder: Path, rate: float, accepted: bool, ending: str) -> None:
+def test_a_rate_that_the_file_contradicts_is_refused(folder, rate, accepted, ending):
     for name in ("m0", "m1", "m2", "e0", "e1", "e2"):
         x = wavfile.read(folder / f"{name}.wav")[1]
         rows = "\n".join(f"{i / 2000:.4f},{value:.6f}" for i, value in enumerate(x))

@@ -1,16 +1,12 @@
 """Records in which the motor runs for a short part, and records that are hardly records at all."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.io import wavfile
 
 from unitcad.lab.campaign import Campaign, SensorTable
 from unitcad.lab.chains.line import Mains, fit_line, running_part
-from unitcad.lab.record import RecordResult, measure_record
+from unitcad.lab.record import measure_record
 from unitcad.spec.convert import convert
 
 RATE = 2000
@@ -18,12 +14,12 @@ TIME = np.arange(2 * RATE) / RATE
 SENSOR = SensorTable(quantity="displacement", unit="um")
 
 
-def gated(size: float, start: float, end: float, noise: float, seed: int = 1) -> np.ndarray:
+def gated(size, start, end, noise, seed=1):
     wave = np.where((start <= TIME) & (end > TIME), size * np.sin(2 * np.pi * 123.4 * TIME), 0.0)
     return wave + noise * np.random.default_rng(seed).standard_normal(len(TIME))
 
 
-def record(folder: Path, channels: list[np.ndarray]) -> RecordResult:
+def record(folder, channels):
     wavfile.write(folder / "a.wav", RATE, np.column_stack(channels).astype("<f4"))
     paired = {"recording": {"channel": 1, "motor_channel": 2}} if len(channels) > 1 else {}
     data = {"name": "t", "sensor": {"quantity": "displacement", "unit": "um"}, "unit": [{"name": "a"}], **paired}
@@ -38,9 +34,7 @@ def record(folder: Path, channels: list[np.ndarray]) -> RecordResult:
     ("start", "end"), [(0.95, 2.1), (1.1, 2.1), (1.5, 2.1), (0.0, 0.9), (0.5, 1.4), (0.9, 1.3), (1.7, 2.1)]
 )
 @pytest.mark.parametrize("noise", [0.01, 1.0, 3.0])
-def test_a_motor_that_runs_for_less_than_half_is_measured(
-    tmp_path: Path, start: float, end: float, noise: float
-) -> None:
+def test_a_motor_that_runs_for_less_than_half_is_measured(tmp_path, start, end, noise):
     hum = 5 * np.sin(2 * np.pi * 50 * TIME)
     result = record(tmp_path, [gated(40.0, start, end, noise) + hum])
     assert result.usable
@@ -53,35 +47,14 @@ def test_a_motor_that_runs_for_less_than_half_is_measured(
         assert "only that part was used" in codes["L107"]
 
 
-def test_both_channels_are_measured_where_the_motor_runs(tmp_path: Path) -> None:
-    result = record(tmp_path, [gated(8.0, 1.2, 1.9, 0.2), gated(100.0, 1.2, 1.9, 1.0, 2)])
-    assert result.usable
-    assert result.ratio == pytest.approx(0.08, rel=0.01)
-    assert result.lag_deg == pytest.approx(0.0, abs=1.0)
-
-
-def test_pulses_are_measured_in_the_longest(tmp_path: Path) -> None:
+def test_pulses_are_measured_in_the_longest(tmp_path):
     x = gated(40.0, 0.1, 0.4, 0.5) + gated(40.0, 1.0, 1.5, 0.5)
     result = record(tmp_path, [x])
     assert result.amplitude_um == pytest.approx(40.0, rel=0.01)
     assert 0.35 < result.steady_s < 0.55
 
 
-def test_two_units_of_uncertainty_hold_the_amplitude_of_short_runs() -> None:
-    rng = np.random.default_rng(3)
-    held = []
-    for seed in range(120):
-        length = rng.uniform(0.35, 1.25)
-        start = rng.uniform(0, 2 - length)
-        x = gated(40.0, start, start + length, float(np.exp(rng.uniform(np.log(0.4), np.log(13)))), seed)
-        x[rng.integers(0, len(x), 8)] += 300.0  # drop-outs
-        fit = fit_line(x, RATE)
-        assert fit is not None
-        held.append(abs(fit.amplitude - 40.0) < 2 * fit.u)
-    assert np.mean(held) > 0.92
-
-
-def test_beats_and_sweeps_are_no_silence() -> None:
+def test_beats_and_sweeps_are_no_silence():
     """Two lines 0.2 Hz apart fade in and out; a motor that speeds up leaves its first frequency."""
     time = np.arange(10 * RATE) / RATE
     beat = 40 * np.sin(2 * np.pi * 125 * time) + 38 * np.sin(2 * np.pi * 125.2 * time + 1)
@@ -93,13 +66,7 @@ def test_beats_and_sweeps_are_no_silence() -> None:
         assert running_part(sweep, np.ones(len(sweep), bool), RATE, (60.0, 250.0), 50.0) is None
 
 
-@pytest.mark.parametrize("hertz", [156.0, 158.0, 160.0, 180.0, 240.0])
-def test_a_line_outside_the_band_is_no_silence(hertz: float) -> None:
-    x = 100 * np.cos(2 * np.pi * hertz * TIME) + 2 * np.random.default_rng(1).standard_normal(len(TIME))
-    assert running_part(x, np.ones(len(x), bool), RATE, (102.0, 153.0), 50.0) is None
-
-
-def odd_signal(seed: int) -> tuple[np.ndarray, float]:
+def odd_signal(seed):
     """Up to three pieces of lines, noise, mains and offset of any size; rounded, cut off, with gaps or drop-outs."""
     rng = np.random.default_rng(seed)
     rate = float(rng.choice([300, 500, 1000, 2000]))
@@ -133,7 +100,7 @@ def odd_signal(seed: int) -> tuple[np.ndarray, float]:
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("first", [150, 240, 350, 450, 2190, 2400])
-def test_no_signal_ends_in_an_error(first: int) -> None:
+def test_no_signal_ends_in_an_error(first):
     for seed in range(first, first + 25):
         fit = fit_line(*odd_signal(seed))
         assert fit is None or np.isfinite([fit.amplitude, fit.u, fit.frequency_hz, fit.drift]).all()

@@ -1,7 +1,5 @@
 """`unitcad phantom`: recipe and box against their lengths, response and echo, refusals, a spec's tissue."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -17,8 +15,8 @@ from unitcad.attenuation import HalfSpace, Layer, LayeredMedium, LossFactor, Uni
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_spec
-from unitcad.kernels.mesh import bounds, realise
-from unitcad.lab.phantom import PhantomSet, bench, phantom_files, phantom_set
+from unitcad.kernels.mesh import realise
+from unitcad.lab.phantom import bench, phantom_files, phantom_set
 from unitcad.lab.phantom.recipe import PhantomTable, load_phantom, modulus_by_table, phantoms
 from unitcad.shape import box, exact_volume
 from unitcad.shape.lettering import engraving
@@ -33,15 +31,15 @@ LAYERS = [
 
 
 @cache
-def _skin() -> PhantomSet:
+def _skin():
     return phantom_set(load_phantom("skin"))
 
 
-def _made(**changed: object) -> PhantomSet:
+def _made(**changed):
     return phantom_set(convert({"name": "ours", "layers": LAYERS, **changed}, PhantomTable))
 
 
-def test_every_tested_share_has_the_modulus_of_the_source() -> None:
+def test_every_tested_share_has_the_modulus_of_the_source():
     with open(DATA, encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 15
@@ -56,7 +54,7 @@ def test_every_tested_share_has_the_modulus_of_the_source() -> None:
     assert modulus_by_table("ecoflex-00-50", 6.0, "layers.0")[0] == pytest.approx(130, rel=0.02)
 
 
-def test_the_walls_and_the_response_are_those_of_another_program() -> None:
+def test_the_walls_and_the_response_are_those_of_another_program():
     made = _skin()
     assert made.expected.wall_mm == pytest.approx(63, abs=0.5)
     assert made.inside_mm == 130
@@ -67,7 +65,7 @@ def test_the_walls_and_the_response_are_those_of_another_program() -> None:
     assert abs(made.expected.sensitivity["muscle"]) < 0.01
 
 
-def test_the_range_has_what_the_frequency_may_bring_and_every_page_says_quasi_static() -> None:
+def test_the_range_has_what_the_frequency_may_bring_and_every_page_says_quasi_static():
     made = _skin()
     factor = abs(1 + (2j * math.pi * 125 * 260e-6) ** 0.27)  # the catalogue's law, from rest to 125 Hz
     assert factor == pytest.approx(1.62, abs=0.005)
@@ -82,14 +80,7 @@ def test_the_range_has_what_the_frequency_may_bring_and_every_page_says_quasi_st
     assert phantom_files.tissue_toml(made).count("quasi-static compression; high: also times 1.62") == 3
 
 
-def test_the_procedure_warns_of_what_spoils_a_phantom() -> None:
-    words = bench.casting_markdown(_skin())
-    for part in ("on acrylic does not bond", "nothing may lie on the rim", "latex", "Thinner migrates"):
-        assert part in words
-    assert {"scale", "level", "calliper", "release agent"} < {one.item for one in bench.bill(_skin())}
-
-
-def test_the_response_is_the_layered_solver_s() -> None:
+def test_the_response_is_the_layered_solver_s():
     made = _skin()
     layers = [
         Layer(t * 1e-3, one.density_g_cm3 * 1e3, one.modulus_kpa * 1e3, 0.4999, LossFactor(0.2))
@@ -103,7 +94,7 @@ def test_the_response_is_the_layered_solver_s() -> None:
     assert made.expected.low[-1] < made.expected.value[-1] < made.expected.high[-1]
 
 
-def test_tools_and_layers_fill_the_box_without_overlap() -> None:
+def test_tools_and_layers_fill_the_box_without_overlap():
     """Tools are drawn from lengths, not by subtracting the layers: together they leave nothing of the cavity."""
     made = _skin()
     layers = [realise(body.shape, 64) for body in made.layers]
@@ -121,14 +112,7 @@ def test_tools_and_layers_fill_the_box_without_overlap() -> None:
     assert made.volumes_mm3 == pytest.approx((side[1] ** 2 * 1.5, side[1] ** 2 * 4.0, frustum), rel=1e-5)
 
 
-def test_the_blade_passes_the_pegs_and_lies_on_both_rims() -> None:
-    made = _skin()
-    blade = next(bounds(realise(b.shape, 64)) for b in made.tools if b.kind == "blade")
-    assert made.size.outer <= blade[3] < made.size.peg_x - 3.0
-    assert blade[2] == pytest.approx(made.size.tray_rim)
-
-
-def test_the_grams_are_the_volumes_and_the_thinner_the_recipe() -> None:
+def test_the_grams_are_the_volumes_and_the_thinner_the_recipe():
     made = _skin()
     pours = bench.pours(made)
     assert [pour.name for pour in pours] == ["muscle", "hypodermis", "skin"]
@@ -143,7 +127,7 @@ def test_the_grams_are_the_volumes_and_the_thinner_the_recipe() -> None:
     assert skin.frame_mm / skin.print_layer_mm == pytest.approx(8)
 
 
-def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path: Path) -> None:
+def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path):
     done = CliRunner().invoke(app, ["phantom", "-o", str(tmp_path), "--json"])
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
@@ -176,12 +160,6 @@ def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path: Path) -> None:
     assert all((folder / name).read_bytes() == content for name, content in again.items())
 
 
-def test_the_box_taken_apart_is_a_picture() -> None:
-    picture = phantom_files.box_picture(_skin())
-    assert picture.startswith(b"\x89PNG")
-    assert len(picture) > 10_000
-
-
 @pytest.mark.parametrize(
     ("changed", "field", "part"),
     [
@@ -208,7 +186,7 @@ def test_the_box_taken_apart_is_a_picture() -> None:
         ({"points_mm": [5.0]}, "points_mm", "must have at least 2 entries"),
     ],
 )
-def test_what_can_not_be_is_refused(changed: dict, field: str, part: str) -> None:
+def test_what_can_not_be_is_refused(changed, field, part):
     with pytest.raises(Refusal) as refused:
         _made(**changed)
     assert refused.value.field == field
@@ -217,7 +195,7 @@ def test_what_can_not_be_is_refused(changed: dict, field: str, part: str) -> Non
         assert _made(inside_mm=refused.value.nearest).expected.echo_pct <= 5.0
 
 
-def test_a_refused_phantom_leaves_no_folder(tmp_path: Path) -> None:
+def test_a_refused_phantom_leaves_no_folder(tmp_path):
     file = tmp_path / "p.toml"
     file.write_text(phantoms()["skin"].read_text("utf-8").replace('"fdm-0.4"', '"sla"'), "utf-8")
     with pytest.raises(Refusal, match="known: skin"):
@@ -227,7 +205,7 @@ def test_a_refused_phantom_leaves_no_folder(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_solid_of_the_box_is_exact() -> None:
+def test_a_solid_of_the_box_is_exact():
     lengths = _skin().size
     frame = next(b for b in _skin().tools if b.name == "frame3")
     ears = 4 * 14.0 * 18.0 - 4 * math.pi * lengths.hole**2
@@ -237,7 +215,7 @@ def test_a_solid_of_the_box_is_exact() -> None:
     assert exact_volume(_skin().layers[0].shape) == pytest.approx(1.5 * 4 * lengths.rim**2, rel=1e-5)
 
 
-def test_the_bill_has_what_the_procedure_asks_for() -> None:
+def test_the_bill_has_what_the_procedure_asks_for():
     text = bench.casting_markdown(_skin()).split("## Needed")[0].lower()
     items = " ".join(f"{one.item} {one.note}" for one in bench.bill(_skin())).lower()
     for asked in ("tape", "clips", "pen", "rubber band", "emery paper", "primer", "degas", "talc", "calliper", "blade"):
@@ -246,17 +224,7 @@ def test_the_bill_has_what_the_procedure_asks_for() -> None:
     assert next(one for one in bench.bill(_skin()) if one.item == "silicone primer").note.startswith("optional")
 
 
-def test_a_bubble_that_rises_for_longer_than_the_pot_life_is_said_to_stay() -> None:
-    for line in bench.casting_markdown(_skin()).splitlines():
-        if line.startswith("| pot life"):
-            pot = float(line.split("|")[2].split()[0])
-        if line.startswith("| bubble"):
-            rise = float(line.split("|")[2].split()[0])
-            assert ("longer than the pot life" in line) == (rise > pot)
-    assert "longer than the pot life" in bench.casting_markdown(_skin())
-
-
-def test_the_sheet_wants_the_first_layer_s_height_of_the_tray_and_the_others_of_frames() -> None:
+def test_the_sheet_wants_the_first_layer_s_height_of_the_tray_and_the_others_of_frames():
     lines = bench.sheet_markdown(_skin()).splitlines()
     frames = next(line for line in lines if line.startswith("Frame heights"))
     assert "muscle" not in frames

@@ -1,7 +1,5 @@
 """What is written on the phantom: points and their numbers on the lid, a frame's number, names of the section."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from functools import cache
 from itertools import pairwise
@@ -11,9 +9,9 @@ from msgspec.structs import replace
 
 from unitcad.export.svg import text_width
 from unitcad.kernels.mesh import bounds, realise
-from unitcad.lab.phantom import PhantomSet, phantom_files, phantom_set
+from unitcad.lab.phantom import phantom_files, phantom_set
 from unitcad.lab.phantom.recipe import load_phantom
-from unitcad.shape import Shape, box, cylinder, moved, union
+from unitcad.shape import box, cylinder, moved, union
 from unitcad.shape.lettering import engraving
 
 STROKE, DEPTH = 0.8, 0.4
@@ -21,16 +19,16 @@ STROKE, DEPTH = 0.8, 0.4
 
 
 @cache
-def _skin() -> PhantomSet:
+def _skin():
     return phantom_set(load_phantom("skin"))
 
 
-def volume(shape: Shape) -> float:
+def volume(shape):
     return realise(shape, 64).volume()
 
 
 @pytest.mark.parametrize("diameter", [4.0, 14.0, 40.0])
-def test_the_lid_has_a_seat_and_a_hole_for_each_point(diameter: float) -> None:
+def test_the_lid_has_a_seat_and_a_hole_for_each_point(diameter):
     """Each hole is a cylinder of 1.25 mm; those that meet the seat are cut with it."""
     made = phantom_set(replace(load_phantom("skin"), unit_diameter_mm=diameter, points_mm=(2.5, 6.25, 30.0)))
     (body,) = [one for one in made.tools if one.name == "lid"]
@@ -46,7 +44,7 @@ def test_the_lid_has_a_seat_and_a_hole_for_each_point(diameter: float) -> None:
     assert (middle - lid).volume() == pytest.approx(volume(union(through)), rel=1e-6)
 
 
-def test_a_frame_has_the_number_of_its_pour_where_the_blade_does_not_run() -> None:
+def test_a_frame_has_the_number_of_its_pour_where_the_blade_does_not_run():
     made = _skin()
     size = made.size
     reach = next(bounds(realise(b.shape, 64)) for b in made.tools if b.kind == "blade")[3]
@@ -59,7 +57,7 @@ def test_a_frame_has_the_number_of_its_pour_where_the_blade_does_not_run() -> No
         assert gone == pytest.approx(volume(engraving(body.name[-1], STROKE, 0.0, 0.2)), rel=1e-3)
 
 
-def test_every_name_of_the_section_is_on_the_page() -> None:
+def test_every_name_of_the_section_is_on_the_page():
     made = _skin()
     root = ET.fromstring(phantom_files.contents(made)["section.svg"])
     named = {body.name for body in (*made.tools, *made.layers)}

@@ -1,7 +1,5 @@
 """Signal chains against exact answers, an independent fit, and records that a chain must not be fooled by."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -12,20 +10,20 @@ from scipy.stats import ttest_ind, ttest_rel
 from benchmarks.accuracy.synthetic_records import LENGTH_S, PLAIN, RATE, Scenario, synthetic
 from unitcad.errors import Refusal
 from unitcad.lab.chains import paper
-from unitcad.lab.chains.chain import ChainTable, LineFit
+from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.chains.line import Mains, fit_line
 from unitcad.lab.measuring import level
 
 TIME = np.arange(4000) / RATE
 
 
-def fitted(x: np.ndarray, rate: float = RATE, **options: object) -> LineFit:
+def fitted(x, rate=RATE, **options):
     fit = fit_line(x, rate, **options)  # type: ignore[arg-type]
     assert fit is not None
     return fit
 
 
-def test_a_line_without_noise_is_exact() -> None:
+def test_a_line_without_noise_is_exact():
     x = 3.0 * np.cos(2 * np.pi * 123.4 * TIME + 0.7) + 0.4 * np.cos(2 * np.pi * 246.8 * TIME) + 5 + 0.1 * TIME
     x += 0.8 * np.cos(2 * np.pi * 50 * TIME) + 0.3 * np.cos(2 * np.pi * 150 * TIME + 1)
     fit = fitted(x)
@@ -35,11 +33,11 @@ def test_a_line_without_noise_is_exact() -> None:
     assert math.isinf(fit.clipped)
 
 
-def test_a_line_is_what_a_nonlinear_fit_gives() -> None:
+def test_a_line_is_what_a_nonlinear_fit_gives():
     """scipy's Levenberg-Marquardt over amplitude, frequency, phase and offset shares no code with the chain."""
     record = synthetic(PLAIN, np.random.default_rng(3), 40.0, 131.7)
 
-    def model(t: np.ndarray, a: float, hz: float, phase: float, offset: float) -> np.ndarray:
+    def model(t, a, hz, phase, offset):
         return a * np.cos(2 * np.pi * hz * t + phase) + offset
 
     fit = fitted(record.x)
@@ -51,7 +49,7 @@ def test_a_line_is_what_a_nonlinear_fit_gives() -> None:
     assert fit.frequency_hz == pytest.approx(values[1], abs=0.01)
 
 
-def test_three_lines_within_two_hertz_are_three() -> None:
+def test_three_lines_within_two_hertz_are_three():
     """Lines as close as in a real record of 11.5 s in acceleration, at 3.2 kHz: synthesised."""
     rate, rng = 3200.0, np.random.default_rng(8)
     time = np.arange(round(11.5 * rate)) / rate
@@ -64,7 +62,7 @@ def test_three_lines_within_two_hertz_are_three() -> None:
 
 @pytest.mark.parametrize("noise", [0.02, 0.2, 0.5])
 @pytest.mark.parametrize("seed", range(3))
-def test_lines_in_noise_are_named_each_at_its_frequency(noise: float, seed: int) -> None:
+def test_lines_in_noise_are_named_each_at_its_frequency(noise, seed):
     """A single line of varying phase follows their beat, and noise hides that it leaves more than three lines do."""
     rng, rate = np.random.default_rng(seed), 1000.0
     time = np.arange(20_000) / rate
@@ -75,7 +73,7 @@ def test_lines_in_noise_are_named_each_at_its_frequency(noise: float, seed: int)
 
 
 @pytest.mark.parametrize("noise", [0.02, 0.5, 2.0])
-def test_noise_makes_no_second_line(noise: float) -> None:
+def test_noise_makes_no_second_line(noise):
     """Steady, wandering and drifting motors over 2 and 20 s."""
     for seed in range(6):
         rng = np.random.default_rng(seed)
@@ -84,7 +82,7 @@ def test_noise_makes_no_second_line(noise: float) -> None:
         assert fitted(np.cos(phase) + noise * rng.standard_normal(len(time)), 1000.0).lines == ()
 
 
-def test_one_drifting_line_is_not_several() -> None:
+def test_one_drifting_line_is_not_several():
     for seed in range(5):
         scenario = Scenario("drift and wander", drift=0.03, wander=0.02, spin_up_s=0.05)
         record = synthetic(scenario, np.random.default_rng(seed), 1.0, 120.0 + 5 * seed)
@@ -94,7 +92,7 @@ def test_one_drifting_line_is_not_several() -> None:
         assert fit.amplitude == pytest.approx(record.amplitude, rel=0.01)
 
 
-def test_a_motor_on_the_same_clock_takes_the_wander_out_of_the_ratio() -> None:
+def test_a_motor_on_the_same_clock_takes_the_wander_out_of_the_ratio():
     """Both channels wander together: their ratio is far better known than either amplitude's mean."""
     motor = synthetic(Scenario("wander", wander=0.05, drift=0.01), np.random.default_rng(1), 300.0, 127.0)
     rng = np.random.default_rng(2)
@@ -107,7 +105,7 @@ def test_a_motor_on_the_same_clock_takes_the_wander_out_of_the_ratio() -> None:
     assert lag == pytest.approx(-2 * np.pi * 127.0 / RATE, abs=0.01)
 
 
-def test_mains_beside_the_line_are_in_the_uncertainty() -> None:
+def test_mains_beside_the_line_are_in_the_uncertainty():
     record = synthetic(Scenario("mains", mains=(0.0, 0.05, 0.0)), np.random.default_rng(4), 1.0, 100.01)
     alone, known = fitted(record.x), fitted(record.x, mains=Mains(blank=((2, 0.05),)))
     assert alone.mains_hz == known.mains_hz == 100.0
@@ -117,13 +115,13 @@ def test_mains_beside_the_line_are_in_the_uncertainty() -> None:
 
 
 @pytest.mark.parametrize("level_", [0.95, 0.8, 0.5])
-def test_clipping_is_seen_and_its_level_is_told(level_: float) -> None:
+def test_clipping_is_seen_and_its_level_is_told(level_):
     record = synthetic(Scenario("clip", clip=level_), np.random.default_rng(6), 2.0, 127.0)
     assert fitted(record.x).clipped == pytest.approx(level_, rel=0.06)
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
-def test_a_converters_steps_are_no_clipping(bits: int) -> None:
+def test_a_converters_steps_are_no_clipping(bits):
     step = 2.0 ** (1 - bits) / 0.9
     x = np.round(np.cos(2 * np.pi * 125.3 * TIME) / step) * step
     fit = fitted(x)
@@ -131,14 +129,7 @@ def test_a_converters_steps_are_no_clipping(bits: int) -> None:
     assert fit.amplitude == pytest.approx(1.0, abs=step)
 
 
-def test_a_gap_in_the_samples_is_left_out() -> None:
-    x = np.cos(2 * np.pi * 125 * TIME)
-    x[1000:1040] = np.nan
-    fit = fitted(x)
-    assert fit.amplitude == pytest.approx(1.0, rel=1e-5)
-
-
-def test_a_record_without_a_line_has_none() -> None:
+def test_a_record_without_a_line_has_none():
     assert fit_line(np.zeros(4000), RATE) is None
     assert fit_line(np.full(4000, 3.0), RATE) is None
     assert fit_line(np.full(4000, np.nan), RATE) is None
@@ -146,7 +137,7 @@ def test_a_record_without_a_line_has_none() -> None:
 
 @pytest.mark.parametrize("zero_phase", [True, False])
 @pytest.mark.parametrize("hz", [100.0, 101.0, 117.0, 150.0])
-def test_the_papers_chain_has_the_gain_that_it_states(zero_phase: bool, hz: float) -> None:
+def test_the_papers_chain_has_the_gain_that_it_states(zero_phase, hz):
     """A long steady line through the filters themselves, not through their frequency response."""
     chain = ChainTable(zero_phase=zero_phase, trim_s=4.0)
     time = np.arange(20000) / RATE
@@ -155,15 +146,7 @@ def test_the_papers_chain_has_the_gain_that_it_states(zero_phase: bool, hz: floa
     assert (paper.gain(chain, hz) < 1e-6) == (hz in (100.0, 150.0))
 
 
-def test_the_papers_chain_takes_other_rates() -> None:
-    time = np.arange(102400) / 51200
-    found = paper.amplitude(ChainTable(), np.cos(2 * np.pi * 122 * time), 51200.0)
-    assert found == pytest.approx(paper.gain(ChainTable(), 122), rel=2e-3)
-    with pytest.raises(Refusal, match=r"paper\.trim_s"):
-        paper.amplitude(ChainTable(), np.zeros(1000), 2000.0)
-
-
-def test_a_levels_interval_is_welchs() -> None:
+def test_a_levels_interval_is_welchs():
     """scipy's Welch test of the same logarithms."""
     edge, motor = [41.0, 44.0, 40.5, 43.1], [101.0, 98.0, 105.0]
     found = level(edge, motor)

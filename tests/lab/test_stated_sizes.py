@@ -1,10 +1,7 @@
 """Small files that state much: the size is refused before anything of it is read."""
 
-from __future__ import annotations
-
 import struct
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,13 +10,13 @@ from recordings import write_tdms
 from unitcad.lab.readers import Unreadable, open_recording
 
 
-def refused(path: Path) -> str:
+def refused(path):
     with pytest.raises(Unreadable) as raised:
         open_recording(path)
     return raised.value.limit
 
 
-def test_hdf5_that_states_more_than_it_stores(tmp_path: Path) -> None:
+def test_hdf5_that_states_more_than_it_stores(tmp_path):
     h5py = pytest.importorskip("h5py")
     cases = {
         "fill": ({"shape": (10**10,), "chunks": (1000,)}, "states 10000000000 numbers"),
@@ -41,7 +38,7 @@ def test_hdf5_that_states_more_than_it_stores(tmp_path: Path) -> None:
         assert limit in refused(tmp_path / f"{name}.h5"), name
 
 
-def test_hdf5_of_many_data_sets_that_fit_each(tmp_path: Path) -> None:
+def test_hdf5_of_many_data_sets_that_fit_each(tmp_path):
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for i in range(5):
@@ -50,16 +47,16 @@ def test_hdf5_of_many_data_sets_that_fit_each(tmp_path: Path) -> None:
     assert "the file states 83886080 numbers" in refused(tmp_path / "a.h5")
 
 
-def element(kind: int, content: bytes) -> bytes:
+def element(kind, content):
     return struct.pack("<II", kind, len(content)) + content + b"\0" * (-len(content) % 8)
 
 
-def matrix(kind: int, shape: tuple[int, int], *parts: bytes, name: bytes = b"") -> bytes:
+def matrix(kind, shape, *parts, name=b""):
     head = element(6, struct.pack("<II", kind, 0)) + element(5, struct.pack("<ii", *shape)) + element(1, name)
     return element(14, head + b"".join(parts))
 
 
-def test_a_mat_struct_of_long_fields(tmp_path: Path) -> None:
+def test_a_mat_struct_of_long_fields(tmp_path):
     """Bytes of zeros, of which MATLAB makes doubles: 200 kB compressed stand for 1.6 GB."""
     count = 2**27
     body = matrix(6, (count, 1), element(2, b"\0" * count))
@@ -70,32 +67,16 @@ def test_a_mat_struct_of_long_fields(tmp_path: Path) -> None:
     assert "states more than 134217728 bytes" in refused(tmp_path / "a.mat")
 
 
-def test_a_mat_matrix_of_a_sparse_shape(tmp_path: Path) -> None:
-    whole = matrix(6, (2**30, 2), element(2, b"\0" * 8), name=b"x")
-    (tmp_path / "a.mat").write_bytes(b"MATLAB 5.0".ljust(124) + b"\x00\x01IM" + whole)
-    assert "states 2147483648 numbers" in refused(tmp_path / "a.mat")
-
-
-def test_tdms_that_states_many_scales(tmp_path: Path) -> None:
-    pytest.importorskip("nptdms")
-    from nptdms import ChannelObject, TdmsWriter
-
-    with TdmsWriter(str(tmp_path / "a.tdms")) as writer:
-        scales = {"NI_Number_Of_Scales": np.uint32(2**32 - 1), "NI_Scaling_Status": "unscaled"}
-        writer.write_segment([ChannelObject("g", "c", np.arange(4.0), properties=scales)])
-    assert "states 4294967295 scales" in refused(tmp_path / "a.tdms")
-
-
-def test_tdms_that_states_more_samples_than_bytes(tmp_path: Path) -> None:
+def test_tdms_that_states_more_samples_than_bytes(tmp_path):
     pytest.importorskip("nptdms")
     write_tdms(tmp_path / "a.tdms")
     content = (tmp_path / "a.tdms").read_bytes()
     assert content.count(struct.pack("<Q", 300)) == 3
     (tmp_path / "a.tdms").write_bytes(content.replace(struct.pack("<Q", 300), struct.pack("<Q", 3 * 10**9)))
-    assert "holds fewer samples than it states" in refused(tmp_path / "a.tdms")
+    assert "has fewer samples than it states" in refused(tmp_path / "a.tdms")
 
 
-def test_a_library_that_takes_all_memory_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_library_that_takes_all_memory_is_ended(tmp_path, monkeypatch):
     from unitcad.lab import readers
     from unitcad.workers import Pool
 
@@ -106,5 +87,5 @@ def test_a_library_that_takes_all_memory_is_ended(tmp_path: Path, monkeypatch: p
         assert "takes more than 3 GiB to read" in refused(tmp_path / "a.tdms")
 
 
-def _fill(*asked: object) -> None:
+def _fill(*asked):
     np.ones(2**28)

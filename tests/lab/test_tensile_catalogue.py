@@ -1,7 +1,5 @@
 """The catalogue's second source: recomputed from the curves, held against measuring by hand, chosen by a spec."""
 
-from __future__ import annotations
-
 import csv
 import math
 from pathlib import Path
@@ -12,7 +10,7 @@ import pytest
 from unitcad import catalogue
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.lab.columns import declared
-from unitcad.lab.tensile import Specimen, TensileResult, evaluate, read_curve
+from unitcad.lab.tensile import Specimen, evaluate, read_curve
 from unitcad.validation import load
 
 DATA = Path(__file__).parent / "data" / "soft-robotics-materials-database"
@@ -27,14 +25,14 @@ PROTOTYPE = {
 
 
 @pytest.fixture(scope="module")
-def results() -> dict[str, TensileResult]:
+def results():
     known = catalogue.materials()
     bare = declared(["strain=Engineering Strain:1"])  # the files give no unit
     return {n: evaluate([read_curve(FILES[n], bare, Specimen())], (0.12, 0.24), known[n]) for n in NAMES}
 
 
 @pytest.mark.parametrize("method", PROTOTYPE)
-def test_every_method_gives_what_another_program_gave(method: str, results: dict[str, TensileResult]) -> None:
+def test_every_method_gives_what_another_program_gave(method, results):
     for name, expected in zip(NAMES, PROTOTYPE[method], strict=True):
         row = next(row for row in results[name].rows if row.method == method)
         assert row.value is not None
@@ -43,7 +41,7 @@ def test_every_method_gives_what_another_program_gave(method: str, results: dict
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_reader_finds_the_engineering_columns(name: str, results: dict[str, TensileResult]) -> None:
+def test_the_reader_finds_the_engineering_columns(name, results):
     with open(FILES[name], encoding="utf-8-sig", newline="") as file:
         rows = [row for row in csv.reader(file, delimiter=";") if row[0][:1].isdigit()]
     strain, stress = (np.array([float(row[i]) for row in rows]) for i in (3, 4))
@@ -57,7 +55,7 @@ def test_the_reader_finds_the_engineering_columns(name: str, results: dict[str, 
     assert curve.rate == pytest.approx(450 / 60 / 33, rel=0.01)
 
 
-def test_the_shipped_values_are_those_of_the_curves(results: dict[str, TensileResult]) -> None:
+def test_the_shipped_values_are_those_of_the_curves(results):
     sources = catalogue.moduli_by_source()
     for name, result in results.items():
         shipped = catalogue.materials()[name].quasistatic_modulus_kpa
@@ -71,21 +69,21 @@ def test_the_shipped_values_are_those_of_the_curves(results: dict[str, TensileRe
             assert at is None or at == pytest.approx((row.value or 0) / 1e3, rel=1e-3)
 
 
-def test_the_sources_stand_side_by_side() -> None:
+def test_the_sources_stand_side_by_side():
     sources = catalogue.moduli_by_source()
     assert sources["paper"] == {"ecoflex-00-10": 15, "dragon-skin-10-medium": 250, "dragon-skin-30": 355}
     assert sources["data sheet"]["ecoflex-00-10"] == 55
     assert set(sources["tensile, secant at 15 %"]) == set(NAMES)
 
 
-def test_the_warnings_name_what_is_doubtful(results: dict[str, TensileResult]) -> None:
+def test_the_warnings_name_what_is_doubtful(results):
     codes = {name: {one.code for one in result.warnings} for name, result in results.items()}
     assert codes["ecoflex-00-10"] == {"force", "start", "toe", "break", "crosshead", "specimens"}
     assert "force" not in codes["dragon-skin-30"]
     assert "break" not in codes["dragon-skin-10-medium"]
 
 
-def test_a_spec_chooses_the_second_source_and_the_estimate_says_so() -> None:
+def test_a_spec_chooses_the_second_source_and_the_estimate_says_so():
     default, chosen = load("encapsulating"), load("encapsulating", ["estimate.moduli=quasi-static"])
     inner = estimate_input(chosen).layers[0].youngs_modulus
     value = catalogue.materials()["ecoflex-00-10"].quasistatic_modulus_kpa
@@ -98,7 +96,7 @@ def test_a_spec_chooses_the_second_source_and_the_estimate_says_so() -> None:
     assert not any("quasi-static" in line for line in estimate_spec(default)["assumptions"])
 
 
-def test_an_own_quasi_static_modulus_is_used_where_it_is_chosen() -> None:
+def test_an_own_quasi_static_modulus_is_used_where_it_is_chosen():
     own = "materials.ours={like='ecoflex-00-10', quasistatic_modulus_kpa=30.0}"
     spec = load("encapsulating", [own, "layers.0.material=ours", "estimate.moduli=quasi-static"])
     assert estimate_input(spec).layers[0].youngs_modulus.value == 30e3

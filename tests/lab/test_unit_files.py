@@ -76,17 +76,6 @@ def test_measured_walls_stand_in_for_the_spec_s(tmp_path: Path) -> None:
     assert fit.measured[0].source == "as typed, walls as measured, 1.4, 1.1 mm"
 
 
-def test_a_unit_that_nobody_measured_has_the_spec_s_walls(tmp_path: Path) -> None:
-    record(tmp_path)
-    one = load_fit_lab(fit_file(tmp_path, cavity=1)).units[0]
-    assert one.built == one.spec
-    assert one.source == "as typed"
-    record(tmp_path, lambda data: data.update(units=[data["units"][1], data["units"][2]]))
-    assert load_fit_lab(fit_file(tmp_path)).units[0].built.layers[0].wall_mm == pytest.approx(1.4)  # the usable one
-    record(tmp_path, lambda data: data.update(units=[]))
-    assert load_fit_lab(fit_file(tmp_path)).units[0].built == one.spec
-
-
 @pytest.mark.parametrize(
     ("unit", "change", "field", "part"),
     [
@@ -94,7 +83,7 @@ def test_a_unit_that_nobody_measured_has_the_spec_s_walls(tmp_path: Path) -> Non
         ({"cavity": 9}, None, "unit.0.cavity", "has no such unit; it has 1, 2, 3; nearest accepted: 3"),
         ({"cavity": 3}, None, "unit.0.cavity", "not usable"),
         ({"cavity": 2, "cast": "gone.cast.json"}, None, "unit.0.cast", "no such file"),
-        ({"cavity": 2, "spec": "encapsulating"}, None, "unit.0.cast", "stands beside spec"),
+        ({"cavity": 2, "spec": "encapsulating"}, None, "unit.0.cast", "excludes spec"),
         ({"cavity": 2, "cast": None, "spec": "encapsulating"}, None, "unit.0.cavity", "there is no cast"),
         ({"cast": None}, None, "unit.0.spec", "is required, or cast"),
         ({"cavity": 2, "set": {"layers.0.wall_mm": 1.0}}, None, "unit.0.set", "the record says what was cast"),
@@ -152,7 +141,7 @@ def test_a_campaign_s_unit_goes_into_a_fit_by_its_cast_record(tmp_path: Path) ->
         (f'cast = "{CAST}"\ncavity = 3', "unit.0.cavity", "not usable"),
         ('cast = "c.toml"', "unit.0.cast", "JSON"),
         ('spec = "encapsulating"\ncavity = 1', "unit.0.cavity", "there is no cast"),
-        (f'spec = "encapsulating"\ncast = "{CAST}"', "unit.0.cast", "stands beside spec"),
+        (f'spec = "encapsulating"\ncast = "{CAST}"', "unit.0.cast", "excludes spec"),
     ],
 )
 def test_a_campaign_checks_the_record_before_it_measures(unit: str, field: str, part: str, tmp_path: Path) -> None:

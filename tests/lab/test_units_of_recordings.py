@@ -1,21 +1,17 @@
 """Units between columns, files and records: each is converted, or refused with both named."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import read_campaign
-from unitcad.lab.measuring import Measured, measure
+from unitcad.lab.measuring import measure
 
 TIME = np.arange(1000) / 1000
 LEVEL = 0.4
 
 
-def measured(folder: Path, sensor: str, columns: dict[str, tuple[str, float]], paired: bool = True) -> Measured:
+def measured(folder, sensor, columns, paired=True):
     """Measure three records; `columns` has for each channel its unit in the file, and the size of a unit in it."""
     for i in range(3):
         table, names = [TIME], ["Time (s)"]
@@ -35,7 +31,7 @@ def measured(folder: Path, sensor: str, columns: dict[str, tuple[str, float]], p
     return measure(read_campaign(folder / "c.toml"), folder)
 
 
-def sensor(quantity: str, unit: str, more: str = "", table: str = "sensor") -> str:
+def sensor(quantity, unit, more="", table="sensor"):
     return f'[{table}]\nquantity = "{quantity}"\nunit = "{unit}"\n{more}'
 
 
@@ -54,20 +50,18 @@ MOTION = [
 
 @pytest.mark.parametrize("paired", [True, False])
 @pytest.mark.parametrize(("table", "motor", "edge"), MOTION)
-def test_units_that_a_file_states_are_converted(
-    tmp_path: Path, table: str, motor: tuple[str, float], edge: tuple[str, float], paired: bool
-) -> None:
+def test_units_that_a_file_states_are_converted(tmp_path, table, motor, edge, paired):
     result = measured(tmp_path, table, {"m": motor, "e": edge}, paired)
     assert result.levels[0].level.value == pytest.approx(LEVEL, rel=1e-4)
 
 
-def test_a_unit_in_one_file_and_none_in_another_is_refused(tmp_path: Path) -> None:
+def test_a_unit_in_one_file_and_none_in_another_is_refused(tmp_path):
     """The motor's records are in V, the edge's in an unknown unit."""
     with pytest.raises(Refusal, match=r"is needed: e0.csv gives no unit, m0.csv gives V; nearest accepted: 'V'"):
         measured(tmp_path, sensor("velocity", "mm/s", "scale = 50.0\n"), {"m": ("V", 1.0), "e": ("", 1.0)}, False)
 
 
-def test_a_scale_is_per_its_own_unit(tmp_path: Path) -> None:
+def test_a_scale_is_per_its_own_unit(tmp_path):
     """50 mm/s per mV at 125.3 Hz, in the motor's sensor too."""
     table = sensor("velocity", "mm/s", 'scale = 50.0\nper = "mV"\n')
     result = measured(tmp_path, table, {"m": ("mV", 1.0), "e": ("V", 1e-3)}, paired=False)
@@ -90,16 +84,14 @@ def test_a_scale_is_per_its_own_unit(tmp_path: Path) -> None:
         (VOLTS, "mm/s", "V", "sensor.per", ("mm/s", "'V'")),
     ],
 )
-def test_units_that_nobody_can_convert_are_refused(
-    tmp_path: Path, table: str, motor: str, edge: str, field: str, words: tuple[str, ...], paired: bool
-) -> None:
+def test_units_that_nobody_can_convert_are_refused(tmp_path, table, motor, edge, field, words, paired):
     with pytest.raises(Refusal) as refused:
         measured(tmp_path, table, {"m": (motor, 1.0), "e": (edge, 1.0)}, paired)
     assert refused.value.field == field
     assert all(word in str(refused.value) for word in words), str(refused.value)
 
 
-def test_two_sensors_may_have_two_units(tmp_path: Path) -> None:
+def test_two_sensors_may_have_two_units(tmp_path):
     tables = sensor("velocity", "mm/s", "scale = 50.0\n") + sensor("displacement", "um", table="motor_sensor")
     size = 1e3 / (2 * np.pi * 125.3)  # um of 1 mm/s
     result = measured(tmp_path, tables, {"m": ("nm", 1e3 * size), "e": ("V", 1 / 50)}, paired=False)

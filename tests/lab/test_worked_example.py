@@ -1,70 +1,31 @@
-"""docs/lab.md as a new user follows it: its commands in order, in an empty folder, give what the page shows."""
-
-from __future__ import annotations
+"""docs/tutorials/lab-data-to-estimate.md as a new user follows it, in an empty folder."""
 
 import re
-import shlex
-import shutil
-import subprocess
-import sys
 import tomllib
-from pathlib import Path
 
 import pytest
+from page_examples import ROOT, run_console
 
-PAGE = Path(__file__).parents[2] / "docs" / "lab.md"
-BLOCK = re.compile(r"^```console lab\n(.*?)^```", re.MULTILINE | re.DOTALL)
-
-
-def missing(shown: list[str], output: list[str]) -> str | None:
-    """Return the first line of `shown` that `output` does not have where it is due; "..." stands for any lines."""
-    at, anywhere = 0, False
-    for line in shown:
-        if line == "...":
-            anywhere = True
-            continue
-        found = next((i for i in range(at, len(output)) if output[i] == line), None)
-        if found is None or (found > at and not anywhere):
-            return line
-        at, anywhere = found + 1, False
-    return None if anywhere or at == len(output) else output[at]
-
-
-def test_lines_are_compared_in_order() -> None:
-    output = ["a", "b", "c", "d"]
-    assert missing(["a", "...", "c", "d"], output) is None
-    assert missing(["a", "..."], output) is None
-    assert missing(["a", "c", "..."], output) == "c"
-    assert missing(["...", "c", "...", "b", "..."], output) == "b"
-    assert missing(["a", "b", "c"], output) == "d"
+PAGE = ROOT / "docs" / "tutorials" / "lab-data-to-estimate.md"
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Run the page in a fresh folder, comparing what each command prints."""
+def folder(tmp_path_factory):
+    """Run the page in a fresh folder, comparing the output of each command."""
     folder = tmp_path_factory.mktemp("lab")
-    commands = [part.splitlines() for block in BLOCK.findall(PAGE.read_text("utf-8")) for part in block.split("$ ")[1:]]
-    assert [lines[0].split()[1] for lines in commands] == ["-c", "measure", "material", "fit", "estimate"]
-    for line, *shown in commands:
-        words = shlex.split(line)
-        here = Path(sys.executable).parent
-        words[0] = sys.executable if words[0] == "python" else shutil.which("unitcad", path=str(here)) or "unitcad"
-        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-        assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
-        output = [text.rstrip() for text in done.stdout.splitlines()]
-        assert missing(shown, output) is None, f"{line}\n{done.stdout}"
+    assert run_console(PAGE, folder) == 6
     return folder
 
 
-def test_the_commands_of_the_page_give_what_it_shows(folder: Path) -> None:
+def test_the_commands_of_the_page_give_what_it_shows(folder):
     made = {"measured/measured.toml", "blend/material.toml", "fit/lab-fit.toml", "fit/fit.md"}
     assert all((folder / name).is_file() for name in made)
 
 
-def test_the_pasted_table_is_the_one_that_was_made(folder: Path) -> None:
+def test_the_pasted_table_is_the_one_that_was_made(folder):
     tables = [
         tomllib.loads((folder / name).read_text())
-        for name in ("blend/material.toml", "lab/bench.toml", "lab/wish.toml")
+        for name in ("blend/material.toml", "lab/bench.toml", "lab/next-unit.toml")
     ]
     page = re.search(r"^```toml\n(.*?)^```", PAGE.read_text("utf-8"), re.MULTILINE | re.DOTALL)
     assert page
@@ -75,7 +36,7 @@ def test_the_pasted_table_is_the_one_that_was_made(folder: Path) -> None:
             assert entry["quasistatic_modulus_kpa"][key] == made["quasistatic_modulus_kpa"][key]
 
 
-def test_the_example_says_that_it_is_synthetic(folder: Path) -> None:
+def test_the_example_says_that_it_is_synthetic(folder):
     for file in (folder / "lab").iterdir():
         if file.suffix in (".toml", ".csv"):
             assert "ynthetic" in file.read_text(), file.name

@@ -372,7 +372,7 @@ def _printing() -> list[tuple]:
         ("pin.stl", "D002", stl(pin), fdm),
         ("table.stl", "D003", stl(table), fdm),
         ("hollow-plate.stl", "D004", stl(hollow), fdm),
-        ("floating.stl", "D005", stl(box(at=(0, 0, 2))), fdm),
+        ("sunken.stl", "D005", stl(box(at=(0, 0, -2))), fdm),
         ("on-its-tip.stl", "D005", stl(tip), fdm),
         ("gap.stl", "D006", stl(np.concatenate([box(), box(at=(10.05, 0, 0))])), fdm),
     ]

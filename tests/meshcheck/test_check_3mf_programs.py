@@ -27,6 +27,7 @@ def test_an_export_passes(path: Path) -> None:
     assert report.facts.watertight
 
 
+@pytest.mark.smoke
 @pytest.mark.slicer
 @pytest.mark.skipif(shutil.which("prusa-slicer") is None, reason="PrusaSlicer is not installed")
 def test_what_prusaslicer_exports_now_passes(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import os
 import re
 import subprocess
 import sys
+import traceback
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,10 @@ import numpy as np
 import pytest
 from shapes import box, package, stl
 
+import unitcad
 from unitcad.cli import main
+from unitcad.meshcheck.rules import t_topology
+from unitcad.meshcheck.rules.inspection import Inspection
 
 GOOD, HOLE, WARN = stl(box()), stl(box()[2:]), stl(box(), header=b"solid")
 
@@ -277,3 +281,16 @@ def test_options_that_can_not_be_are_refused_before_the_work(words: list[str], s
     done = run("hole.stl", *words, cwd=tmp_path)
     assert done.returncode == 2
     assert said in done.stderr + done.stdout
+
+
+def test_few_files_and_frames_lie_between_the_command_and_a_rule(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package, stacks, rule = str(Path(unitcad.__file__).parent), [], t_topology.check_mesh
+
+    def spy(part: Inspection) -> object:
+        stacks.append([frame for frame in traceback.extract_stack() if frame.filename.startswith(package)])
+        return rule(part)
+
+    monkeypatch.setattr(t_topology, "check_mesh", spy)
+    assert run("good.stl", cwd=folder).returncode == 0
+    assert len(stacks[0]) < 12  # the rule itself is the twelfth
+    assert len({frame.filename for frame in stacks[0]}) <= 8

@@ -198,7 +198,7 @@ def test_the_action_takes_the_checkouts_settings(fail_on: str, code: int, tmp_pa
 
 
 def test_the_settings_on_the_page_are_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    page = (ROOT / "docs/checks-in-ci.md").read_text("utf-8")
+    page = (ROOT / "docs/how-to/checks-in-ci.md").read_text("utf-8")
     monkeypatch.chdir(tmp_path)
     shown = re.findall(r"```toml\n# (\S+)\n(.*?)```", page, re.DOTALL)
     assert [name for name, _ in shown] == ["unitcad.toml", "pyproject.toml"]
@@ -222,7 +222,7 @@ def test_the_actions_inputs_are_not_pasted_into_its_script() -> None:
 
 def test_the_page_on_ci_names_what_there_is() -> None:
     """Its snippets use the hook's id, every input of the action and no other, and options of the command only."""
-    page = (ROOT / "docs/checks-in-ci.md").read_text("utf-8")
+    page = (ROOT / "docs/how-to/checks-in-ci.md").read_text("utf-8")
     action = (ROOT / "action.yml").read_text("utf-8")
     assert f"- id: {_value((ROOT / '.pre-commit-hooks.yaml').read_text('utf-8'), '- id')}\n" in page
     inputs = re.findall(r"(?m)^  ([\w-]+):$", action[action.index("inputs:") : action.index("runs:")])
@@ -233,7 +233,7 @@ def test_the_page_on_ci_names_what_there_is() -> None:
 
 
 def test_the_page_on_ci_shows_the_json_that_is_written(judge) -> None:
-    page = (ROOT / "docs/checks-in-ci.md").read_text("utf-8")
+    page = (ROOT / "docs/how-to/checks-in-ci.md").read_text("utf-8")
     shown = json.loads(page[page.index("```json\n") + 8 : page.index("```\n", page.index("```json"))])
     content = re.search(r"open\('open.obj', 'w'\).write\('(.*)'\)", page)
     assert content is not None

@@ -209,7 +209,14 @@ def test_bed(judge) -> None:
     assert judge(stl(box((100, 100, 221))), **FDM).has("S002")
     assert judge(stl(box(at=(0, 0, -5))), **FDM).has("D005")
     assert not judge(stl(box(at=(500, 500, 0))), **FDM).has("D005")
-    assert judge(stl(triangles(Manifold.sphere(5, 32).translate([0, 0, 5]))), **FDM).has("D005")
+    assert not judge(stl(box(at=(0, 0, 300))), **FDM).has("D005")  # a slicer drops it to the bed
+    ball = triangles(Manifold.sphere(5, 32).translate([0, 0, 5]))
+    edge = triangles(Manifold.cube([8, 8, 8]).rotate([45, 0, 0]).translate([30, 0, 0]))
+    for height in (0, 7):
+        both = judge(stl(np.concatenate([box(at=(-30, 0, 0)), ball, edge]) + np.array([0, 0, height])), **FDM)
+        (finding,) = [item for item in both.findings if item.code == "D005"]
+        assert finding.message == "2 parts on an edge or a point: 0 mm2 of flat on the bed"
+        assert [place.xyz and place.xyz[2] for place in finding.locations] == [height, height]
 
 
 def test_hollow(judge) -> None:

@@ -6,9 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from unitcad.checks import check_moulds
+from unitcad.export import stl
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays
+from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape
-from unitcad.spec import Spec
+from unitcad.spec import Spec, printer_of
 from unitcad.validation import load
 
 
@@ -27,6 +31,17 @@ def of_spec(spec: Spec) -> MouldSet:
 def broken(moulds: MouldSet) -> set[str]:
     """Return the codes of the checks that a set breaks."""
     return {finding.code for finding in check_moulds(moulds) if not finding.ok}
+
+
+def mesh_findings(moulds: MouldSet) -> list[str]:
+    """Return what the mesh rules find in the bodies and the pieces of a set, as they are written to STL."""
+    findings = []
+    for body in (*moulds.unit, *moulds.plan.pieces):
+        content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
+        printer = printer_of(moulds.spec) if body.made == "printed" else None
+        report = check_bytes(content, f"{body.name}.stl", Options(printer=printer))
+        findings += [f"{body.name}: {f.code} {f.message}" for f in report.findings if f.severity != "info"]
+    return findings
 
 
 def with_fault(moulds: MouldSet, name: str, change: Callable[[Shape], Shape]) -> MouldSet:

@@ -10,17 +10,16 @@ import pytest
 from faulty_sets import set_of, with_fault
 from manifold3d import Manifold, OpType
 
+from tests.sample_bodies import LEADLESS
 from unitcad.checks import check_moulds, draw, groove_walls
-from unitcad.checks.walls import near
 from unitcad.kernels.mesh import realise, shells
-from unitcad.moulds.congruence import column_round, cropped
+from unitcad.moulds.congruence import column_round
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, box, cut, union
-from unitcad.shape.column import Column, Standing
 
 BED = ("moulds.bed_x_mm=1000", "moulds.bed_y_mm=1000")
 GANGS = [
-    ("no-fpcb", "moulds.cavities=[3,3]"),
+    (LEADLESS, "moulds.cavities=[3,3]"),
     ("encapsulating", "moulds.cavities=[2,3]"),
     ("encapsulating", "moulds.cavities=[2,2]", "moulds.pour=injected"),
     ("embedded", "moulds.cavities=[1,3]", "fpcb.tail=both"),
@@ -66,8 +65,8 @@ def test_a_cell_s_cavity_is_that_of_the_whole_plate(gang: tuple[str, ...]) -> No
     "gang",
     [
         GANGS[0],
-        ("no-fpcb", "moulds.cavities=[4,2]"),
-        pytest.param(("no-fpcb", "moulds.cavities=[6,6]"), marks=pytest.mark.long),
+        (LEADLESS, "moulds.cavities=[4,2]"),
+        pytest.param((LEADLESS, "moulds.cavities=[6,6]"), marks=pytest.mark.long),
     ],
 )
 def test_like_cells_have_the_findings_that_each_has_alone(gang: tuple[str, ...]) -> None:
@@ -79,7 +78,7 @@ def test_like_cells_have_the_findings_that_each_has_alone(gang: tuple[str, ...])
 @pytest.mark.parametrize(
     "gang",
     [
-        pytest.param(("no-fpcb", f"moulds.cavities=[{columns},{rows}]"), marks=[] if cells <= 6 else [pytest.mark.long])
+        pytest.param((LEADLESS, f"moulds.cavities=[{columns},{rows}]"), marks=[] if cells <= 6 else [pytest.mark.long])
         for columns in range(1, 7)
         for rows in range(1, 7)
         if (cells := columns * rows) in (4, 6, 9, 16, 25, 36)
@@ -104,7 +103,7 @@ def test_a_groove_that_joins_its_cells_is_looked_at_cell_by_cell(monkeypatch: py
         return tiles(*given)
 
     monkeypatch.setattr(groove_walls, "_tiles", counted)
-    assert len(list(groove_walls.findings(set_of("no-fpcb", "moulds.cavities=[10,2]", *BED)))) == len(made)
+    assert len(list(groove_walls.findings(set_of(LEADLESS, "moulds.cavities=[10,2]", *BED)))) == len(made)
     assert made == [20] * len(made)
 
 
@@ -137,7 +136,7 @@ FAULTS: list[tuple[str, str, Callable[[Shape], Shape]]] = [
 
 @pytest.mark.parametrize(("code", "tool", "change"), FAULTS)
 def test_a_fault_in_one_cell_is_found_there(code: str, tool: str, change: Callable[[Shape], Shape]) -> None:
-    faulty = with_fault(set_of("no-fpcb", "moulds.cavities=[3,3]"), tool, change)
+    faulty = with_fault(set_of(LEADLESS, "moulds.cavities=[3,3]"), tool, change)
     found = {(f.code, f.where) for f in check_moulds(faulty) if not f.ok}
     alone = {(f.code, f.where) for f in check_moulds(each_cell_alone(faulty)) if not f.ok}
     assert code in {code for code, _ in found}
@@ -148,7 +147,7 @@ def test_a_fault_in_one_cell_is_found_there(code: str, tool: str, change: Callab
 
 def test_of_stubs_that_leave_together_the_one_that_is_caught_is_named() -> None:
     """A piece of the base below the middle stub stops it, and no other."""
-    faulty = with_fault(set_of("no-fpcb", "moulds.cavities=[3,3]"), "base", lambda base: union((base, BELOW)))
+    faulty = with_fault(set_of(LEADLESS, "moulds.cavities=[3,3]"), "base", lambda base: union((base, BELOW)))
     found = [f for f in draw.findings(faulty) if not f.ok]
     assert [f.where for f in found] == ["pour 2: stub5 out against base"]
     radius = faulty.spec.moulds.filament_mm / 2
@@ -158,59 +157,12 @@ def test_of_stubs_that_leave_together_the_one_that_is_caught_is_named() -> None:
 
 def test_a_hundred_cells_have_one_surrounding() -> None:
     """The filaments' ways, which differ from row to row, lie below them; numbers lie beside them."""
-    moulds = set_of("no-fpcb", "moulds.cavities=[10,10]", *BED)
+    moulds = set_of(LEADLESS, "moulds.cavities=[10,10]", *BED)
     assert [len(set(cells)) for cells in moulds.cells] == [1, 1]
 
 
-@pytest.mark.parametrize("gang", GANGS, ids=[" ".join(gang) for gang in GANGS])
-def test_what_a_column_is_told_to_hold_is_what_the_meshes_have_there(gang: tuple[str, ...]) -> None:
-    """The reduced trees, made into meshes of their own, fill the column as the whole tools do."""
-    moulds = set_of(*gang)
-    for cell in (moulds.plan.layout.cells[0], moulds.plan.layout.cells[-1]):
-        for radius in (6.0, 9.0, 14.0):
-            column = Column(cell.x, cell.y, radius)
-            for tool in moulds.plan.tools:
-                whole = cropped(moulds.solids[tool.name], column).translate((-column.x, -column.y, 0))
-                parts = [realise(part, moulds.segments) for part in Standing([tool.shape]).within(column)]
-                told = cropped(Manifold.compose(parts), Column(0, 0, radius)) if parts else Manifold()
-                differ = whole.volume() + told.volume() - 2 * (whole ^ told).volume()
-                assert abs(differ) < 1e-6, (tool.name, radius)
-
-
-def test_a_set_keeps_each_mesh_however_many_there_are() -> None:
-    """Checks tell solids apart by identity, and a mesh made anew may get that of a lost one."""
-    moulds = set_of("no-fpcb", "moulds.cavities=[3,3]")
-    first = moulds.meshes(moulds.plan.steps[0].layer)
-    for size in range(1, 600):
-        moulds.mesh_of(box(0, size, 0, 1, 0, 1))
-    assert [id(mesh) for mesh in moulds.meshes(moulds.plan.steps[0].layer)] == [id(mesh) for mesh in first]
-
-
-def test_pairs_of_boxes_within_a_gap_are_those_found_one_by_one() -> None:
-    cubes = [Manifold.cube((1, 1, 1)).translate((1.5 * (i % 4), 1.7 * (i // 4), 0)) for i in range(12)]
-    for gap in (0.0, 0.4, 0.6, 0.8, 4.0):
-        apart = [
-            (i, k)
-            for i in range(12)
-            for k in range(i + 1, 12)
-            if max(1.5 * abs(i % 4 - k % 4), 1.7 * abs(i // 4 - k // 4)) - 1 <= gap
-        ]
-        assert near(cubes, gap) == apart
-
-
-def test_what_a_boolean_leaves_on_flat_faces_makes_no_place_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Corners, sides and middle of a plate whose grooves join: the order of the cells' operands tells none apart."""
-    judged = []
-    once_each = groove_walls.once_each
-    monkeypatch.setattr(groove_walls, "once_each", lambda keys, make: judged.append(keys) or once_each(keys, make))
-    assert all(finding.ok for finding in groove_walls.findings(set_of("no-fpcb", "moulds.cavities=[4,4]")))
-    a, b, c, d, e, f, g, h, i = range(1, 10)
-    assert judged[0] == [1] * 16
-    assert judged[1] == [a, b, b, c, d, e, e, f, d, e, e, f, g, h, h, i]
-
-
 def test_a_mesh_that_lacks_a_wedge_makes_a_cell_of_its_own() -> None:
-    moulds = set_of("no-fpcb", "moulds.cavities=[3,3]")
+    moulds = set_of(LEADLESS, "moulds.cavities=[3,3]")
     cell = moulds.plan.layout.cells[4]
     wedge = Manifold.cube((0.5, 0.02, 0.5)).translate((cell.x + 4.2, cell.y, 1.0))
     damaged = MouldSet(moulds.spec, replace(moulds.plan))

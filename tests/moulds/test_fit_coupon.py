@@ -11,13 +11,12 @@ import pytest
 from manifold3d import CrossSection, Manifold
 from typer.testing import CliRunner
 
+from tests.sample_bodies import LEADLESS
 from unitcad.casting import coupon
 from unitcad.catalogue import printers
 from unitcad.kernels.mesh import area_true, realise
-from unitcad.moulds.cup import window_section
-from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import moved, turned
-from unitcad.validation import from_data, load, read, templates
+from unitcad.validation import from_data, read
 
 GRID = 2 / 1024
 SEGMENTS = 64
@@ -78,7 +77,7 @@ def test_its_toml_is_taken_by_a_spec(name: str) -> None:
     assert spec.moulds.plinth_clearance_mm == float(printer.plinth_clearance_mm)
     for fit in coupon.Coupon(printer).fits.values():
         own = tomllib.loads(fit.toml(3))
-        data = {**read("no-fpcb"), "moulds": {"printer": "mine"}, "printers": {"mine": {"like": name, **own}}}
+        data = {**read(LEADLESS), "moulds": {"printer": "mine"}, "printers": {"mine": {"like": name, **own}}}
         assert getattr(from_data(data).moulds, fit.key) == fit.values_mm[3]
 
 
@@ -118,17 +117,3 @@ def test_resin_coupon_says_how_to_cut_the_tongue() -> None:
     text = coupon.Coupon(printers()["sla"]).markdown()
     assert "cut a strip 3.4 wide" in text
     assert "0.35 mm thick" in text
-
-
-@pytest.mark.parametrize("name", sorted(printers()))
-def test_a_cup_has_the_window_of_station_3_or_one_layer_more(name: str) -> None:
-    """What the coupon's page says of cups, for every template's window."""
-    printer = printers()[name]
-    layer = float(printer.layer_mm)
-    low, high = coupon.Coupon(printer).windows[2]
-    for template in templates():
-        moulds = MouldSet(load(template, [f"moulds.printer={name}"]))
-        for step in moulds.plan.steps if moulds.dimensions.exit else ():
-            _, bottom, top = window_section(moulds.spec, moulds.dimensions.exit, step.rim)
-            more = (top - bottom - (high - low)) / layer
-            assert min(abs(more), abs(more - 1)) < 1e-6, (template, step.cup)

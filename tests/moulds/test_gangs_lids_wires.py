@@ -11,6 +11,7 @@ from faulty_sets import broken, of_spec, set_of
 from manifold3d import CrossSection
 from msgspec import structs
 
+from tests.sample_bodies import LEADLESS
 from unitcad.catalogue import printers
 from unitcad.checks import air
 from unitcad.designs import dimensions
@@ -54,10 +55,10 @@ def accepted(spec: Spec, columns: int, rows: int) -> bool:
 @pytest.mark.parametrize(
     ("name", "settings"),
     [
-        ("no-fpcb", ["diameter_mm=14.0"]),
-        ("no-fpcb", ["diameter_mm=14.0", "moulds.bed_x_mm=70"]),
-        ("no-fpcb", ["diameter_mm=15.1", "moulds.bed_x_mm=400", "moulds.bed_y_mm=95"]),
-        ("no-fpcb", ["diameter_mm=30.0"]),
+        (LEADLESS, ["diameter_mm=14.0"]),
+        (LEADLESS, ["diameter_mm=14.0", "moulds.bed_x_mm=70"]),
+        (LEADLESS, ["diameter_mm=15.1", "moulds.bed_x_mm=400", "moulds.bed_y_mm=95"]),
+        (LEADLESS, ["diameter_mm=30.0"]),
         ("embedded", ["diameter_mm=14.0"]),
         ("embedded", ["diameter_mm=20.3", "moulds.bed_y_mm=333"]),
         ("encapsulating", []),
@@ -88,7 +89,7 @@ def test_a_tail_reaches_an_edge(name: str, asked: str, nearest: list[int]) -> No
 
 
 def test_without_tails_any_number_of_columns() -> None:
-    assert len(set_of("no-fpcb", "moulds.cavities=[4,2]").plan.layout.cells) == 8
+    assert len(set_of(LEADLESS, "moulds.cavities=[4,2]").plan.layout.cells) == 8
 
 
 @pytest.mark.parametrize("set_by_hand", [("moulds.bed_z_mm=8",), ("moulds.plate_mm=30", "moulds.bed_z_mm=25")])
@@ -106,7 +107,7 @@ def test_a_length_beyond_the_printer_s_height_is_the_one_refused() -> None:
 
 
 def test_cells_are_numbered_and_numbers_keep_off_grooves_and_each_other() -> None:
-    moulds = set_of("no-fpcb", "moulds.cavities=[5,4]")
+    moulds = set_of(LEADLESS, "moulds.cavities=[5,4]")
     names = [cell.name for cell in moulds.plan.layout.cells]
     assert names == [f"{i + 1:02X}" for i in range(20)]
     # Each character is a pocket of its own: the cup's top has the drawn number of outlines, none merged or cut open.
@@ -171,7 +172,7 @@ def test_flat_lid_without_vents_traps_what_an_exact_integral_says() -> None:
 @pytest.mark.parametrize("count", [8, 12, 16])
 def test_measured_pocket_between_vents_is_the_formula(count: int) -> None:
     """Without a tongue, whose dent would be the deeper one; polygons stand for circles within 5 um."""
-    moulds = set_of("no-fpcb", "moulds.pour=injected", f"moulds.vents={count}", "output.tolerance_mm=0.001")
+    moulds = set_of(LEADLESS, "moulds.pour=injected", f"moulds.vents={count}", "output.tolerance_mm=0.001")
     step = moulds.plan.steps[0]
     cavity = moulds.cavities[0].reached
     expected = lid.pocket_depth(moulds.dimensions, 0, count)

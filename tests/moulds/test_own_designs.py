@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 from faulty_sets import broken, of_spec
@@ -12,7 +11,6 @@ from faulty_sets import broken, of_spec
 from unitcad import designs
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline.write import build
-from unitcad.spec import custom_code
 from unitcad.validation import load, templates
 
 EMBEDDED = (Path(designs.__file__).parent / "embedded.py").read_text("utf-8")
@@ -60,7 +58,7 @@ def test_a_copy_of_a_shipped_design_gives_the_same_files(template: str, tmp_path
     change = {"output.formats": ["stl"]}
     known, own = build(load(template, change), tmp_path / "known"), build(load(copy, change), tmp_path / "own")
     assert stl_files(own.folder) == stl_files(known.folder) != {}
-    for key in ("label", "outputs", "laws", "left_out", "warnings", "air_ring_mm"):
+    for key in ("label", "outputs", "mould_checks", "skipped", "warnings", "air_ring_mm"):
         assert own.manifest[key] == known.manifest[key]
     casting = [re.sub(r"(?m)^# .*", "", (done.folder / "casting.md").read_text()) for done in (own, known)]
     assert casting[0] == casting[1]
@@ -166,13 +164,3 @@ def test_what_a_tooling_lacks_is_one_sentence(old: str, new: str, why: str, tmp_
 def test_a_lid_needs_tooling_that_has_one(tmp_path: Path) -> None:
     with pytest.raises(UnitcadError, match="its tooling has no lid1"):
         of_spec(load(written(tmp_path, SLEEVE.replace("RELIEF", "1")), {"moulds.pour": "injected"}))
-
-
-def test_a_design_in_a_result_runs_only_where_it_is_allowed(tmp_path: Path, monkeypatch: Any) -> None:
-    done = build(load(written(tmp_path, EMBEDDED)), tmp_path / "out", only=("unit",))
-    monkeypatch.setattr(custom_code, "_allowed", set())
-    spec = load(done.folder / "spec.toml")
-    with pytest.raises(UnitcadError, match="--allow-code"):
-        build(spec, tmp_path / "again", only=("unit",))
-    custom_code.allow({custom_code.ANY})
-    assert build(spec, tmp_path / "again", only=("unit",)).manifest["hash"] == done.manifest["hash"]

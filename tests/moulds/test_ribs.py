@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from faulty_sets import broken, set_of, with_fault
 
+from tests.sample_bodies import LEADLESS
 from unitcad.casting.figures import UNEVEN, eccentricity, shift_per_depth
 from unitcad.catalogue import printers
 from unitcad.checks import check_moulds
@@ -168,7 +169,7 @@ def test_a_printer_of_ones_own_without_the_key_has_none() -> None:
         for name in printers()["fdm-0.4"].__struct_fields__
         if name not in ("name", "rib_interference_mm") and (value := getattr(printers()["fdm-0.4"], name)) is not None
     }
-    data = {**read("no-fpcb"), "moulds": {"printer": "ours"}, "printers": {"ours": entry}}
+    data = {**read(LEADLESS), "moulds": {"printer": "ours"}, "printers": {"ours": entry}}
     moulds = MouldSet(from_data(data))
     assert moulds.spec.moulds.rib_interference_mm == 0
     assert broken(moulds) == set()

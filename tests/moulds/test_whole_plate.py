@@ -8,6 +8,7 @@ import pytest
 from faulty_sets import set_of, with_fault
 from test_congruent_places import shown, whole_plate_cavity
 
+from tests.sample_bodies import LEADLESS
 from unitcad.checks import check_moulds, groove_walls, overlap
 from unitcad.moulds.cavities import Cavity, united
 from unitcad.moulds.mould_set import MouldSet
@@ -56,7 +57,7 @@ def reached_from(cavity: Cavity, parts: list):
     ],
 )
 def test_a_gang_has_the_findings_of_its_whole_plate(columns: int, rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    moulds = set_of("no-fpcb", f"moulds.cavities=[{columns},{rows}]", *BED)
+    moulds = set_of(LEADLESS, f"moulds.cavities=[{columns},{rows}]", *BED)
     assert [shown(finding) for finding in check_moulds(moulds)] == whole_plate_findings(moulds, monkeypatch)
 
 
@@ -85,7 +86,7 @@ FAULTS: dict[str, tuple[str, str, Callable[[Shape], Shape]]] = {
 )
 def test_a_planted_fault_has_the_findings_of_the_whole_plate(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     code, tool, change = FAULTS[fault]
-    moulds = with_fault(set_of("no-fpcb", "moulds.cavities=[3,3]", *BED), tool, change)
+    moulds = with_fault(set_of(LEADLESS, "moulds.cavities=[3,3]", *BED), tool, change)
     found = [shown(finding) for finding in check_moulds(moulds)]
     assert code in {each[0] for each in found if not each[2]}
     assert found == whole_plate_findings(moulds, monkeypatch)

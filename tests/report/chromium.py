@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 FLAGS = (
     "--no-sandbox",
@@ -32,13 +30,13 @@ LISTEN = """
 """Keeps a list of what listens to clicks."""
 
 
-def executable() -> str | None:
+def executable():
     """Where Chromium is, or None."""
     return shutil.which("chromium")
 
 
 @contextlib.contextmanager
-def browser() -> Iterator[Any]:
+def browser():
     """A running browser."""
     from playwright.sync_api import sync_playwright
 
@@ -47,7 +45,7 @@ def browser() -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def launched(kind: Any, *flags: str) -> Iterator[Any]:
+def launched(kind, *flags):
     """A browser of a kind (`running.browser_type` is one) with more flags."""
     running = kind.launch(executable_path=executable(), args=[*FLAGS, *flags])
     try:
@@ -61,14 +59,14 @@ class Visit:
 
     def __init__(
         self,
-        running: Any,
-        at: Path | str,
-        width: int = 1280,
-        height: int = 900,
-        dark: bool = False,
-        fragment: str = "",
-        script: str = "",
-    ) -> None:
+        running,
+        at,
+        width=1280,
+        height=900,
+        dark=False,
+        fragment="",
+        script="",
+    ):
         scheme = "dark" if dark else "light"
         self.context = running.new_context(
             viewport={"width": width, "height": height}, color_scheme=scheme, reduced_motion="reduce"
@@ -86,12 +84,12 @@ class Visit:
         self.page.goto(address + (f"#{fragment}" if fragment else ""))
         self.page.wait_for_selector("html[data-ready=yes]", timeout=60_000)
 
-    def drawn(self) -> None:
+    def drawn(self):
         """Wait until the 3D view has drawn."""
         self.page.wait_for_selector(".stage-host[data-shown]", timeout=60_000)
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
-    def overflowing(self) -> list[str]:
+    def overflowing(self):
         """What reaches past the right edge of the window, its section or its cell, and is in no part that scrolls."""
         return self.page.evaluate(
             """() => {
@@ -107,7 +105,7 @@ class Visit:
             }"""
         )
 
-    def picture(self, selector: str) -> bytes:
+    def picture(self, selector):
         """Take a picture (PNG) of where a part stands; one that is drawn again meanwhile may be another element."""
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         clip = self.page.locator(selector).evaluate(
@@ -118,6 +116,6 @@ class Visit:
         )
         return self.page.screenshot(full_page=True, clip=clip)
 
-    def close(self) -> None:
+    def close(self):
         """End the visit."""
         self.context.close()

@@ -1,9 +1,5 @@
 """Results that several tests look at, and the browser that they look with."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from msgspec.structs import replace
 
@@ -14,19 +10,19 @@ from unitcad.validation import load
 
 
 @pytest.fixture(scope="session")
-def hostile() -> str:
+def hostile():
     """A name that would be markup if it were not kept text."""
     return "<script>alert('x')</script> \"quoted\" & <b>bold</b>"
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(tmp_path_factory):
     """One variant's folder, with everything that a build of STL makes."""
     return build(load("encapsulating", ['output.formats=["stl"]']), tmp_path_factory.mktemp("one")).folder
 
 
 @pytest.fixture(scope="session")
-def sweep(tmp_path_factory: pytest.TempPathFactory, hostile: str) -> Path:
+def sweep(tmp_path_factory, hostile):
     """A folder of nine variants: two designs, three walls and three materials, one with markup for a name."""
     out, store = tmp_path_factory.mktemp("sweep"), MemoryStore()
     for wall in (1.0, 1.25, 1.5):
@@ -44,6 +40,6 @@ def sweep(tmp_path_factory: pytest.TempPathFactory, hostile: str) -> Path:
 
 
 @pytest.fixture(scope="session")
-def page(built: Path) -> Path:
+def page(built):
     """The page of one variant."""
     return write_report(built)

@@ -1,16 +1,9 @@
 """A batch's table: as a page shows it, and pages with a table of a test's own."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
-from chromium import Visit
-
 from unitcad.report import page as pages
 
 
-def column(visit: Visit, name: str) -> list[str]:
+def column(visit, name):
     """The cells of a column as shown."""
     heads = [
         text.replace("▲", "").replace("▼", "").strip()
@@ -20,9 +13,7 @@ def column(visit: Visit, name: str) -> list[str]:
     return visit.page.locator(f".variants tbody tr > :nth-child({at})").all_inner_texts()
 
 
-def table_page(
-    folder: Path, columns: list[str], rows: list[list[Any]], swept: list[str] | None = None, **more: Any
-) -> Path:
+def table_page(folder, columns, rows, swept=None, **more):
     """A page with a table of our own: each row the variant's folder and its cells."""
     data = {
         "title": "many",

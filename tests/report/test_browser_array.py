@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from chromium import Visit
@@ -19,13 +15,13 @@ SMALL = ["layout.columns=2", "layout.rows=2", "sheet.strap_slot_mm=[3, 8]", "out
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     array = load_array("forearm-patch", SMALL)
     return build_array(array, tmp_path_factory.mktemp("array"), only=["unit"], check=False).folder
 
 
 @pytest.fixture
-def visit(running: Any, folder: Path) -> Iterator[Visit]:
+def visit(running, folder):
     page = write_report(folder)
     seen = Visit(running, page)
     seen.drawn()
@@ -37,7 +33,7 @@ def visit(running: Any, folder: Path) -> Iterator[Visit]:
     seen.close()
 
 
-def test_the_patch_is_drawn_with_each_body_named_once(visit: Visit) -> None:
+def test_the_patch_is_drawn_with_each_body_named_once(visit):
     assert shown(visit) == ["layer1", "layer2", "motor", "circuit"]
     whole = canvas(visit)
     assert drawn_share(whole) > 0.05
@@ -48,7 +44,8 @@ def test_the_patch_is_drawn_with_each_body_named_once(visit: Visit) -> None:
     assert np.diff(columns).max() > 20
 
 
-def test_tools_are_shown_pour_by_pour_and_apart(visit: Visit) -> None:
+@pytest.mark.smoke
+def test_tools_are_shown_pour_by_pour_and_apart(visit):
     visit.page.check("input[value=moulds]")
     assert {"base", "cup1", "cup2", "layer1", "layer2"} <= set(shown(visit))
     visit.page.click("button[aria-label='Step on']")
@@ -62,7 +59,7 @@ def test_tools_are_shown_pour_by_pour_and_apart(visit: Visit) -> None:
     assert changed(together, canvas(visit)) > 0.05
 
 
-def test_a_unit_that_runs_code_has_no_3d_view(folder: Path, tmp_path: Path) -> None:
+def test_a_unit_that_runs_code_has_no_3d_view(folder, tmp_path):
     copy = tmp_path / "copy"
     copy.mkdir()
     (copy / "manifest.json").write_bytes((folder / "manifest.json").read_bytes())

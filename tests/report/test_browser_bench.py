@@ -1,11 +1,7 @@
 """The bench page in a browser: two pages of paper, timers that survive a reload, a record that the report shows."""
 
-from __future__ import annotations
-
 import json
 import re
-from pathlib import Path
-from typing import Any
 
 import pytest
 from cast_records import spec_of
@@ -25,7 +21,7 @@ SETS = {
 }
 
 
-def bench(name: str, changes: tuple[str, ...], out: Path) -> Path:
+def bench(name, changes, out):
     spec = load(name, [*changes, "output.formats=[]"])
     folder = build(spec, out, only=("moulds", "casting"), check=False).folder
     write_report(folder)
@@ -33,12 +29,12 @@ def bench(name: str, changes: tuple[str, ...], out: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def page_of_one(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page_of_one(tmp_path_factory):
     return bench("encapsulating", (), tmp_path_factory.mktemp("bench"))
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_a_printed_sheet_fits_two_pages(name: str, running: Any, tmp_path: Path) -> None:
+def test_a_printed_sheet_fits_two_pages(name, running, tmp_path):
     visit = Visit(running, bench(name, SETS[name], tmp_path))
     pdf = visit.page.pdf(prefer_css_page_size=True)
     visit.page.emulate_media(media="print")
@@ -54,7 +50,7 @@ def test_a_printed_sheet_fits_two_pages(name: str, running: Any, tmp_path: Path)
 
 
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (390, True), (1280, False)])
-def test_it_contacts_nothing_and_fits_its_window(width: int, dark: bool, running: Any, page_of_one: Path) -> None:
+def test_it_contacts_nothing_and_fits_its_window(width, dark, running, page_of_one):
     visit = Visit(running, page_of_one, width=width, dark=dark)
     assert (visit.errors, visit.console) == ([], [])
     assert {url.partition(":")[0] for url in visit.requests} <= {"file", "data"}
@@ -73,7 +69,7 @@ def test_it_contacts_nothing_and_fits_its_window(width: int, dark: bool, running
     visit.close()
 
 
-def test_a_timer_goes_on_through_a_reload(running: Any, page_of_one: Path) -> None:
+def test_a_timer_goes_on_through_a_reload(running, page_of_one):
     visit = Visit(running, page_of_one)
     page = visit.page
     page.get_by_role("button", name="Start pot life").first.click()
@@ -94,7 +90,7 @@ def test_a_timer_goes_on_through_a_reload(running: Any, page_of_one: Path) -> No
     visit.close()
 
 
-def test_the_schedule_counts_back(running: Any, page_of_one: Path) -> None:
+def test_the_schedule_counts_back(running, page_of_one):
     casting = json.loads((page_of_one.parent / "casting.json").read_text("utf-8"))
     visit = Visit(running, page_of_one)
     visit.page.locator("[name=ready]").fill("2101-03-14T12:00")
@@ -108,7 +104,8 @@ def test_the_schedule_counts_back(running: Any, page_of_one: Path) -> None:
     visit.close()
 
 
-def test_the_record_is_saved_and_shown(running: Any, page_of_one: Path) -> None:
+@pytest.mark.smoke
+def test_the_record_is_saved_and_shown(running, page_of_one):
     visit = Visit(running, page_of_one)
     page, folder = visit.page, page_of_one.parent
     for name, text in {"p1.a": "1,02", "p1.b": "0.99", "u1.height": "4.6", "u1.w2.1": "1.3", "u1.w2.3": "1.2"}.items():

@@ -1,15 +1,11 @@
 """A batch's page: rows named by what was swept, levels with their error, what no model reads, pins side by side."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from chromium import Visit
-from pagetable import column, table_page
+from pagetable import column
 
 from unitcad.report import write_report
 from unitcad.sweeps import BatchOptions, run
@@ -18,7 +14,7 @@ from unitcad.sweeps.sweep import from_file
 
 
 @pytest.fixture(scope="module")
-def walls(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def walls(tmp_path_factory):
     """A batch of both designs with two outer walls, one name a design."""
     data = {
         "base": ["embedded", "encapsulating"],
@@ -34,7 +30,7 @@ def walls(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def visit(running: Any, walls: Path) -> Iterator[Visit]:
+def visit(running, walls):
     seen = Visit(running, walls / "report.html")
     yield seen
     assert seen.errors == []
@@ -42,17 +38,17 @@ def visit(running: Any, walls: Path) -> Iterator[Visit]:
     seen.close()
 
 
-def variants(walls: Path) -> list[dict[str, Any]]:
+def variants(walls):
     return json.loads((walls / "batch.json").read_text())["variants"]
 
 
-def test_rows_of_one_name_are_named_by_what_was_swept(visit: Visit) -> None:
+def test_rows_of_one_name_are_named_by_what_was_swept(visit):
     assert column(visit, "name") == [
         f"{name}: layer 2 wall {wall} mm" for name in ("embedded", "encapsulating") for wall in (1.1, 1.4)
     ]
 
 
-def test_each_row_shows_its_section(visit: Visit) -> None:
+def test_each_row_shows_its_section(visit):
     pictures = visit.page.locator(".variants tbody .thumbnail")
     assert pictures.count() == 4
     pictures.nth(3).scroll_into_view_if_needed()
@@ -61,7 +57,7 @@ def test_each_row_shows_its_section(visit: Visit) -> None:
     assert len(set(pictures.evaluate_all("(all) => all.map((one) => one.src)"))) == 4
 
 
-def test_levels_are_per_cent_with_the_models_typical_error(visit: Visit, walls: Path) -> None:
+def test_levels_are_per_cent_with_the_models_typical_error(visit, walls):
     errors = json.loads((walls / "batch.json").read_text())["estimate"]["typical_error"]
     for shown, row in zip(column(visit, "edge_published, %"), variants(walls), strict=True):
         level, low, high = (float(word) for word in shown.replace("(", "").replace(")", "").replace("to ", "").split())
@@ -72,7 +68,7 @@ def test_levels_are_per_cent_with_the_models_typical_error(visit: Visit, walls: 
         assert len(shown.replace(".", "")) <= 3
 
 
-def test_a_filter_takes_what_a_cell_shows(visit: Visit) -> None:
+def test_a_filter_takes_what_a_cell_shows(visit):
     volume = column(visit, "layer2_volume_mm3")[0]
     visit.page.fill('input[name="filter-layer2_volume_mm3"]', volume)
     assert column(visit, "layer2_volume_mm3") == [volume]
@@ -81,7 +77,7 @@ def test_a_filter_takes_what_a_cell_shows(visit: Visit) -> None:
     assert {name.split(":")[0] for name in column(visit, "name")} == {"embedded"}
 
 
-def test_a_model_is_plotted_only_against_what_it_reads(visit: Visit) -> None:
+def test_a_model_is_plotted_only_against_what_it_reads(visit):
     assert visit.page.input_value('select[name="plot-x"]') == "layers.1.wall_mm"
     assert visit.page.input_value('select[name="plot-y"]') == "edge_published"
     assert "4 of 4 points" in visit.page.inner_text("#plot .tip")
@@ -97,7 +93,7 @@ def test_a_model_is_plotted_only_against_what_it_reads(visit: Visit) -> None:
     assert visit.page.locator("#plot .note").count() == 0
 
 
-def test_pins_set_variants_side_by_side(visit: Visit, walls: Path) -> None:
+def test_pins_set_variants_side_by_side(visit, walls):
     assert "Pin two or three" in visit.page.inner_text("#compare")
     boxes = visit.page.locator(".variants .pin")
     boxes.nth(0).check()
@@ -114,61 +110,3 @@ def test_pins_set_variants_side_by_side(visit: Visit, walls: Path) -> None:
     answers = [json.loads((walls / v["folder"] / "estimate.json").read_text())["answer"] for v in variants(walls)]
     assert told["Estimate"] == [answers[0]["headline"], answers[2]["headline"]]
     assert "edge_rule, %" in told
-
-
-def test_three_pins_are_the_most_and_are_undone_by_keys(visit: Visit) -> None:
-    boxes = visit.page.locator(".variants .pin")
-    for i in range(3):
-        boxes.nth(i).focus()
-        visit.page.keyboard.press("Space")
-    assert boxes.nth(3).is_disabled()
-    visit.page.locator("#compare button").first.focus()
-    visit.page.keyboard.press("Enter")
-    assert visit.page.locator("#compare thead th").count() == 2
-    assert visit.page.evaluate("() => document.activeElement.textContent") == "Unpin"
-    assert boxes.nth(3).is_enabled()
-    assert not boxes.nth(0).is_checked()
-    visit.page.keyboard.press("Enter")
-    visit.page.wait_for_selector("#compare .absent")
-    assert visit.page.evaluate("() => document.activeElement.className") == "pin"
-
-
-def test_pins_stay_as_a_variant_is_opened_and_the_table_is_filtered(visit: Visit) -> None:
-    boxes = visit.page.locator(".variants .pin")
-    boxes.nth(0).check()
-    boxes.nth(1).check()
-    visit.page.fill('input[name="filter-design"]', "encapsulating")
-    assert visit.page.locator("#compare thead th").count() == 2
-    visit.page.locator("#compare thead a").first.click()
-    visit.drawn()
-    visit.page.go_back()
-    visit.page.wait_for_selector("#compare thead")
-    assert visit.page.locator("#compare thead th").count() == 2
-
-
-@pytest.mark.parametrize("dark", [False, True])
-def test_side_by_side_fits_390_pixels(running: Any, walls: Path, dark: bool) -> None:
-    seen = Visit(running, walls / "report.html", width=390, height=844, dark=dark)
-    for i in range(3):
-        seen.page.locator(".variants .pin").nth(i).check()
-    assert seen.overflowing() == []
-    ground = "() => getComputedStyle(document.querySelector('#compare')).backgroundColor"
-    assert (seen.page.evaluate(ground) == "rgb(29, 33, 37)") == dark
-    seen.close()
-
-
-def test_a_batch_of_estimates_alone_can_be_compared_too(running: Any, tmp_path: Path) -> None:
-    columns = ["status", "name", "layers.0.wall_mm", "edge_published"]
-    rows = [["", "ok", "u", 1.0, 0.1], ["", "ok", "u", 1.2, 0.08], ["", "refused", "u", 99, None]]
-    table = {"estimate": {"typical_error": {"published": 1.25}, "not_read": {}}}
-    page = table_page(tmp_path, columns, rows, swept=["layers.0.wall_mm"], **table)
-    seen = Visit(running, page)
-    assert "1 failed" in seen.page.inner_text("header")
-    seen.page.locator(".pin").nth(0).check()
-    seen.page.locator(".pin").nth(1).check()
-    said = seen.page.inner_text("#compare")
-    assert "10 (8 to 13)" in said
-    assert "8 (6.4 to 10)" in said
-    assert "Section" not in said
-    assert seen.errors == []
-    seen.close()

@@ -1,10 +1,5 @@
 """The page of a target: the table of proposals with its heads over its columns, and as cards on a phone."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from unitcad.search.design_files import contents
@@ -13,13 +8,14 @@ from unitcad.search.target_file import load_target
 
 
 @pytest.fixture(scope="module")
-def design_html(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def design_html(tmp_path_factory):
     path = tmp_path_factory.mktemp("design") / "design.html"
     path.write_bytes(contents(invert(load_target("quiet-edge"), check=False), "out")["design.html"])
     return path
 
 
-def test_heads_stand_over_their_columns_and_on_a_phone_beside_their_values(running: Any, design_html: Path) -> None:
+@pytest.mark.smoke
+def test_heads_stand_over_their_columns_and_on_a_phone_beside_their_values(running, design_html):
     page = running.new_page(viewport={"width": 1200, "height": 900})
     page.goto(design_html.as_uri())
     ends = "nodes => nodes.map(node => Math.round(node.getBoundingClientRect().right))"

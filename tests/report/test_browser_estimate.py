@@ -1,13 +1,8 @@
 """The estimate's blocks in Chromium: both drives' curves, ranges by finite elements, inputs seen; a study's picture."""
 
-from __future__ import annotations
-
 import io
 import json
-from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +19,7 @@ OPEN = """() => document.querySelectorAll("#estimate details").forEach((node) =>
 
 
 @pytest.fixture(scope="module")
-def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def solved(tmp_path_factory):
     """The folder of a unit estimated by closed forms and, with few draws, by finite elements."""
     from unitcad.attenuation.fem import prior_range
 
@@ -39,12 +34,12 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def estimate(solved: Path) -> dict[str, Any]:
+def estimate(solved):
     return json.loads((solved / "estimate.json").read_text("utf-8"))
 
 
 @pytest.fixture
-def visit(running: Any, solved: Path) -> Iterator[Visit]:
+def visit(running, solved):
     seen = Visit(running, solved / "report.html")
     seen.page.evaluate(OPEN)
     yield seen
@@ -52,18 +47,18 @@ def visit(running: Any, solved: Path) -> Iterator[Visit]:
     seen.close()
 
 
-def cells(visit: Visit, label: str) -> list[list[str]]:
+def cells(visit, label):
     """The texts of a table, its head first."""
     rows = visit.page.locator(f'#estimate table[aria-label="{label}"] tr, #estimate [aria-label="{label}"] table tr')
     return rows.evaluate_all("(rows) => rows.map((row) => [...row.cells].map((cell) => cell.innerText.trim()))")
 
 
-def pixels(image: np.ndarray, colour: str) -> int:
+def pixels(image, colour):
     rgb = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
     return int((np.abs(image - rgb).max(axis=2) < 30).sum())
 
 
-def test_both_drives_are_drawn_and_stand_in_the_table(visit: Visit, estimate: dict[str, Any]) -> None:
+def test_both_drives_are_drawn_and_stand_in_the_table(visit, estimate):
     visit.page.wait_for_selector("#estimate .plot canvas")
     legend = " ".join(visit.page.locator("#estimate ul.key").all_inner_texts())
     assert "Force turning in the skin's plane (this motor)" in legend
@@ -84,7 +79,7 @@ def test_both_drives_are_drawn_and_stand_in_the_table(visit: Visit, estimate: di
     assert ratio[-1] > 100  # far out a sideways force moves more skin
 
 
-def test_two_lines_lead_and_the_rest_is_folded(running: Any, solved: Path, estimate: dict[str, Any]) -> None:
+def test_two_lines_lead_and_the_rest_is_folded(running, solved, estimate):
     seen = Visit(running, solved / "report.html")
     answer, shown = estimate["answer"], seen.page.inner_text("#estimate")
     for line in (answer["headline"], answer["lines"][1], answer["lines"][0][len(answer["headline"]) :].strip()):
@@ -100,7 +95,7 @@ def test_two_lines_lead_and_the_rest_is_folded(running: Any, solved: Path, estim
     seen.close()
 
 
-def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit: Visit, estimate: dict[str, Any]) -> None:
+def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit, estimate):
     levels = estimate["fem"]["levels"]
     chart = visit.page.locator("#estimate figure.ranges", has_text=f"of {DRAWS} draws")
     bars = chart.locator(".row:not(.scale)").evaluate_all(
@@ -132,7 +127,7 @@ def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit: Visit, est
         assert float(row[head.index("Median, %")]) == pytest.approx(100 * one["median"], rel=5e-3)
 
 
-def test_the_inputs_that_a_model_sees(visit: Visit, estimate: dict[str, Any]) -> None:
+def test_the_inputs_that_a_model_sees(visit, estimate):
     head, *rows = cells(visit, "Inputs that a model sees")
     blocks = [estimate["models"][name]["inputs_seen"] for name in ("rule", "divider", "published")]
     blocks += estimate["fem"]["inputs_seen"]
@@ -155,7 +150,7 @@ def test_the_inputs_that_a_model_sees(visit: Visit, estimate: dict[str, Any]) ->
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_nothing_of_it_is_wider_than_its_column(running: Any, solved: Path, dark: bool) -> None:
+def test_nothing_of_it_is_wider_than_its_column(running, solved, dark):
     seen = Visit(running, solved / "report.html", width=390, height=844, dark=dark)
     seen.page.evaluate(OPEN)
     for width in (768, 1280, 1920, 390):

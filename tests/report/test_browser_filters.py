@@ -1,10 +1,5 @@
 """Filters of a batch's table in Chromium: numbers as numbers, texts as texts, and what is not understood says so."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from typing import Any
-
 import pytest
 from chromium import Visit
 from pagetable import column, table_page
@@ -37,7 +32,7 @@ NUMBERS = [1, 1.1, 1.2, 1.25, 2, -3, 0.0517123456, None]
         ("!> 1", [1, -3, 0.0517123456, None]),
     ],
 )
-def test_numbers_are_filtered_as_numbers(table_of_both: Visit, text: str, kept: list[float | None]) -> None:
+def test_numbers_are_filtered_as_numbers(table_of_both, text, kept):
     table_of_both.page.fill('input[name="filter-value"]', text)
     assert column(table_of_both, "name") == [f"v{NUMBERS.index(value)}" for value in kept]
     assert table_of_both.page.get_attribute('input[name="filter-value"]', "aria-invalid") == "false"
@@ -58,7 +53,7 @@ def test_numbers_are_filtered_as_numbers(table_of_both: Visit, text: str, kept: 
         ("word", "", 8),
     ],
 )
-def test_texts_are_filtered_as_texts(table_of_both: Visit, field: str, text: str, kept: int) -> None:
+def test_texts_are_filtered_as_texts(table_of_both, field, text, kept):
     table_of_both.page.fill(f'input[name="filter-{field}"]', text)
     assert len(column(table_of_both, "name")) == kept
     assert table_of_both.page.inner_text(".fault") == ""
@@ -71,7 +66,7 @@ def test_texts_are_filtered_as_texts(table_of_both: Visit, field: str, text: str
         ("value", "> 1 < 2 < 3"), ("mixed", ">="), ("word", "> 1"), ("word", "!"), ("word", "="),
     ],
 )  # fmt: skip
-def test_a_filter_not_understood_says_so(table_of_both: Visit, field: str, text: str) -> None:
+def test_a_filter_not_understood_says_so(table_of_both, field, text):
     page, own = table_of_both.page, f'input[name="filter-{field}"]'
     plain = page.eval_on_selector(own, "(node) => getComputedStyle(node).borderColor")
     page.fill(own, text)
@@ -92,7 +87,7 @@ def test_a_filter_not_understood_says_so(table_of_both: Visit, field: str, text:
 
 
 @pytest.fixture(scope="module")
-def both(running: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
+def both(running, tmp_path_factory):
     """A column of numbers, one of numbers and texts, one of texts."""
     rows = [["", f"v{i}", value, "auto", "soft" if i % 2 else "hard"] for i, value in enumerate(NUMBERS)]
     rows[0][3], rows[1][3], rows[2][4] = 1, "1.0 soft", "a <x> b"
@@ -103,7 +98,7 @@ def both(running: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Vis
 
 
 @pytest.fixture
-def table_of_both(both: Visit) -> Visit:
+def table_of_both(both):
     for field in both.page.locator(".filters input").all():
         field.fill("")
     return both

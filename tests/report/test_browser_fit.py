@@ -1,28 +1,22 @@
 """The page of a variant with a lab's fit: range, own measurement and the fit's own errors, wide and narrow."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
-
 import pytest
 from chromium import Visit
 
 from unitcad.lab.fit_files import fit_toml
-from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
+from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.validation import load
 
 
 @pytest.fixture(scope="module")
-def fitted() -> Fitted:
+def fitted():
     return fit_lab(load_fit_lab("synthetic-bench"))
 
 
 @pytest.fixture(scope="module")
-def fit_page(fitted: Fitted, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fit_page(fitted, tmp_path_factory):
     folder = tmp_path_factory.mktemp("fit")
     (folder / "lab-fit.toml").write_text(fit_toml(fitted))
     spec = load("embedded", {"estimate.fit": str(folder / "lab-fit.toml")})
@@ -30,7 +24,7 @@ def fit_page(fitted: Fitted, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def visit(running: Any, fit_page: Path) -> Iterator[Visit]:
+def visit(running, fit_page):
     seen = Visit(running, fit_page)
     seen.page.get_by_text("How sure?").click()
     yield seen
@@ -39,7 +33,7 @@ def visit(running: Any, fit_page: Path) -> Iterator[Visit]:
     seen.close()
 
 
-def test_the_fit_s_own_error_stands_beside_the_stored_constants_one(visit: Visit, fitted: Fitted) -> None:
+def test_the_fit_s_own_error_stands_beside_the_stored_constants_one(visit, fitted):
     table = visit.page.locator('.scroll[aria-label="Error by the fit of synthetic-bench"] table')
     assert table.is_visible()  # under "How sure?", not among the folded tables
     rows = [row.split("\t") for row in table.locator("tbody tr").all_inner_texts()]
@@ -54,7 +48,7 @@ def test_the_fit_s_own_error_stands_beside_the_stored_constants_one(visit: Visit
     assert float(rows[-1][1]) == pytest.approx(fitted.fit.model["baseline"].left_out, rel=6e-3)
 
 
-def test_range_measurement_and_name_of_the_fit_are_there(visit: Visit, fitted: Fitted) -> None:
+def test_range_measurement_and_name_of_the_fit_are_there(visit, fitted):
     text = visit.page.inner_text("body")
     assert "Where a new unit is expected in the lab synthetic-bench" in text
     assert "Measured here (soft-inside): 9.8" in text
@@ -63,7 +57,7 @@ def test_range_measurement_and_name_of_the_fit_are_there(visit: Visit, fitted: F
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_nothing_overflows_at_390_pixels(running: Any, fit_page: Path, dark: bool) -> None:
+def test_nothing_overflows_at_390_pixels(running, fit_page, dark):
     seen = Visit(running, fit_page, width=390, height=844, dark=dark)
     assert seen.overflowing() == []
     seen.close()

@@ -1,13 +1,10 @@
 """Values that the JSON Schemas forbid: wrong kinds, out of range, NaN, huge, empty, nested, dates."""
 
-from __future__ import annotations
-
 import copy
 import datetime
 import json
 import random
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import msgspec
@@ -31,13 +28,13 @@ Bad = tuple[str, Any]
 """A dotted path and a value that its schema forbids."""
 
 
-def bad_values(kind: str) -> list[Bad]:
+def bad_values(kind):
     """Every forbidden value for every path of a spec or a sweep file, in the schema's order."""
     schema = SCHEMAS[kind]
     return list(_bad(schema, schema, ""))
 
 
-def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+def with_value(data, path, value):
     """A spec's data with a value put in, entries of the catalogue being whole but for it."""
     changed = copy.deepcopy(data)
     table, name, *rest = [*path.split("."), ""]
@@ -51,10 +48,10 @@ def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     return changed
 
 
-def toml(data: dict[str, Any]) -> str:
+def toml(data):
     """Data as TOML, dates too."""
 
-    def marked(node: Any) -> Any:
+    def marked(node):
         if isinstance(node, dict):
             return {key: marked(below) for key, below in node.items()}
         if isinstance(node, list):
@@ -64,13 +61,13 @@ def toml(data: dict[str, Any]) -> str:
     return re.sub('"@@(.*?)@@"', r"\1", text_of(marked(data)))
 
 
-def sample(kind: str, count: int, seed: int) -> list[Bad]:
+def sample(kind, count, seed):
     """`count` of them, drawn from a seed; all if there are fewer."""
     found = bad_values(kind)
     return found if len(found) <= count else random.Random(seed).sample(found, count)
 
 
-def _bad(node: dict[str, Any], schema: dict[str, Any], path: str) -> Iterator[Bad]:
+def _bad(node, schema, path):
     members = [_followed(member, schema) for member in node.get("anyOf", [node])]
     members = [member for member in members if member.get("type") != "null"]
     if path:
@@ -81,7 +78,7 @@ def _bad(node: dict[str, Any], schema: dict[str, Any], path: str) -> Iterator[Ba
         yield from _below(member, schema, path)
 
 
-def _below(member: dict[str, Any], schema: dict[str, Any], path: str) -> Iterator[Bad]:
+def _below(member, schema, path):
     prefix = f"{path}." if path else ""
     for name, below in member.get("properties", {}).items():
         yield from _bad(below, schema, f"{prefix}{name}")
@@ -95,7 +92,7 @@ def _below(member: dict[str, Any], schema: dict[str, Any], path: str) -> Iterato
         yield from _bad(free, schema, f"{prefix}ours")
 
 
-def _candidates(members: list[dict[str, Any]]) -> Iterator[Any]:
+def _candidates(members):
     yield from NUMBERS
     yield from WORDS
     yield from OTHERS
@@ -107,7 +104,7 @@ def _candidates(members: list[dict[str, Any]]) -> Iterator[Any]:
                 yield from (limit + beyond, limit + beyond * 1e-6 * max(1.0, abs(limit)), beyond * 5e-324)
 
 
-def _allows(member: dict[str, Any], value: Any) -> bool:
+def _allows(member, value):
     """Whether a member of a schema takes a value, as far as it goes without looking into tables and lists."""
     if "enum" in member:
         return value in member["enum"] and not isinstance(value, bool)
@@ -133,7 +130,7 @@ def _allows(member: dict[str, Any], value: Any) -> bool:
     return isinstance(value, dict) and not value and not member.get("required") and not member.get("minProperties")
 
 
-def _never(value: Any) -> bool:
+def _never(value):
     """Whether no key at all takes it."""
     try:
         json.dumps(value, allow_nan=False)
@@ -142,9 +139,9 @@ def _never(value: Any) -> bool:
     return False
 
 
-def _nested(depth: int) -> Any:
+def _nested(depth):
     return {"a": _nested(depth - 1)} if depth else 1
 
 
-def _followed(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
+def _followed(node, schema):
     return schema["$defs"][node["$ref"].removeprefix("#/$defs/")] if "$ref" in node else node

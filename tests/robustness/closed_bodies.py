@@ -1,12 +1,10 @@
 """Closed meshes to test checks with, each from a seed: unions, differences and intersections by manifold3d."""
 
-from __future__ import annotations
-
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
 
-def _primitive(rng: np.random.Generator) -> Manifold:
+def _primitive(rng):
     size = rng.choice([2.0, 4.0, 5.0, 8.0, 10.0], 3)
     kind = rng.integers(6)
     if kind == 0:
@@ -31,7 +29,7 @@ def _primitive(rng: np.random.Generator) -> Manifold:
     return found.rotate([float(v) for v in turn]).translate([float(v) for v in shift])
 
 
-def _level_set(rng: np.random.Generator) -> Manifold:
+def _level_set(rng):
     shapes = (
         lambda x, y, z: np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x) + 0.2,
         lambda x, y, z: 9 - (x * x + y * y + z * z) + 2 * np.sin(3 * x) * np.sin(2 * y),
@@ -40,7 +38,7 @@ def _level_set(rng: np.random.Generator) -> Manifold:
     return Manifold.level_set(shapes[rng.integers(3)], [-5, -5, -5, 5, 5, 5], float(rng.uniform(0.5, 0.9)), 0.0)
 
 
-def closed_body(seed: int) -> np.ndarray:
+def closed_body(seed):
     """The triangles (n, 3, 3) of a closed mesh as a float32 file holds them; one in ten is a level set."""
     rng = np.random.default_rng(seed)
     found = _level_set(rng) if seed % 10 == 9 else _primitive(rng)

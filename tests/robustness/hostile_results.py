@@ -6,93 +6,92 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 SECRET = "the-secret-of-another-folder"
 Spoil = Callable[[Path], None]
 
 
-def _linked(name: str, outside: str = "secret.svg") -> Spoil:
-    def spoil(folder: Path) -> None:
+def _linked(name, outside="secret.svg"):
+    def spoil(folder):
         (folder / name).unlink(missing_ok=True)
         (folder / name).symlink_to(folder.parent.parent / "outside" / outside)
 
     return spoil
 
 
-def _piped(name: str) -> Spoil:
-    def spoil(folder: Path) -> None:
+def _piped(name):
+    def spoil(folder):
         (folder / name).unlink(missing_ok=True)
         os.mkfifo(folder / name)
 
     return spoil
 
 
-def _written(name: str, content: str | bytes) -> Spoil:
-    def spoil(folder: Path) -> None:
+def _written(name, content):
+    def spoil(folder):
         (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
 
     return spoil
 
 
-def _torn(name: str) -> Spoil:
-    def spoil(folder: Path) -> None:
+def _torn(name):
+    def spoil(folder):
         content = (folder / name).read_bytes()
         (folder / name).write_bytes(content[: len(content) // 2])
 
     return spoil
 
 
-def _said(file: str, /, **values: Any) -> Spoil:
+def _said(file, /, **values):
     """The file with other values."""
 
-    def spoil(folder: Path) -> None:
+    def spoil(folder):
         (folder / file).write_text(json.dumps({**json.loads((folder / file).read_text()), **values}))
 
     return spoil
 
 
-def _with_number(file: str, number: str) -> Spoil:
+def _with_number(file, number):
     """The file with a number as Python would not write it."""
 
-    def spoil(folder: Path) -> None:
+    def spoil(folder):
         (folder / file).write_text((folder / file).read_text().replace("{", f'{{"more": {number},', 1))
 
     return spoil
 
 
-def _device(name: str) -> Spoil:
-    def spoil(folder: Path) -> None:
+def _device(name):
+    def spoil(folder):
         (folder / name).unlink()
         (folder / name).symlink_to("/dev/zero")
 
     return spoil
 
 
-def _large(name: str, size: int = 40_000_000) -> Spoil:
-    def spoil(folder: Path) -> None:
+def _large(name, size=40_000_000):
+    def spoil(folder):
         with open(folder / name, "wb") as file:
             file.truncate(size)
 
     return spoil
 
 
-def _folder_link(folder: Path) -> None:
+def _folder_link(folder):
     (folder / "more").symlink_to(folder.parent.parent / "outside")
 
 
-def _loop(folder: Path) -> None:
+def _loop(folder):
     (folder / "again").symlink_to(folder)
     (folder / "turn.svg").symlink_to("turn.svg")
 
 
-def _many(folder: Path) -> None:
+def _many(folder):
     (folder / "many").mkdir()
     for i in range(2500):
         (folder / "many" / f"{i}.txt").touch()
 
 
-def _deep(folder: Path) -> None:
+def _deep(folder):
     here = folder
     for _ in range(300):
         here = here / "d"
@@ -100,14 +99,14 @@ def _deep(folder: Path) -> None:
     (here / "deep.svg").write_text("<svg/>")
 
 
-def _code(folder: Path) -> None:
+def _code(folder):
     text = (folder / "spec.toml").read_text()
     source = json.dumps(f"open({str(folder.parent.parent / 'RAN')!r}, 'w')\ndef f(spec): pass\n")
     text = text.replace('design = "single-embedded"', "").replace('design = "embedded"', 'design = "d.py:f"')
     (folder / "spec.toml").write_text(f"design_source = {source}\n{text}")
 
 
-def _odd_names(folder: Path) -> None:
+def _odd_names(folder):
     for name in (b"\xff\xfe.svg", b"<img src=x onerror=alert(1)>.svg", b"\x1b[31m.txt", "‮gnp.txt".encode(), b"a\nb"):
         with open(os.path.join(os.fsencode(folder), name), "wb") as file:
             file.write(b"<svg xmlns='http://www.w3.org/2000/svg'/>")
@@ -141,8 +140,8 @@ KINDS: dict[str, tuple[Spoil, bool]] = {
     "manifest.json is a list": (_written("manifest.json", "[1, 2]"), False),
     "manifest.json is not UTF-8": (_written("manifest.json", b"\xff\xfe{}"), False),
     "manifest.json is deep": (_written("manifest.json", '{"a": ' + "[" * 900 + "]" * 900 + "}"), False),
-    "parts are numbers": (_said("manifest.json", parts=[1, 2], laws=5), False),
-    "laws are of a wrong type": (_said("manifest.json", laws=[{"code": 5, "ok": "yes"}]), False),
+    "parts are numbers": (_said("manifest.json", parts=[1, 2], mould_checks=5), False),
+    "mould checks are of a wrong type": (_said("manifest.json", mould_checks=[{"code": 5, "ok": "yes"}]), False),
     "numbers are huge": (_with_number("manifest.json", "1e999"), False),
     "numbers have 5,000 digits": (_with_number("manifest.json", "9" * 5000), False),
     "numbers are NaN": (_said("manifest.json", air_ring_mm=float("nan")), False),
@@ -163,7 +162,7 @@ KINDS: dict[str, tuple[Spoil, bool]] = {
 """What is done to a folder, and whether its variant is still shown (else it is listed as damaged)."""
 
 
-def outside(folder: Path) -> None:
+def outside(folder):
     """What no page may hold."""
     folder.mkdir()
     (folder / "secret.svg").write_text(f"<svg xmlns='http://www.w3.org/2000/svg'><text>{SECRET}</text></svg>")

@@ -1,12 +1,9 @@
 """Code that lies in a result, or that a spec brings along, never runs unasked."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -29,7 +26,7 @@ def f(spec):
 """
 
 
-def _unitcad(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+def _unitcad(*arguments, cwd):
     command = [sys.executable, "-m", "unitcad", *map(str, arguments)]
     environment = {**os.environ, "UNITCAD_CACHE": str(cwd / "cache")}
     return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False, timeout=120)
@@ -38,7 +35,7 @@ def _unitcad(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[s
 class Planted:
     """A folder with code that leaves a mark when it runs: as a file, embedded in a spec, in results, behind a sweep."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         self.folder = folder
         self.ran = folder / "RAN"
         self.code = CODE.format(ran=str(self.ran))
@@ -60,7 +57,7 @@ class Planted:
 
 
 @pytest.fixture
-def planted(tmp_path: Path) -> Planted:
+def planted(tmp_path):
     return Planted(tmp_path)
 
 
@@ -85,7 +82,7 @@ def planted(tmp_path: Path) -> Planted:
         "check results",
     ],
 )
-def test_code_that_nobody_named_does_not_run(arguments: str, planted: Planted) -> None:
+def test_code_that_nobody_named_does_not_run(arguments, planted):
     done = _unitcad(*arguments.split(), cwd=planted.folder)
     assert not planted.ran.exists()
     assert "Traceback" not in done.stderr
@@ -106,13 +103,13 @@ def test_code_that_nobody_named_does_not_run(arguments: str, planted: Planted) -
         "batch sweep-named.toml --dry-run --allow-code",
     ],
 )
-def test_code_of_a_file_that_was_named_runs_and_other_code_when_allowed(arguments: str, planted: Planted) -> None:
+def test_code_of_a_file_that_was_named_runs_and_other_code_when_allowed(arguments, planted):
     done = _unitcad(*arguments.split(), cwd=planted.folder)
     assert done.returncode == 0, done.stderr
     assert planted.ran.exists()
 
 
-def test_an_estimate_reads_a_named_design_and_with_it_runs_its_file(planted: Planted) -> None:
+def test_an_estimate_reads_a_named_design_and_with_it_runs_its_file(planted):
     """Its file says whether it has an estimate; a function has none."""
     done = _unitcad("estimate", "named.toml", cwd=planted.folder)
     assert planted.ran.exists()
@@ -120,7 +117,7 @@ def test_an_estimate_reads_a_named_design_and_with_it_runs_its_file(planted: Pla
     assert "has no estimate" in done.stderr
 
 
-def test_a_page_is_made_of_a_result_whose_code_does_not_run(planted: Planted) -> None:
+def test_a_page_is_made_of_a_result_whose_code_does_not_run(planted):
     assert _unitcad("build", "named.toml", "--only", "unit", "-o", "results", cwd=planted.folder).returncode == 0
     planted.ran.unlink()
     done = _unitcad("report", "results", cwd=planted.folder)

@@ -16,7 +16,7 @@ sys.path.append(str(Path(__file__).parent.parent / "sweeps"))
 from batching import bytes_of, leftovers, ring_sweep
 
 from unitcad.errors import UnitcadError
-from unitcad.sweeps import BatchOptions, Summary, load_sweep, run
+from unitcad.sweeps import BatchOptions, load_sweep, run
 from unitcad.sweeps.executors import SerialExecutor
 from unitcad.sweeps.journal import JOURNAL
 
@@ -27,16 +27,16 @@ Change = Callable[[Path, random.Random], None]
 class Batch:
     """A finished batch with its cache, as a folder to be copied."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         self.folder, self.out, self.cache = folder, folder / "out", folder / "cache"
 
-    def run(self, sweep: Path) -> Summary:
+    def run(self, sweep):
         options = BatchOptions(("unit",), verify=True, cache=self.cache)
         return run(load_sweep(sweep), self.out, options, SerialExecutor(), workers=1)
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Batch, Path]:
+def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("made")
     sweep = ring_sweep(folder / "s", heights=[2.0, 3.0], materials=2)
     batch = Batch(folder / "batch")
@@ -44,70 +44,70 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Batch, Path]:
     return batch, sweep
 
 
-def _emptied(file: Path, dice: random.Random) -> None:
+def _emptied(file, dice):
     _anew(file, b"")
 
 
-def _cut(file: Path, dice: random.Random) -> None:
+def _cut(file, dice):
     content = file.read_bytes()
     _anew(file, content[: dice.randrange(len(content))])
 
 
-def _flipped(file: Path, dice: random.Random) -> None:
+def _flipped(file, dice):
     content = bytearray(file.read_bytes())
     content[dice.randrange(len(content))] ^= 1 << dice.randrange(8)
     _anew(file, bytes(content))
 
 
-def _zeroed(file: Path, dice: random.Random) -> None:
+def _zeroed(file, dice):
     _anew(file, b"\0" * file.stat().st_size)
 
 
-def _longer(file: Path, dice: random.Random) -> None:
+def _longer(file, dice):
     _anew(file, file.read_bytes() + dice.randbytes(1000))
 
 
-def _nonsense(file: Path, dice: random.Random) -> None:
+def _nonsense(file, dice):
     _anew(file, b'[{"a": 1e999}]')
 
 
-def _gone(file: Path, dice: random.Random) -> None:
+def _gone(file, dice):
     shutil.rmtree(file) if file.is_dir() and not file.is_symlink() else file.unlink()
 
 
-def _linked(file: Path, dice: random.Random) -> None:
+def _linked(file, dice):
     aside = next(parent.parent for parent in file.parents if parent.name in ("out", "cache")) / "aside"
     aside = aside.with_name(f"aside{len(list(aside.parent.iterdir()))}")
     shutil.move(file, aside)
     file.symlink_to(aside)
 
 
-def _dangling(file: Path, dice: random.Random) -> None:
+def _dangling(file, dice):
     _gone(file, dice)
     file.symlink_to("nowhere")
 
 
-def _folder(file: Path, dice: random.Random) -> None:
+def _folder(file, dice):
     _gone(file, dice)
     file.mkdir()
     (file / "file").touch()
 
 
-def _pipe(file: Path, dice: random.Random) -> None:
+def _pipe(file, dice):
     _gone(file, dice)
     os.mkfifo(file)
 
 
-def _file(folder: Path, dice: random.Random) -> None:
+def _file(folder, dice):
     _gone(folder, dice)
     folder.write_text("something else")
 
 
-def _future(file: Path, dice: random.Random) -> None:
+def _future(file, dice):
     os.utime(file, (FAR, FAR))
 
 
-def _anew(file: Path, content: bytes) -> None:
+def _anew(file, content):
     """As a new file: a result is a link to the cache."""
     file.unlink()
     file.write_bytes(content)
@@ -120,7 +120,7 @@ ANY: dict[str, Change] = {
 }  # fmt: skip
 
 
-def _swapped(folder: Path, dice: random.Random) -> None:
+def _swapped(folder, dice):
     """Each file of a folder of entries under the name of another one."""
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     contents = [path.read_bytes() for path in paths]
@@ -128,8 +128,8 @@ def _swapped(folder: Path, dice: random.Random) -> None:
         _anew(path, content)
 
 
-def _each(change: Change) -> Change:
-    def changed(folder: Path, dice: random.Random) -> None:
+def _each(change):
+    def changed(folder, dice):
         for path in sorted(path for path in folder.rglob("*") if path.is_file()):
             change(path, dice)
 
@@ -179,14 +179,25 @@ FAILED = {"the variant: a file", "the variant: linked"}
 """A variant whose place is taken by something that is not ours fails with that reason; nothing is overwritten."""
 
 
-def _copied(made: Batch, folder: Path) -> Batch:
+def _copied(made, folder):
     shutil.copytree(made.folder, folder, symlinks=True)
     return Batch(folder)
 
 
-def _attack_cache(kind: str, made: tuple[Batch, Path], folder: Path, seed: int) -> None:
+def _cases(kinds, count):
+    """Return each kind of damage with three seeds, of which `count` kinds with the first seed are not `long`."""
+    share = random.Random(1).sample(sorted(kinds), count)
+    return [
+        pytest.param(kind, seed, marks=() if kind in share and not seed else pytest.mark.long)
+        for kind in kinds
+        for seed in range(3)
+    ]
+
+
+@pytest.mark.parametrize(("kind", "seed"), _cases(IN_CACHE, 8))
+def test_a_damaged_cache(kind, seed, made, tmp_path):
     """The damage, then the batch into a new folder: all comes out of the cache, or is made again."""
-    batch, sweep = _copied(made[0], folder), made[1]
+    batch, sweep = _copied(made[0], tmp_path / "batch"), made[1]
     shutil.rmtree(batch.out)
     place, change = IN_CACHE[kind]
     change(batch.cache / place, random.Random(f"{kind} {seed}"))
@@ -202,8 +213,9 @@ def _attack_cache(kind: str, made: tuple[Batch, Path], folder: Path, seed: int) 
         shutil.rmtree(batch.out)
 
 
-def _attack_results(kind: str, made: tuple[Batch, Path], folder: Path, seed: int) -> None:
-    batch, sweep = _copied(made[0], folder), made[1]
+@pytest.mark.parametrize(("kind", "seed"), _cases(IN_RESULTS, 12))
+def test_damaged_results(kind, seed, made, tmp_path):
+    batch, sweep = _copied(made[0], tmp_path / "batch"), made[1]
     variant = json.loads((batch.out / "batch.json").read_text())["variants"][1]["folder"]
     place, change = IN_RESULTS[kind]
     place = place.replace("VARIANT", variant).replace("LOCK", f".{variant}.lock")
@@ -229,31 +241,3 @@ def _attack_results(kind: str, made: tuple[Batch, Path], folder: Path, seed: int
     assert not any(path.is_symlink() for path in batch.out.rglob("*"))
     assert not leftovers(batch.out)
     assert batch.run(sweep).resumed == 4
-
-
-def _share(kinds: dict[str, tuple[str, Change]], count: int) -> list[str]:
-    return random.Random(1).sample(sorted(kinds), count)
-
-
-@pytest.mark.parametrize("kind", _share(IN_CACHE, 8))
-def test_a_damaged_cache(kind: str, made: tuple[Batch, Path], tmp_path: Path) -> None:
-    _attack_cache(kind, made, tmp_path / "batch", 0)
-
-
-@pytest.mark.parametrize("kind", _share(IN_RESULTS, 12))
-def test_damaged_results(kind: str, made: tuple[Batch, Path], tmp_path: Path) -> None:
-    _attack_results(kind, made, tmp_path / "batch", 0)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("kind", IN_CACHE)
-def test_every_damage_to_a_cache(kind: str, seed: int, made: tuple[Batch, Path], tmp_path: Path) -> None:
-    _attack_cache(kind, made, tmp_path / "batch", seed)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("kind", IN_RESULTS)
-def test_every_damage_to_results(kind: str, seed: int, made: tuple[Batch, Path], tmp_path: Path) -> None:
-    _attack_results(kind, made, tmp_path / "batch", seed)

@@ -3,8 +3,6 @@
 The body is one closed shell, so that a file of which some faces are lost has a hole: without an error it must have all.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 import zipfile
@@ -26,7 +24,7 @@ LIMITS = Limits(max_faces=100_000, seconds=20)
 TRIANGLES = 20
 
 
-def body() -> tuple[np.ndarray, list[list[int]]]:
+def body():
     """A prism over an L: two concave caps of six corners and six quads."""
     n = len(OUTLINE)
     points = np.array([(x, y, z) for z in (0.0, 5.0) for x, y in OUTLINE])
@@ -34,7 +32,7 @@ def body() -> tuple[np.ndarray, list[list[int]]]:
     return points, faces + [[i, (i + 1) % n, n + (i + 1) % n, n + i] for i in range(n)]
 
 
-def files() -> dict[str, bytes]:
+def files():
     """The body in every format by a name with the format's suffix."""
     points, faces = body()
     made = every_way(points, faces)
@@ -53,7 +51,7 @@ def files() -> dict[str, bytes]:
 FILES = files()
 
 
-def damaged(data: bytes, rng: np.random.Generator) -> bytes:
+def damaged(data, rng):
     """The bytes after one to three kinds of damage."""
     for _ in range(int(rng.integers(1, 4))):
         size = max(len(data), 1)
@@ -83,7 +81,19 @@ def damaged(data: bytes, rng: np.random.Generator) -> bytes:
     return data
 
 
-def attack(name: str, seeds: range) -> None:
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_the_body_itself_is_sound(name):
+    report = check_bytes(FILES[name], name)
+    assert report.findings == ()
+    assert report.facts.triangles == TRIANGLES
+    assert report.facts.volume_mm3 == pytest.approx(5 * 56, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(25), pytest.param(range(25, 3000), marks=pytest.mark.long)], ids=["few", "many"]
+)
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_damage_is_never_silent(name, seeds):
     for seed in seeds:
         data = damaged(FILES[name], np.random.default_rng([seed, sorted(FILES).index(name)]))
         begin = time.monotonic()
@@ -94,22 +104,3 @@ def attack(name: str, seeds: range) -> None:
         if report.verdict != "error":
             assert facts.watertight, (name, seed)
             assert (facts.triangles or 0) >= TRIANGLES, (name, seed)
-
-
-@pytest.mark.parametrize("name", sorted(FILES))
-def test_the_body_itself_is_sound(name: str) -> None:
-    report = check_bytes(FILES[name], name)
-    assert report.findings == ()
-    assert report.facts.triangles == TRIANGLES
-    assert report.facts.volume_mm3 == pytest.approx(5 * 56, rel=1e-5)
-
-
-@pytest.mark.parametrize("name", sorted(FILES))
-def test_damage_is_never_silent(name: str) -> None:
-    attack(name, range(25))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", sorted(FILES))
-def test_damage_is_never_silent_in_the_long_run(name: str) -> None:
-    attack(name, range(25, 3000))

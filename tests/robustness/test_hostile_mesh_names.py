@@ -1,12 +1,9 @@
 """Names of mesh files that would be markup, orders to a terminal or workflow commands, through every output."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 from random import Random
 from urllib.parse import unquote_to_bytes
 
@@ -29,13 +26,13 @@ NAMES = [
 _PIECES = [piece for name in NAMES for piece in re.findall(r"\w+|\W", name)]
 
 
-def random_names(seed: int, count: int) -> list[str]:
+def random_names(seed, count):
     """Names put together from pieces of the others."""
     random = Random(seed)
     return ["".join(random.choices(_PIECES, k=random.randint(1, 25)))[:60].replace("/", "_") for _ in range(count)]
 
 
-def judge(folder: Path, name: str) -> None:
+def judge(folder, name):
     """Whether a file's name is text in each format, in a baseline and in a picture's name."""
     path = folder / f"{name}.obj"
     path.write_text(OPEN)
@@ -72,11 +69,11 @@ def judge(folder: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES, ids=ascii)
-def test_a_name_is_text_in_every_output(tmp_path: Path, name: str) -> None:
+def test_a_name_is_text_in_every_output(tmp_path, name):
     judge(tmp_path, name)
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 20))])
-def test_names_put_together_at_random_are_text(tmp_path: Path, seed: int) -> None:
+def test_names_put_together_at_random_are_text(tmp_path, seed):
     for name in random_names(seed, 20):
         judge(tmp_path, name)

@@ -10,7 +10,6 @@ import re
 import unicodedata
 import xml.etree.ElementTree as ElementTree
 import zipfile
-from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -28,7 +27,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.export import chart, threemf
 from unitcad.pipeline.write import build
 from unitcad.report import write_report
-from unitcad.spec import Spec, to_toml
+from unitcad.spec import to_toml
 from unitcad.validation import from_data, read
 
 SHOWN = [
@@ -82,7 +81,7 @@ REFUSED = [
 """Names with characters that deceive."""
 
 
-def _spec(name: str) -> Spec:
+def _spec(name):
     """A spec in which variant, material and source have that name."""
     data = read("single-embedded")
     data |= {"name": name, "output": {"formats": []}}
@@ -92,7 +91,7 @@ def _spec(name: str) -> Spec:
     return from_data(data)
 
 
-def _random_names(seed: int, count: int) -> list[str]:
+def _random_names(seed, count):
     """Names put together from pieces of the others."""
     random = Random(seed)
     pieces = [piece for name in SHOWN for piece in re.findall(r"\w+|\W", name)]
@@ -101,12 +100,12 @@ def _random_names(seed: int, count: int) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def folders(tmp_path_factory):
     """A variant of each name."""
     return _built(SHOWN, tmp_path_factory.mktemp("names"))
 
 
-def _built(names: list[str], out: Path) -> dict[str, Path]:
+def _built(names, out):
     store = MemoryStore()
     return {
         name: build(_spec(name), out, only=["unit", "casting", "estimate"], check=False, store=store).folder
@@ -116,7 +115,7 @@ def _built(names: list[str], out: Path) -> dict[str, Path]:
 
 @pytest.mark.parametrize("name", REFUSED)
 @pytest.mark.parametrize("place", ["name", "key", "material", "parameter", "unknown"])
-def test_a_name_that_deceives_is_refused_with_its_field(name: str, place: str, capsys) -> None:
+def test_a_name_that_deceives_is_refused_with_its_field(name, place, capsys):
     data: dict[str, Any] = read("single-embedded")
     if place == "name":
         data["name"] = name
@@ -142,12 +141,12 @@ def test_a_name_that_deceives_is_refused_with_its_field(name: str, place: str, c
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_an_error_about_a_file_or_from_a_design_is_no_order_to_the_terminal(name: str, capsys) -> None:
+def test_an_error_about_a_file_or_from_a_design_is_no_order_to_the_terminal(name, capsys):
     say_error(UnitcadError(f"{name}: no such file"), "text")
     assert text.invisible(capsys.readouterr().err.removesuffix("\n")) is None
 
 
-def _judge(name: str, folder: Path) -> None:
+def _judge(name, folder):
     """Whether a name is text in each of a variant's files."""
     manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
     assert manifest["name"] == name
@@ -169,30 +168,30 @@ def _judge(name: str, folder: Path) -> None:
         assert not tags & {"script", "foreignObject", "image", "a", "use", "iframe"}
 
 
-def _shown(token: Any) -> str:
+def _shown(token):
     """Return what a reader of rendered Markdown sees."""
     return _once_spaced("".join(child.content for child in token.children or [] if child.type != "softbreak"))
 
 
-def _once_spaced(text: str) -> str:
+def _once_spaced(text):
     """Return a text as HTML shows it: runs of spaces as one, none at the ends."""
     return " ".join(text.split())
 
 
 @pytest.mark.parametrize("name", SHOWN)
-def test_a_name_is_text_in_every_file(name: str, folders: dict[str, Path]) -> None:
+def test_a_name_is_text_in_every_file(name, folders):
     _judge(name, folders[name])
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(20))
-def test_names_put_together_at_random_are_text_in_every_file(seed: int, tmp_path: Path) -> None:
+def test_names_put_together_at_random_are_text_in_every_file(seed, tmp_path):
     for name, folder in _built(_random_names(seed, 10), tmp_path).items():
         _judge(name, folder)
 
 
 @pytest.mark.parametrize("name", SHOWN)
-def test_a_bodys_name_is_text_in_meshes_and_drawings(name: str) -> None:
+def test_a_bodys_name_is_text_in_meshes_and_drawings(name):
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     with zipfile.ZipFile(
@@ -205,7 +204,8 @@ def test_a_bodys_name_is_text_in_meshes_and_drawings(name: str) -> None:
     assert ElementTree.fromstring(marked).text == name
 
 
-def test_a_page_of_all_names_runs_no_script_and_asks_for_nothing(folders: dict[str, Path], running: Any) -> None:
+@pytest.mark.smoke
+def test_a_page_of_all_names_runs_no_script_and_asks_for_nothing(folders, running):
     root = next(iter(folders.values())).parent
     page = write_report(root)
     for name in ["", *SHOWN[:4]]:
@@ -223,7 +223,7 @@ def test_a_page_of_all_names_runs_no_script_and_asks_for_nothing(folders: dict[s
         visit.close()
 
 
-def test_a_terminal_gets_names_as_text(tmp_path: Path) -> None:
+def test_a_terminal_gets_names_as_text(tmp_path):
     for name in SHOWN[::7]:
         file = tmp_path / "a.toml"
         file.write_text(to_toml(_spec(name)), "utf-8")

@@ -38,7 +38,7 @@ class Reference:
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+def reference(tmp_path_factory):
     folder = tmp_path_factory.mktemp("reference")
     sweep = ring_sweep(folder / "s", heights=HEIGHTS, materials=MATERIALS)
     start = time.monotonic()
@@ -48,13 +48,13 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
     return Reference(sweep, bytes_of(folder / "out"), time.monotonic() - start)
 
 
-def _start(sweep: Path, out: Path, cache: Path) -> subprocess.Popen[bytes]:
+def _start(sweep, out, cache):
     words = ("batch", sweep, "-o", out, "-j", 2, "--cache", cache, "--json")
     # A group of its own, so that a kill can be for the whole of it.
     return subprocess.Popen(command(*words), stdout=subprocess.PIPE, env=environment(), start_new_session=True)
 
 
-def _noted(out: Path) -> dict[int, str]:
+def _noted(out):
     """The variants that the journal has, and the folders that it names."""
     if not (out / JOURNAL).exists():
         return {}
@@ -62,7 +62,7 @@ def _noted(out: Path) -> dict[int, str]:
     return {found["index"]: found["folder"] for found in map(json.loads, lines)}
 
 
-def _kill(child: subprocess.Popen[bytes], dice: random.Random) -> None:
+def _kill(child, dice):
     """By SIGKILL: the parent, the whole group, or a worker and then the parent."""
     below = psutil.Process(child.pid).children(recursive=True)
     match dice.choice(("parent", "group", "worker")):
@@ -81,8 +81,11 @@ def _kill(child: subprocess.Popen[bytes], dice: random.Random) -> None:
     assert not [process for process in alive if process.status() != psutil.STATUS_ZOMBIE]
 
 
-def _trial(reference: Reference, folder: Path, kills: int, seed: int) -> None:
-    dice, out, cache = random.Random(seed), folder / "out", folder / "cache"
+@pytest.mark.parametrize(
+    ("kills", "seed"), [(3, 1), *(pytest.param(5, seed, marks=pytest.mark.long) for seed in range(2, 14))]
+)
+def test_a_batch_that_is_killed_again_and_again(kills, seed, reference, tmp_path):
+    dice, out, cache = random.Random(seed), tmp_path / "out", tmp_path / "cache"
     noted: dict[int, str] = {}
     before: dict[str, int] = {}
     while kills:
@@ -116,13 +119,3 @@ def _trial(reference: Reference, folder: Path, kills: int, seed: int) -> None:
     assert bytes_of(out) == reference.bytes
     assert len(rows(out)) == VARIANTS
     assert not leftovers(out)
-
-
-def test_a_batch_that_is_killed_again_and_again(reference: Reference, tmp_path: Path) -> None:
-    _trial(reference, tmp_path, 3, 1)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(2, 14))
-def test_batches_that_are_killed_again_and_again(seed: int, reference: Reference, tmp_path: Path) -> None:
-    _trial(reference, tmp_path, 5, seed)

@@ -1,12 +1,8 @@
 """A refusal of a spec's length names a field that helps: the value offered, put in, is accepted in that field."""
 
-from __future__ import annotations
-
 import copy
 import math
 import random
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 
@@ -21,7 +17,7 @@ CHANGED = 4
 """Fields of a spec that are changed at once, at most."""
 
 
-def lengths(node: Any, path: str = "") -> dict[str, float]:
+def lengths(node, path=""):
     """Return every length of a spec's data by its dotted path."""
     below = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
     found = {}
@@ -31,7 +27,7 @@ def lengths(node: Any, path: str = "") -> dict[str, float]:
     return found
 
 
-def bad_specs(name: str, count: int) -> list[dict[str, Any]]:
+def bad_specs(name, count):
     """Return specs of a template with some lengths between a seventh and the sevenfold of its own."""
     choose = random.Random(name)
     own = sorted(lengths(to_data(load(name))).items())
@@ -48,7 +44,7 @@ def bad_specs(name: str, count: int) -> list[dict[str, Any]]:
     return specs
 
 
-def refused(data: dict[str, Any], judge: Callable[[dict[str, Any]], object]) -> Refusal | None:
+def refused(data, judge):
     try:
         judge(data)
     except Refusal as refusal:
@@ -56,7 +52,7 @@ def refused(data: dict[str, Any], judge: Callable[[dict[str, Any]], object]) -> 
     return None
 
 
-def check_offer(data: dict[str, Any], judge: Callable[[dict[str, Any]], object]) -> bool:
+def check_offer(data, judge):
     """Assert the law of one spec; tell whether it was refused."""
     refusal = refused(data, judge)
     if refusal is None or refusal.value is None or not refusal.field.endswith("_mm"):
@@ -70,12 +66,12 @@ def check_offer(data: dict[str, Any], judge: Callable[[dict[str, Any]], object])
 
 
 @pytest.mark.parametrize("name", sorted(templates()))
-def test_a_bad_length_is_refused_with_one_that_is_accepted(name: str) -> None:
+def test_a_bad_length_is_refused_with_one_that_is_accepted(name):
     assert sum(check_offer(data, from_data) for data in bad_specs(name, 150)) > 20
 
 
 @pytest.mark.parametrize("name", sorted(custom_templates()))
-def test_a_bad_length_of_a_custom_design_is_refused_with_one_that_is_accepted(name: str) -> None:
+def test_a_bad_length_of_a_custom_design_is_refused_with_one_that_is_accepted(name):
     allow(ANY)
     try:
         assert sum(check_offer(data, from_data) for data in bad_specs(name, 40)) > 3
@@ -84,8 +80,8 @@ def test_a_bad_length_of_a_custom_design_is_refused_with_one_that_is_accepted(na
 
 
 @pytest.mark.parametrize("name", sorted(templates()))
-def test_moulds_that_are_refused_name_a_length_that_is_accepted(name: str) -> None:
-    def judge(data: dict[str, Any]) -> None:
+def test_moulds_that_are_refused_name_a_length_that_is_accepted(name):
+    def judge(data):
         plan(from_data(data))
 
     for data in bad_specs(name, 100):
@@ -100,7 +96,7 @@ def test_moulds_that_are_refused_name_a_length_that_is_accepted(name: str) -> No
         ({"moulds.ledge_mm": 3.578, "fpcb.tail_width_mm": 0.5}, "diameter_mm", 15.706),
     ],
 )
-def test_a_core_too_narrow_names_what_widens_it(changes: dict[str, Any], field: str, nearest: float) -> None:
+def test_a_core_too_narrow_names_what_widens_it(changes, field, nearest):
     with pytest.raises(Refusal, match="the core must hold the filament's hole") as caught:
         load("single-encapsulating", changes)
     assert (caught.value.field, caught.value.nearest) == (field, nearest)

@@ -1,13 +1,10 @@
 """Commands that start other processes: nothing runs on after the command, however it ends."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -22,17 +19,17 @@ from unitcad.validation import templates
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 
-def build(folder: Path) -> tuple[list[str], int]:
+def build(folder):
     """A build of eight units, with STEP, in mid-work: its helper is there."""
     return command("build", *["three-layer"] * 8, "-o", folder / "out"), 1
 
 
-def batch(folder: Path) -> tuple[list[str], int]:
+def batch(folder):
     sweep = ring_sweep(folder / "s", "slow", [float(height) for height in range(2, 20)])
     return command("batch", sweep, "-o", folder / "out", "-j", 2, "--cache", folder / "cache"), 2
 
 
-def check(folder: Path) -> tuple[list[str], int]:
+def check(folder):
     """A check of files that take long to read."""
     rows = "v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "".join(f"v {i} {i % 7} {i % 11}\n" for i in range(300_000))
     rows += "".join(f"f {i + 1} {i + 2} {i + 3}\n" for i in range(300_000))
@@ -43,9 +40,7 @@ def check(folder: Path) -> tuple[list[str], int]:
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT], ids=lambda end: end.name)
 @pytest.mark.parametrize("started", [build, batch, check], ids=lambda started: started.__name__)
-def test_a_command_leaves_no_process(
-    started: Callable[[Path], tuple[list[str], int]], end: signal.Signals, tmp_path: Path
-) -> None:
+def test_a_command_leaves_no_process(started, end, tmp_path):
     words, workers = started(tmp_path)
     process = subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(), start_new_session=True
@@ -61,7 +56,7 @@ def test_a_command_leaves_no_process(
         process.kill()
 
 
-def test_a_server_that_is_killed_in_mid_sweep_leaves_no_process(tmp_path: Path) -> None:
+def test_a_server_that_is_killed_in_mid_sweep_leaves_no_process(tmp_path):
     words = command("serve", "--no-browser", "encapsulating")
     process = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:

@@ -1,13 +1,10 @@
 """Builds of one spec into one folder at the same time: none fails, and what each was asked for is there at the end."""
 
-from __future__ import annotations
-
 import os
 import random
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +14,11 @@ FORMATS = ("stl", "3mf", "svg", "glb")
 OUTPUTS = ("unit", "estimate", "casting")
 
 
-def _build_at_once(folder: Path, count: int, seed: int) -> None:
+@pytest.mark.parametrize(
+    ("count", "seed"), [(4, 2), *(pytest.param(18, seed, marks=pytest.mark.long) for seed in range(4))]
+)
+def test_builds_of_one_spec_at_the_same_time(count, seed, tmp_path):
+    folder = tmp_path / "out"
     dice = random.Random(seed)
     asked = [(dice.choice(FORMATS), dice.choice(OUTPUTS), dice.random() < 0.5) for _ in range(count)]
     build = [sys.executable, "-P", "-m", "unitcad", "build", "single-embedded", "--set", "output.tolerance_mm=0.1"]
@@ -38,13 +39,3 @@ def _build_at_once(folder: Path, count: int, seed: int) -> None:
     formats = tomllib.loads((result / "spec.toml").read_text())["output"]["formats"]
     assert set(formats) == {form for form, _, _ in asked}
     assert (result / "report.html").exists() == any(page for _, _, page in asked)
-
-
-def test_builds_of_one_spec_at_the_same_time(tmp_path: Path) -> None:
-    _build_at_once(tmp_path / "out", 4, 2)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(4))
-def test_many_builds_of_one_spec_at_the_same_time(seed: int, tmp_path: Path) -> None:
-    _build_at_once(tmp_path / "out", 18, seed)

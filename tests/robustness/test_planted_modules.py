@@ -1,7 +1,5 @@
 """No command imports anything from the folder in which it runs."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import os
 import shutil
@@ -44,7 +42,7 @@ MORE = [
 
 
 @cache
-def _names() -> frozenset[str]:
+def _names():
     """Modules that anything might import: Python's own and those of what is installed."""
     found = set(importlib.metadata.packages_distributions()) | set(sys.stdlib_module_names)
     optional = {"OCP", "build123d", "cadquery", "distributed", "gmsh", "sitecustomize", "usercustomize"}
@@ -52,7 +50,7 @@ def _names() -> frozenset[str]:
 
 
 @pytest.fixture(scope="module")
-def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def material(tmp_path_factory):
     """What the commands work on."""
     folder = tmp_path_factory.mktemp("material")
     (folder / "sweep.toml").write_text(SWEEP)
@@ -67,7 +65,7 @@ def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def _planted(material: Path, folder: Path, spared: frozenset[str] = frozenset()) -> tuple[Path, Path]:
+def _planted(material, folder, spared=frozenset()):
     """A working directory full of modules, and the folder in which each leaves a mark when it runs."""
     here, ran = folder / "here", folder / "ran"
     shutil.copytree(material, here)
@@ -77,7 +75,7 @@ def _planted(material: Path, folder: Path, spared: frozenset[str] = frozenset())
     return here, ran
 
 
-def _run(command: list[str], here: Path, ran: Path) -> None:
+def _run(command, here, ran):
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONSAFEPATH")}
     environment["UNITCAD_CACHE"] = str(here.parent / "cache")
     done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, check=False, timeout=300)
@@ -88,13 +86,13 @@ def _run(command: list[str], here: Path, ran: Path) -> None:
 
 
 @pytest.mark.parametrize("arguments", [*COMMANDS, *(pytest.param(more, marks=pytest.mark.long) for more in MORE)])
-def test_nothing_is_imported_from_the_working_directory(arguments: str, material: Path, tmp_path: Path) -> None:
+def test_nothing_is_imported_from_the_working_directory(arguments, material, tmp_path):
     here, ran = _planted(material, tmp_path)
     _run([SCRIPT, *arguments.split()], here, ran)
 
 
 @pytest.mark.parametrize("arguments", ["check a.stl b.stl -j 2", pytest.param(COMMANDS[0], marks=pytest.mark.long)])
-def test_python_m_imports_no_more_than_python_itself(arguments: str, material: Path, tmp_path: Path) -> None:
+def test_python_m_imports_no_more_than_python_itself(arguments, material, tmp_path):
     (tmp_path / "trivial.py").write_text("import sys\nprint(*sys.modules)\n")
     command = [sys.executable, "-m", "trivial"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)

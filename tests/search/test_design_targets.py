@@ -44,7 +44,7 @@ from unitcad.search.target_file import load_target, shipped, target_of
         ({"vary": {"layers": [2], "step_mm": 0.01}}, "vary.step_mm", "more than 20000 sets of lengths", 0.02),
         ({"estimate": {"fit": "none.toml"}}, "estimate.fit", "none.toml", None),
         ({"spec": {"layers": {}}}, "spec.layers", "not known", None),
-        ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "stands in at_hand.motors", None),
+        ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "is in at_hand.motors", None),
     ],
 )
 def test_what_is_refused(data: dict[str, Any], field: str, limit: str, nearest: object) -> None:
@@ -63,7 +63,7 @@ def test_a_fault_of_a_table_for_every_spec_is_named() -> None:
 
 
 def test_shipped_targets_load_and_are_listed(run: Any) -> None:
-    assert set(shipped()) == {"amplify", "measured-lengths", "quiet-edge"}
+    assert set(shipped()) == {"amplify", "published", "quiet-edge"}
     for name in shipped():
         assert load_target(name).name == name
         assert name in run("list", "targets").stdout
@@ -77,7 +77,7 @@ def test_a_name_that_is_no_target_is_refused(run: Any) -> None:
 
 def test_a_target_to_start_from(run: Any, tmp_path: Path) -> None:
     assert run("init", "mine", "--template", "quiet-edge", cwd=tmp_path).returncode == 0
-    assert load_target(tmp_path / "mine.toml").wish.edge_max == 0.06
+    assert load_target(tmp_path / "mine.toml").goals.edge_max == 0.06
     done = run("init", "other", "--template", "quiet", cwd=tmp_path)
     assert done.returncode == 2
     assert "--template = 'quiet': not known; closest: quiet-edge" in done.stderr

@@ -1,26 +1,22 @@
 """One server for the tests that only ask."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
 import pytest
 
 pytest.importorskip("starlette", reason="the extra serve is not installed")
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
-from running import Server, serving
+from running import serving
 
 from unitcad.validation import templates
 
 
 @pytest.fixture(scope="session")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+def server(tmp_path_factory):
     """A server of the default template."""
     with serving(tmp_path_factory.mktemp("served")) as running:
         yield running
 
 
 @pytest.fixture(scope="session")
-def text() -> str:
+def text():
     """The text of the encapsulating template."""
     return templates()["encapsulating"].read_text("utf-8")

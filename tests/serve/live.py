@@ -1,13 +1,8 @@
 """The live page in Chromium: what a test does on it and waits for."""
 
-from __future__ import annotations
-
 import time
-from collections.abc import Callable
-from typing import Any
 
 from chromium import Visit
-from running import Server
 
 WALL = 'input[name="layers.0.wall_mm"]'
 
@@ -15,53 +10,53 @@ WALL = 'input[name="layers.0.wall_mm"]'
 class Live(Visit):
     """A page of a server in a browser."""
 
-    def __init__(self, running: Any, server: Server, width: int = 1280, height: int = 900, dark: bool = False) -> None:
+    def __init__(self, running, server, width=1280, height=900, dark=False):
         super().__init__(running, server.url, width, height, dark)
         self.server = server
         self.settled()
 
     @property
-    def state(self) -> str:
+    def state(self):
         """What the page says of the spec."""
         return self.page.inner_text("#state")
 
-    def until(self, done: Callable[[], bool], seconds: float = 60.0) -> None:
+    def until(self, done, seconds=60.0):
         """Wait until something holds."""
         end = time.monotonic() + seconds
         while not done():
             assert time.monotonic() < end, self.state
             self.page.wait_for_timeout(30)
 
-    def settled(self) -> None:
+    def settled(self):
         """Wait until nothing is under way: unit, moulds and estimate are those of the newest change."""
         self.until(lambda: self.page.get_attribute("#page", "aria-busy") == "false")
 
-    def choose(self, selector: str, value: str) -> None:
+    def choose(self, selector, value):
         """Type a value, and wait until all of it has been seen."""
         count = len(self.timings())
         self.page.fill(selector, value)
         self.until(lambda: len(self.timings()) > count)
         self.settled()
 
-    def pressed(self, control: Any, key: str = "") -> None:
+    def pressed(self, control, key=""):
         """Click a control, or press a key in it, and wait until all of what changes has been seen."""
         count = len(self.timings())
         control.press(key) if key else control.click()
         self.until(lambda: len(self.timings()) > count)
         self.settled()
 
-    def start_from(self, name: str) -> None:
+    def start_from(self, name):
         """Choose a template."""
         count = len(self.timings())
         self.page.select_option('select[name="template"]', name)
         self.until(lambda: len(self.timings()) > count)
         self.settled()
 
-    def timings(self) -> list[dict[str, Any]]:
+    def timings(self):
         """What the page has measured: what was asked, and ms from the change to what is shown."""
         return self.page.evaluate("() => window.unitcad.timings")
 
-    def close(self) -> None:
+    def close(self):
         """End the visit; nothing was thrown, said, or asked of anybody else."""
         super().close()
         assert self.errors == []

@@ -1,7 +1,5 @@
 """A server that runs as a command, and a client that speaks to it as its page does."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -11,9 +9,6 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 MESSAGE = {"Content-Type": "application/json"}
 
@@ -21,20 +16,20 @@ MESSAGE = {"Content-Type": "application/json"}
 class Server:
     """A running `unitcad serve`: its address, its token, its process."""
 
-    def __init__(self, url: str, process: subprocess.Popen[str]) -> None:
+    def __init__(self, url, process):
         self.url, self.process = url, process
         self.base, _, self.token = url.partition("/?token=")
         self.port = int(self.base.rpartition(":")[2])
 
     def send(
         self,
-        path: str,
-        message: Any = None,
+        path,
+        message=None,
         *,
-        headers: dict[str, str] | None = None,
-        body: bytes | None = None,
-        method: str | None = None,
-    ) -> tuple[int, bytes, dict[str, str]]:
+        headers=None,
+        body=None,
+        method=None,
+    ):
         """Send a message as the page does; `headers` replace the page's, "" leaves one out."""
         if message is not None:
             body = json.dumps(message).encode()
@@ -48,13 +43,13 @@ class Server:
         except urllib.error.HTTPError as error:
             return error.code, error.read(), dict(error.headers)
 
-    def ask(self, text: str, what: str = "unit", edits: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+    def ask(self, text, what="unit", edits=None):
         """Ask about a text; returns the answer."""
         status, content, _ = self.send("/ask", {"text": text, "what": what, "edits": edits or []})
         assert status == 200, content
         return json.loads(content)
 
-    def raw(self, content: bytes, seconds: float = 20.0) -> bytes:
+    def raw(self, content, seconds=20.0):
         """Send bytes over a socket and return what comes back until the server closes or `seconds` have passed."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=seconds) as line:
             line.sendall(content)
@@ -68,7 +63,7 @@ class Server:
 
 
 @contextlib.contextmanager
-def serving(folder: Path, *arguments: str, environment: dict[str, str] | None = None) -> Iterator[Server]:
+def serving(folder, *arguments, environment=None):
     """Run `unitcad serve` in a folder, without a browser unless asked for, with variables added to the environment."""
     command = [sys.executable, "-P", "-m", "unitcad", "serve", "--no-browser", *arguments]
     pipe, given = subprocess.PIPE, {**os.environ, **(environment or {})}

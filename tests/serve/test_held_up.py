@@ -1,7 +1,5 @@
 """Clients and files that would hold up others: downloads that nobody reads, askers that leave, huge files, two jobs."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import signal
@@ -12,18 +10,17 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import pytest
-from running import Server, serving
+from running import serving
 
 pytest.importorskip("uvicorn", reason="the extra serve is not installed")
 import uvicorn
 
 from unitcad.files import TEMPORARY, scratch
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.connections import Connection
-from unitcad.serve.gate import Gate, Limits
-from unitcad.serve.keys import Keys
+from unitcad.serve.request_guard import Limits, RequestGuard
 
 TOKEN = "a-token-of-the-lab"
 HEAD = f"GET / HTTP/1.1\r\nHost: x:1\r\nX-Unitcad-Token: {TOKEN}\r\n\r\n".encode()
@@ -35,12 +32,12 @@ class Quick(Connection):
     write_s = 0.3
 
 
-def behind_a_gate(app: Any, client: Any) -> None:
+def behind_a_guard(app, client):
     """Run a client, given a function that connects it, of an app behind a gate that lets one request in."""
 
-    async def both() -> None:
+    async def both():
         listening = socket.create_server(("127.0.0.1", 0))
-        gate = Gate(app, TOKEN, frozenset({"x:1"}), "cookie", Keys(TOKEN), Limits(requests=1))
+        gate = RequestGuard(app, TOKEN, frozenset({"x:1"}), "cookie", AccessKeys(TOKEN), Limits(requests=1))
         config = uvicorn.Config(
             gate, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_graceful_shutdown=1
         )
@@ -57,7 +54,7 @@ def behind_a_gate(app: Any, client: Any) -> None:
         pool.submit(asyncio.run, both()).result()
 
 
-def answered(connect: Any) -> None:
+def answered(connect):
     """Ask until the only place is free; a test's time limit is 20 s."""
     end = time.monotonic() + 20
     while True:
@@ -69,29 +66,29 @@ def answered(connect: Any) -> None:
         time.sleep(0.05)
 
 
-def test_an_answer_that_nobody_reads_frees_its_place() -> None:
+def test_an_answer_that_nobody_reads_frees_its_place():
     begun = threading.Event()
 
-    async def app(scope: Any, receive: Any, send: Any) -> None:
+    async def app(scope, receive, send):
         await send({"type": "http.response.start", "status": 200, "headers": []})
         for _ in range(1 if begun.is_set() else 500):
             await send({"type": "http.response.body", "body": b"x" * (1 << 20), "more_body": True})
             begun.set()
         await send({"type": "http.response.body", "body": b""})
 
-    def client(connect: Any) -> None:
+    def client(connect):
         with connect() as unread:
             unread.sendall(HEAD)
             assert begun.wait(10)
             answered(connect)
 
-    behind_a_gate(app, client)
+    behind_a_guard(app, client)
 
 
-def test_an_asker_who_leaves_ends_the_work_for_the_answer() -> None:
+def test_an_asker_who_leaves_ends_the_work_for_the_answer():
     begun, ended = threading.Event(), threading.Event()
 
-    async def app(scope: Any, receive: Any, send: Any) -> None:
+    async def app(scope, receive, send):
         if not begun.is_set():
             begun.set()
             try:
@@ -101,24 +98,24 @@ def test_an_asker_who_leaves_ends_the_work_for_the_answer() -> None:
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await send({"type": "http.response.body", "body": b""})
 
-    def client(connect: Any) -> None:
+    def client(connect):
         with connect() as leaving:
             leaving.sendall(HEAD)
             assert begun.wait(10)
         assert ended.wait(10)
         answered(connect)
 
-    behind_a_gate(app, client)
+    behind_a_guard(app, client)
 
 
-def test_an_address_is_bounded_without_a_token(server: Server) -> None:
+def test_an_address_is_bounded_without_a_token(server):
     """A check of the key of each of its folders would take minutes."""
     for path in ("/files/" + "a/" * 5000, "/?" + "&" * 5000):
         head = f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n"
         assert b" 414 " in server.raw(head.encode())
 
 
-def ended(own: Server, state: dict[str, Any]) -> dict[str, Any]:
+def ended(own, state):
     """The state of a job after its end."""
     end = time.monotonic() + 60
     while not state["ended"]:
@@ -128,7 +125,7 @@ def ended(own: Server, state: dict[str, Any]) -> dict[str, Any]:
     return state
 
 
-def test_of_two_jobs_at_once_one_runs_and_a_refused_sweep_leaves_nothing(tmp_path: Path, text: str) -> None:
+def test_of_two_jobs_at_once_one_runs_and_a_refused_sweep_leaves_nothing(tmp_path, text):
     sweep = {"text": text, "key": "no_such_key", "low": 1.0, "high": 2.0, "count": 2}
     with serving(tmp_path, "embedded") as own, ThreadPoolExecutor(4) as apart:
         answers = list(apart.map(lambda _: own.send("/sweep", sweep), range(4)))
@@ -139,35 +136,7 @@ def test_of_two_jobs_at_once_one_runs_and_a_refused_sweep_leaves_nothing(tmp_pat
         assert not (tmp_path / "out").exists()
 
 
-def test_a_job_whose_files_cannot_be_written_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from unitcad.serve.jobs import Jobs, build_folder, sweep_folder
-
-    def full(self: Path, *given: Any, **more: Any) -> int:
-        raise OSError(28, "No space left on device")
-
-    out = tmp_path / "out"
-    jobs = Jobs(out, Keys(TOKEN))
-    monkeypatch.setattr(Path, "write_text", full)
-    for place in (sweep_folder, build_folder):
-        with pytest.raises(OSError, match="No space"):
-            jobs.start("the sweep", [], {"spec.toml": ""}, place(out))
-    assert not out.exists()
-    assert not jobs.known
-
-
-def test_a_file_of_3_gb_in_the_way_of_a_save_is_not_read(tmp_path: Path) -> None:
-    with open(tmp_path / "mine.toml", "wb") as file:
-        file.truncate(3 << 30)
-    with serving(tmp_path, "embedded") as own:
-        status, content, _ = own.send("/save", {"text": "a = 1", "name": "mine.toml"})
-        assert (status, b"is there already" in content) == (422, True)
-        peak = Path(f"/proc/{own.process.pid}/status")
-        if peak.exists():
-            line = next(each for each in peak.read_text().splitlines() if each.startswith("VmHWM"))
-            assert int(line.split()[1]) < 1 << 20  # kB
-
-
-def test_of_saves_at_once_under_a_new_name_one_is_made(tmp_path: Path) -> None:
+def test_of_saves_at_once_under_a_new_name_one_is_made(tmp_path):
     with serving(tmp_path, "embedded") as own, ThreadPoolExecutor(8) as apart:
         saves = [{"text": f"a = {i}", "name": "mine.toml"} for i in range(8)]
         every = [status for status, *_ in apart.map(lambda save: own.send("/save", save), saves)]
@@ -175,7 +144,7 @@ def test_of_saves_at_once_under_a_new_name_one_is_made(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="Windows")
-def test_a_start_removes_the_leftovers_of_a_killed_server_and_none_of_a_live_one(tmp_path: Path, text: str) -> None:
+def test_a_start_removes_the_leftovers_of_a_killed_server_and_none_of_a_live_one(tmp_path, text):
     out = tmp_path / "out"
     out.mkdir()
     with scratch(out) as live:
@@ -190,7 +159,7 @@ def test_a_start_removes_the_leftovers_of_a_killed_server_and_none_of_a_live_one
             assert list(out.glob(f"{TEMPORARY}*")) == [live]
 
 
-def test_the_token_is_of_the_environment_and_not_passed_on(tmp_path: Path, text: str) -> None:
+def test_the_token_is_of_the_environment_and_not_passed_on(tmp_path, text):
     with serving(tmp_path, "embedded", environment={"UNITCAD_TOKEN": TOKEN}) as own:
         assert own.token == TOKEN
         own.ask(text)  # its workers have started

@@ -1,25 +1,19 @@
 """Lines of a job, of any length: they end nothing, and the page keeps their beginning."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.jobs import Jobs, build_folder
-from unitcad.serve.keys import Keys
-from unitcad.serve.messages import JobState
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the command is a script of the shell")
-def test_a_line_of_70_000_characters_ends_neither_its_job_nor_the_next_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_line_of_70_000_characters_ends_neither_its_job_nor_the_next_one(tmp_path, monkeypatch):
     """The command prints long lines on both streams, the last one without an end."""
     script = tmp_path / "command"
     script.write_text(
@@ -28,8 +22,8 @@ def test_a_line_of_70_000_characters_ends_neither_its_job_nor_the_next_one(
     script.chmod(0o755)
     monkeypatch.setattr("unitcad.serve.jobs.sys", SimpleNamespace(executable=str(script)))
 
-    async def run() -> list[JobState]:
-        jobs = Jobs(tmp_path / "out", Keys("token"))
+    async def run():
+        jobs = Jobs(tmp_path / "out", AccessKeys("token"))
         try:
             states = []
             for _ in range(2):

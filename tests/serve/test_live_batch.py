@@ -1,9 +1,6 @@
 """A batch's folder in the live page: its table, and a row that opens live."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Any
 
 import pytest
 from live import WALL, Live
@@ -19,14 +16,15 @@ from unitcad.validation import load
 
 
 @pytest.fixture(scope="module")
-def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def batch(tmp_path_factory):
     out, store = tmp_path_factory.mktemp("batch"), MemoryStore()
     for wall in (1.0, 1.5):
         build(load("encapsulating", [f"layers.0.wall_mm={wall}", "output.formats=[]"]), out, only=["unit"], store=store)
     return out
 
 
-def test_a_row_of_a_batch_opens_live(running: Any, batch: Path) -> None:
+@pytest.mark.smoke
+def test_a_row_of_a_batch_opens_live(running, batch):
     with serving(batch.parent, str(batch)) as own:
         visit = Live(running, own)
         names = visit.page.locator("#variants tbody th a")
@@ -46,19 +44,7 @@ def test_a_row_of_a_batch_opens_live(running: Any, batch: Path) -> None:
         visit.close()
 
 
-def test_a_row_opens_in_another_tab(running: Any, batch: Path) -> None:
-    with serving(batch.parent, str(batch)) as own:
-        visit = Live(running, own)
-        with visit.context.expect_page() as opened:
-            visit.page.locator("#variants tbody th a").last.click(modifiers=["Control"])
-        opened.value.locator("#state", has_text="passed").wait_for()
-        assert own.token not in opened.value.url
-        opened.value.reload()
-        opened.value.locator("#state", has_text="passed").wait_for()
-        visit.close()
-
-
-def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running: Any, tmp_path: Path) -> None:
+def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running, tmp_path):
     base = {"base": "single-embedded", "set": {"output.formats": []}}
     sweep = from_file({**base, "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "walls")
     options = BatchOptions(("unit",), check=False, folders=False)
@@ -77,7 +63,7 @@ def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running: Any
         visit.close()
 
 
-def test_a_refused_row_opens_with_its_values_and_its_refusal(running: Any, tmp_path: Path) -> None:
+def test_a_refused_row_opens_with_its_values_and_its_refusal(running, tmp_path):
     base = {"base": "single-embedded", "set": {"output.formats": []}}
     sweep = from_file({**base, "sweep": {"layers.0.wall_mm": [9.0, 1.0]}}, Path(), "walls")
     run(sweep, tmp_path / "walls", BatchOptions(("unit",), check=False), SerialExecutor(), workers=1)
@@ -97,7 +83,7 @@ def test_a_refused_row_opens_with_its_values_and_its_refusal(running: Any, tmp_p
         visit.close()
 
 
-def test_the_folder_of_a_result_opens_its_spec(batch: Path) -> None:
+def test_the_folder_of_a_result_opens_its_spec(batch):
     folder = sorted(batch.glob("encapsulating-*"))[0]
     with serving(batch.parent, str(folder)) as own:
         _, content, _ = own.send("/")
@@ -106,7 +92,7 @@ def test_the_folder_of_a_result_opens_its_spec(batch: Path) -> None:
 
 
 @pytest.mark.parametrize("folder", ["../secret", "..", "%2e%2e", "nothing"])
-def test_no_folder_but_a_variant_s_is_read(batch: Path, folder: str) -> None:
+def test_no_folder_but_a_variant_s_is_read(batch, folder):
     (batch.parent / "secret").mkdir(exist_ok=True)
     (batch.parent / "secret" / "spec.toml").write_text("name = 'secret'")
     with serving(batch.parent, str(batch)) as own:

@@ -7,7 +7,6 @@ import contextlib
 import os
 import signal
 import time
-from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import msgspec
@@ -15,12 +14,12 @@ import pytest
 
 from unitcad.errors import UnitcadError
 from unitcad.serve import questions
-from unitcad.serve.messages import Ask, Trusted, What
+from unitcad.serve.messages import Ask, Trusted
 from unitcad.serve.questions import Questions, Superseded
 from unitcad.workers import WorkerEnded
 
 
-def answered(message: bytes, trusted: bytes) -> bytes:
+def answered(message, trusted):
     """Answer in a worker as a test says in the question's text: the seconds that it takes, or "die"."""
     ask = msgspec.json.decode(message, type=Ask)
     if ask.text == "die":
@@ -29,10 +28,10 @@ def answered(message: bytes, trusted: bytes) -> bytes:
     return str(os.getpid()).encode()
 
 
-def with_questions(act: Callable[[Questions], Awaitable[None]]) -> None:
+def with_questions(act):
     """Act on questions whose workers have answered one each."""
 
-    async def run() -> None:
+    async def run():
         asked = Questions("0", Trusted())
         try:
             for what in ("unit", "moulds"):
@@ -50,24 +49,24 @@ def with_questions(act: Callable[[Questions], Awaitable[None]]) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _answers(monkeypatch: pytest.MonkeyPatch) -> None:
+def _answers(monkeypatch):
     monkeypatch.syspath_prepend(os.path.dirname(__file__))
     monkeypatch.setattr("unitcad.serve.questions.PRELOAD", ())
     monkeypatch.setattr(Questions, "_parts", lambda self, ask: (f"{__name__}:answered", msgspec.json.encode(ask), b""))
     monkeypatch.setattr(questions, "GRACE_S", 0.5)
 
 
-def last_pid(asked: Questions) -> int:
+def last_pid(asked):
     """The worker that answers next: the one used last."""
     return asked.pool("moulds").submit(os.getpid).result()
 
 
-def asking(asked: Questions, text: str, page: str = "a", what: What = "moulds") -> asyncio.Task[bytes]:
+def asking(asked, text, page="a", what="moulds"):
     return asyncio.create_task(asked.ask(Ask(text=text, what=what, page=page)))
 
 
-def test_an_overtaken_question_is_ended_and_the_newer_one_has_a_warm_worker() -> None:
-    async def act(asked: Questions) -> None:
+def test_an_overtaken_question_is_ended_and_the_newer_one_has_a_warm_worker():
+    async def act(asked):
         first = last_pid(asked)
         older = asking(asked, "60")
         await asyncio.sleep(2.0)
@@ -87,8 +86,8 @@ def test_an_overtaken_question_is_ended_and_the_newer_one_has_a_warm_worker() ->
     with_questions(act)
 
 
-def test_a_burst_of_edits_keeps_the_worker() -> None:
-    async def act(asked: Questions) -> None:
+def test_a_burst_of_edits_keeps_the_worker():
+    async def act(asked):
         first = last_pid(asked)
         every = []
         for _ in range(20):
@@ -102,8 +101,8 @@ def test_a_burst_of_edits_keeps_the_worker() -> None:
     with_questions(act)
 
 
-def test_another_page_s_question_is_not_ended() -> None:
-    async def act(asked: Questions) -> None:
+def test_another_page_s_question_is_not_ended():
+    async def act(asked):
         first = last_pid(asked)
         other = asking(asked, "2", "b")
         await asyncio.sleep(0.1)
@@ -117,8 +116,8 @@ def test_another_page_s_question_is_not_ended() -> None:
     with_questions(act)
 
 
-def test_a_worker_killed_while_idle_is_replaced_unseen() -> None:
-    async def act(asked: Questions) -> None:
+def test_a_worker_killed_while_idle_is_replaced_unseen():
+    async def act(asked):
         pid = last_pid(asked)
         os.kill(pid, signal.SIGKILL)
         assert int(await asking(asked, "0")) != pid
@@ -135,8 +134,8 @@ def test_a_worker_killed_while_idle_is_replaced_unseen() -> None:
     with_questions(act)
 
 
-def test_a_time_limit_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def act(asked: Questions) -> None:
+def test_a_time_limit_is_told_as_one(monkeypatch):
+    async def act(asked):
         monkeypatch.setitem(questions.ANSWER_S, "moulds", 1.0)
         with pytest.raises(WorkerEnded, match="not judged: it took more than 1 s"):
             await asking(asked, "60")
@@ -145,11 +144,11 @@ def test_a_time_limit_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     with_questions(act)
 
 
-def test_no_process_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_process_is_left(monkeypatch):
     """Those under way and the one that is made ready end with the questions."""
     pids: list[int] = []
 
-    async def act(asked: Questions) -> None:
+    async def act(asked):
         asked._text = "30"
         under_way = asking(asked, "60")
         await asyncio.sleep(1.0)

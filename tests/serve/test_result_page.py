@@ -1,21 +1,17 @@
 """A result's page as the live page opens it: its links give its files, and nothing else of the server."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from live import Live
-from running import Server, serving
+from running import serving
 
 DOWNLOADED = ("base.stl", "unit.step")
 SHOWN = {"bench.html": "Mould set", "casting.md": "# ", "spec.toml": "diameter_mm", "estimate.json": "{"}
 
 
 @pytest.fixture(scope="module")
-def built(running: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, Any, str]]:
+def built(running, tmp_path_factory):
     """A server and the page of what was built on it."""
     with serving(tmp_path_factory.mktemp("built")) as own:
         visit = Live(running, own)
@@ -29,7 +25,7 @@ def built(running: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tu
 
 
 @pytest.fixture
-def page(built: tuple[Server, Any, str]) -> Any:
+def page(built):
     """The result's page, as it was opened first."""
     _, page, address = built
     if page.url != address:
@@ -38,7 +34,8 @@ def page(built: tuple[Server, Any, str]) -> Any:
     return page
 
 
-def test_files_are_downloaded_by_a_click(page: Any, tmp_path: Path) -> None:
+@pytest.mark.smoke
+def test_files_are_downloaded_by_a_click(page, tmp_path):
     for name in DOWNLOADED:
         with page.expect_download() as under_way:
             page.locator("#files").get_by_role("link", name=name, exact=True).first.click()
@@ -46,7 +43,7 @@ def test_files_are_downloaded_by_a_click(page: Any, tmp_path: Path) -> None:
         assert (tmp_path / name).stat().st_size > 1000
 
 
-def test_files_are_shown_by_a_click(page: Any) -> None:
+def test_files_are_shown_by_a_click(page):
     back = page.url
     for name, held in SHOWN.items():
         page.get_by_role("link", name=name, exact=True).first.click()
@@ -80,7 +77,7 @@ REACHED = """async ([base, own]) => {
 }"""
 
 
-def test_its_scripts_reach_nothing(built: tuple[Server, Any, str], page: Any) -> None:
+def test_its_scripts_reach_nothing(built, page):
     """The page's own policy is left out, as a hostile page would have none."""
     own = built[0]
     folder = next((Path(f"/proc/{own.process.pid}/cwd").resolve() / "out").glob("encapsulating-*"))

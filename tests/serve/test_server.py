@@ -6,10 +6,9 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 import pytest
-from running import Server, serving
+from running import serving
 
 from unitcad.arrays.array_file import array_templates
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
@@ -18,18 +17,18 @@ from unitcad.validation import custom_templates
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::", "example.com"])
-def test_another_address_needs_a_token(host: str) -> None:
+def test_another_address_needs_a_token(host):
     with pytest.raises(WrongArgument, match="loopback"):
         serve(None, host=host)
 
 
 @pytest.mark.parametrize("token", ["short", "has a space in it now", "é" * 20])
-def test_a_token_can_not_be_guessed(token: str) -> None:
+def test_a_token_can_not_be_guessed(token):
     with pytest.raises(WrongArgument, match="16 printable"):
         serve(None, token=token)
 
 
-def test_a_design_that_is_code_needs_a_word(tmp_path: Path) -> None:
+def test_a_design_that_is_code_needs_a_word(tmp_path):
     with pytest.raises(Refusal, match="--allow-code"):
         serve("custom/dome")
     text = custom_templates()["custom/dome"].read_text("utf-8")
@@ -42,22 +41,22 @@ def test_a_design_that_is_code_needs_a_word(tmp_path: Path) -> None:
         assert own.ask(text, "unit", [{"path": "design", "value": "strap-lugs.py:strap_lugs"}])["faults"]
 
 
-def test_shipped_code_runs_with_a_word_alone(server: Server) -> None:
+def test_shipped_code_runs_with_a_word_alone(server):
     lugs = custom_templates()["custom/strap-lugs"].read_text("utf-8")
     assert server.ask(lugs)["faults"]
 
 
-def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
+def test_a_port_that_is_taken_is_told(tmp_path):
     with serving(tmp_path) as own, pytest.raises(UnitcadError, match=f"127.0.0.1:{own.port}"):
         serve(None, port=own.port)
 
 
-def test_a_spec_that_is_not_there_is_refused() -> None:
+def test_a_spec_that_is_not_there_is_refused():
     with pytest.raises(WrongArgument):
         serve("encapsulatin")
 
 
-def test_the_token_differs_from_start_to_start(tmp_path: Path) -> None:
+def test_the_token_differs_from_start_to_start(tmp_path):
     tokens = set()
     for _ in range(2):
         with serving(tmp_path) as own:
@@ -66,7 +65,7 @@ def test_the_token_differs_from_start_to_start(tmp_path: Path) -> None:
     assert all(len(token) >= 24 for token in tokens)
 
 
-def test_without_the_extra_it_says_how_to_get_it() -> None:
+def test_without_the_extra_it_says_how_to_get_it():
     code = (
         "import sys\n"
         "for name in ('starlette', 'uvicorn', 'tomlkit'): sys.modules[name] = None\n"
@@ -79,7 +78,7 @@ def test_without_the_extra_it_says_how_to_get_it() -> None:
     assert "[serve]" in done.stderr
 
 
-def test_a_question_under_way_does_not_hold_up_the_end(tmp_path: Path) -> None:
+def test_a_question_under_way_does_not_hold_up_the_end(tmp_path):
     """Ctrl-C ends the server quietly: the question, some seconds of work, is answered that the server is ending."""
     text = array_templates()["wrist-band"].read_text("utf-8")
     answers: list[int] = []
@@ -90,20 +89,3 @@ def test_a_question_under_way_does_not_hold_up_the_end(tmp_path: Path) -> None:
         time.sleep(1.0)
     asking.join(20)
     assert answers == [500]
-
-
-def test_a_browser_in_the_foreground_is_answered(tmp_path: Path) -> None:
-    """A browser that $BROWSER names ends, as one in a terminal does, after the page was read."""
-    browser = tmp_path / "browser.py"
-    browser.write_text(
-        f"#!{sys.executable}\nimport pathlib, sys, urllib.request\n"
-        "status = urllib.request.urlopen(sys.argv[1], timeout=60).status\n"
-        f"pathlib.Path({str(tmp_path / 'seen')!r}).write_text(str(status))\n"
-    )
-    browser.chmod(0o755)
-    with serving(tmp_path, "--browser", environment={"BROWSER": str(browser)}):
-        end = time.monotonic() + 60
-        while not (tmp_path / "seen").exists():
-            assert time.monotonic() < end
-            time.sleep(0.05)
-    assert (tmp_path / "seen").read_text() == "200"

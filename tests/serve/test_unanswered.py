@@ -1,24 +1,14 @@
 """What the page shows of a question that has no answer: in time, at all, or none but an overtaken one's."""
 
-from __future__ import annotations
-
 import json
-import os
-import signal
-import time
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
-from typing import Any
 
-import pytest
 from live import WALL, Live
-from running import Server, serving
 
 
-def fulfil(visit: Live, answer: Any) -> None:
+def fulfil(visit, answer):
     """Answer questions in the server's place where `answer`, given one, has something: a status and a message."""
 
-    def handle(route: Any) -> None:
+    def handle(route):
         given = answer(route.request.post_data_json)
         if given == "never":
             return
@@ -30,7 +20,7 @@ def fulfil(visit: Live, answer: Any) -> None:
     visit.page.route("**/ask", handle)
 
 
-def test_a_time_limit_is_not_told_as_a_refusal(running: Any, server: Server) -> None:
+def test_a_time_limit_is_not_told_as_a_refusal(running, server):
     visit, late = Live(running, server), {"moulds": "not judged: it took more than 60 s"}
     late["estimate"] = "not estimated: it took more than 30 s"
     fulfil(
@@ -50,7 +40,7 @@ def test_a_time_limit_is_not_told_as_a_refusal(running: Any, server: Server) -> 
     visit.close()
 
 
-def test_a_fault_of_the_server_leaves_paler_figures_and_a_button(running: Any, server: Server) -> None:
+def test_a_fault_of_the_server_leaves_paler_figures_and_a_button(running, server):
     visit, ended = Live(running, server), [True]
     fault = {"faults": [{"message": "the worker ended: out of memory, or a fault in a kernel"}], "again": True}
     fulfil(visit, lambda ask: ask["what"] == "unit" and ended and (500, fault))
@@ -67,40 +57,3 @@ def test_a_fault_of_the_server_leaves_paler_figures_and_a_button(running: Any, s
     assert visit.page.evaluate(paler, "#figures") == "1"
     visit.console.clear()
     visit.close()
-
-
-def test_the_next_question_does_not_wait_for_one_that_takes_long(running: Any, server: Server) -> None:
-    visit = Live(running, server)
-    fulfil(visit, lambda ask: ask["what"] == "moulds" and "wall_mm = 1.3\n" in ask["text"] and "never")
-    visit.page.fill(WALL, "1.3")
-    visit.until(lambda: visit.state == "judging the moulds")
-    visit.page.fill(WALL, "1.4")
-    visit.until(lambda: "passed" in visit.state)
-    visit.page.unroute("**/ask")
-    visit.close()
-
-
-@pytest.mark.parametrize("count", [1, 3])
-def test_workers_that_are_killed_while_idle_are_not_noticed(running: Any, tmp_path: Path, count: int) -> None:
-    with serving(tmp_path) as own:
-        visit = Live(running, own)
-        children = Path(f"/proc/{own.process.pid}/task/{own.process.pid}/children").read_text().split()
-        for pid in children[:count]:
-            os.kill(int(pid), signal.SIGKILL)
-        visit.choose(WALL, "1.3")
-        assert "passed" in visit.state
-        visit.close()
-
-
-def test_an_overtaken_question_is_no_fault(server: Server, text: str) -> None:
-    """Two of one page at the same time, of which the newer one is put while the older one waits for the first."""
-    with ThreadPoolExecutor(3) as asking:
-        every = []
-        for _ in range(3):
-            every.append(asking.submit(server.send, "/ask", {"text": text, "what": "moulds", "page": "same"}))
-            time.sleep(0.05)
-        answers = [one.result() for one in every]
-    assert [status for status, _, _ in answers] == [200, 200, 200]
-    told = [json.loads(content) for _, content, _ in answers]
-    assert told[1] == {"superseded": True}
-    assert told[2]["checks"]

@@ -1,17 +1,11 @@
 """What the batch tests share: small sweeps, and a design whose function crashes, hangs or fails on request."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
-
-from unitcad.cache import Store
 
 SPEC = """
 name = "ring"
@@ -67,9 +61,7 @@ def slow(spec):
 """
 
 
-def ring_sweep(
-    folder: Path, function: str = "unit", heights: list[float] | None = None, materials: int = 1, more: str = ""
-) -> Path:
+def ring_sweep(folder, function="unit", heights=None, materials=1, more=""):
     """A sweep file over rings of several heights and materials, each height a geometry; none takes the kernel long."""
     silicones = ["ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30"]
     folder.mkdir(parents=True, exist_ok=True)
@@ -84,20 +76,20 @@ def ring_sweep(
     return file
 
 
-def calls(folder: Path) -> list[str]:
+def calls(folder):
     """The heights that the design was drawn for, a line each time."""
     file = folder / "calls"
     return [line.split()[0] for line in file.read_text().splitlines()] if file.exists() else []
 
 
-def unitcad(*words: object, **more: Any) -> subprocess.CompletedProcess[str]:
+def unitcad(*words, **more):
     """Run the command line in a process of its own."""
     return subprocess.run(
         command(*words), capture_output=True, text=True, check=False, timeout=300, **{"env": environment(), **more}
     )
 
 
-def command(*words: object) -> list[str]:
+def command(*words):
     """Return a command line; a batch of rings makes their units alone, which takes the kernel no time."""
     rings = (
         words[0] == "batch"
@@ -107,11 +99,11 @@ def command(*words: object) -> list[str]:
     return [sys.executable, "-m", "unitcad", *map(str, words), *(["--only", "unit"] if rings else [])]
 
 
-def environment() -> dict[str, str]:
+def environment():
     return {**os.environ, "PYTHONUNBUFFERED": "1", "UNITCAD_TRACEBACK": ""}
 
 
-def bytes_of(out: Path) -> dict[str, str]:
+def bytes_of(out):
     """Everything in a batch's folder that is promised to be the same from run to run."""
     apart = ("timings.json", "journal.jsonl", "batch.lock", "store.json")
     return {
@@ -121,18 +113,18 @@ def bytes_of(out: Path) -> dict[str, str]:
     }
 
 
-def rows(out: Path) -> list[dict[str, Any]]:
+def rows(out):
     return json.loads((out / "batch.json").read_text())["variants"]
 
 
-def leftovers(out: Path) -> list[Path]:
+def leftovers(out):
     """Return scratch folders. An empty one does not count: a kill just before its lock or just before its rmdir leaves
     it, and nobody can tell it from one that a living process has just made.
     """
     return [path for path in out.iterdir() if path.name.startswith(".tmp-") and any(path.iterdir())]
 
 
-def data_of(store: Store, key: str, make: Callable[[], Any], intact: Callable[[Any], bool] = lambda data: True) -> Any:
+def data_of(store, key, make, intact=lambda data: True):
     """Return the data under a key, made if the store lacks them."""
     with store.entry(key, intact=intact) as entry:
         if entry.data is None:

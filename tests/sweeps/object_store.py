@@ -1,15 +1,9 @@
 """An S3-compatible server for tests (moto's), in a process of its own, and stores that fail on request."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
-
-from unitcad.cache.objects import Objects
 
 _SERVE = """
 import sys
@@ -23,7 +17,7 @@ BUCKET = "units"
 
 
 @contextmanager
-def s3_server() -> Iterator[dict[str, str]]:
+def s3_server():
     """Run a server with one bucket; yield the environment in which s3fs, boto and their children reach it."""
     child = subprocess.Popen(
         [sys.executable, "-W", "ignore", "-c", _SERVE],
@@ -40,10 +34,10 @@ def s3_server() -> Iterator[dict[str, str]]:
     }
     os.environ.update(environment)
     try:
-        import fsspec
+        import s3fs
 
-        fsspec.get_filesystem_class("s3").clear_instance_cache()  # one may know the address of another server
-        fsspec.filesystem("s3").mkdir(BUCKET)
+        s3fs.S3FileSystem.clear_instance_cache()  # one may know the address of another server
+        s3fs.S3FileSystem().mkdir(BUCKET)
         yield environment
     finally:
         for name in environment:
@@ -60,26 +54,26 @@ class Faulty:
     A write that goes wrong raises OSError, a read is cut in the middle.
     """
 
-    def __init__(self, inner: Objects, fault: Callable[[str, str, int], bool]) -> None:
+    def __init__(self, inner, fault):
         self.inner, self.fault, self.counts = inner, fault, {"put": 0, "get": 0}
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name):
         return getattr(self.inner, name)
 
-    def put(self, name: str, content: bytes) -> None:
+    def put(self, name, content):
         self._count("put", name)
         self.inner.put(name, content)
 
-    def create(self, name: str, content: bytes) -> bool:
+    def create(self, name, content):
         self._count("put", name)
         return self.inner.create(name, content)
 
-    def get(self, name: str, start: int = 0, end: int | None = None) -> bytes:
+    def get(self, name, start=0, end=None):
         content = self.inner.get(name, start, end)
         self.counts["get"] += 1
         return content[: len(content) // 2] if self.fault("get", name, self.counts["get"]) else content
 
-    def _count(self, verb: str, name: str) -> None:
+    def _count(self, verb, name):
         self.counts[verb] += 1
         if self.fault(verb, name, self.counts[verb]):
             raise OSError("503 Slow Down")

@@ -1,20 +1,23 @@
 """Dask: a real scheduler, two workers on loopback, one killed half way; a scheduler that does not answer."""
 
-from __future__ import annotations
-
 import json
+import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from batching import bytes_of, command, environment, ring_sweep, rows, unitcad
+from batching import bytes_of, command, environment, ring_sweep, unitcad
+
+from unitcad.errors import UnitcadError
+from unitcad.sweeps.cluster import Certificates
+from unitcad.sweeps.executors import Workers
 
 pytest.importorskip("distributed")
 
@@ -22,7 +25,7 @@ pytest.importorskip("distributed")
 class Cluster:
     """Processes of the `dask` command; workers keep nothing on this disk but their own scratch folder."""
 
-    def __init__(self, folder: Path, *tls: str, workers: int = 2) -> None:
+    def __init__(self, folder, *tls, workers=2):
         self.folder, self.workers = folder, []
         scheme = "tls" if tls else "tcp"
         here = ("--host", f"{scheme}://127.0.0.1", "--no-dashboard", *tls)
@@ -32,7 +35,7 @@ class Cluster:
             self.workers.append(self._start("worker", self.address, "--no-nanny", "--nthreads", "1", *here))
             self._read(self.workers[-1], r"(Registered to)")
 
-    def _start(self, kind: str, *words: str) -> subprocess.Popen[str]:
+    def _start(self, kind, *words):
         return subprocess.Popen(
             [sys.executable, "-m", "dask", kind, *words],
             stderr=subprocess.PIPE,
@@ -42,28 +45,28 @@ class Cluster:
             env=environment(),
         )
 
-    def _read(self, child: subprocess.Popen[str], pattern: str) -> str:
+    def _read(self, child, pattern):
         assert child.stderr is not None
         for line in child.stderr:
             if match := re.search(pattern, line):
                 return match[1]
         raise AssertionError("dask did not start")
 
-    def close(self) -> None:
+    def close(self):
         for child in (*self.workers, self.scheduler):
             child.kill()
             child.communicate()
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Cluster]:
+def cluster(tmp_path):
     (tmp_path / "cluster").mkdir()
     cluster = Cluster(tmp_path / "cluster")
     yield cluster
     cluster.close()
 
 
-def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(cluster: Cluster, tmp_path: Path) -> None:
+def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(cluster, tmp_path):
     heights = [float(h) for h in range(2, 7)]
     sweep, out = ring_sweep(tmp_path / "s", "slow", heights, materials=5), tmp_path / "out"
     child = subprocess.Popen(
@@ -91,15 +94,8 @@ def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(cluster: Cluster, tm
     assert summary["reused"] == 20
 
 
-def test_a_variant_that_fails_on_a_cluster_is_named(cluster: Cluster, tmp_path: Path) -> None:
-    sweep, out = ring_sweep(tmp_path / "s", "fails"), tmp_path / "out"
-    done = unitcad("batch", sweep, "-o", out, "--scheduler", cluster.address, "--keep-going")
-    assert done.returncode == 1
-    assert [row["status"] for row in rows(out)] == ["ok", "failed", "ok", "ok"]
-    assert rows(out)[1]["reason"] == "design ring.py:fails (line 32): ValueError: never"
-
-
-def test_ctrl_c_takes_the_work_back_and_leaves_the_cluster(cluster: Cluster, tmp_path: Path) -> None:
+@pytest.mark.long
+def test_ctrl_c_takes_the_work_back_and_leaves_the_cluster(cluster, tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", "slow", [float(h) for h in range(2, 9)]), tmp_path / "out"
     words = ("batch", sweep, "-o", out, "--scheduler", cluster.address)
     child = subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, env=environment())
@@ -120,7 +116,7 @@ def test_ctrl_c_takes_the_work_back_and_leaves_the_cluster(cluster: Cluster, tmp
 
 
 @pytest.mark.parametrize("listening", [False, True], ids=["nobody", "somebody-mute"])
-def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening: bool, tmp_path: Path) -> None:
+def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening, tmp_path):
     with socket.socket() as mute:
         mute.bind(("127.0.0.1", 0))
         if listening:
@@ -143,19 +139,10 @@ def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening: 
         assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("address", ["tcp://nowhere.invalid:8786", "nonsense://x", "tcp://127.0.0.1:notaport"])
-def test_an_address_that_is_none(address: str, tmp_path: Path) -> None:
-    done = unitcad("batch", ring_sweep(tmp_path / "s"), "-o", tmp_path / "out", "--scheduler", address)
-    assert done.returncode == 2, done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.stderr.startswith("error: --scheduler")
-    assert "within" not in done.stderr or "nowhere" in address  # only who waited says so
-
-
 @pytest.mark.parametrize(
     "sent", [b"SSH-2.0-OpenSSH_9.6p1\r\n" + b"x" * 40, b"HTTP/1.1 400 Bad Request\r\n\r\n" + b"a" * 99, b"\xff" * 64]
 )
-def test_an_answer_that_is_no_schedulers(sent: bytes) -> None:
+def test_an_answer_that_is_no_schedulers(sent):
     from unitcad.errors import UnitcadError
     from unitcad.sweeps.cluster import dask_executor
 
@@ -164,7 +151,7 @@ def test_an_answer_that_is_no_schedulers(sent: bytes) -> None:
         other.listen()
         kept = []
 
-        def answer() -> None:
+        def answer():
             kept.append(other.accept()[0])
             kept[0].sendall(sent)
 
@@ -174,7 +161,8 @@ def test_an_answer_that_is_no_schedulers(sent: bytes) -> None:
         kept[0].close()
 
 
-def test_a_cluster_is_reached_from_where_an_event_loop_runs(cluster: Cluster) -> None:
+@pytest.mark.long
+def test_a_cluster_is_reached_from_where_an_event_loop_runs(cluster):
     """As in a notebook's cell; in a process of its own, since a client's threads live on."""
     cell = (
         "import asyncio\n"
@@ -186,3 +174,91 @@ def test_a_cluster_is_reached_from_where_an_event_loop_runs(cluster: Cluster) ->
     command = [sys.executable, "-c", cell]
     done = subprocess.run(command, env=environment(), capture_output=True, text=True, check=False, timeout=60)
     assert done.stdout == "2\n", done.stderr
+
+
+pytest.importorskip("distributed")
+CERTIFICATES = Path(__file__).parent / "certificates"
+"""Of two authorities, each with the certificate and key of a member; valid until 2126."""
+
+
+def _authority(name):
+    files = {"--tls-ca-file": "authority.pem", "--tls-cert": "member.pem", "--tls-key": "key.pem"}
+    return tuple(word for option, file in files.items() for word in (option, str(CERTIFICATES / name / file)))
+
+
+@pytest.fixture(scope="module")
+def encrypted(tmp_path_factory):
+    ours = _authority("ours")
+    cluster = Cluster(tmp_path_factory.mktemp("cluster"), *ours, workers=1)
+    yield cluster, ours
+    cluster.close()
+
+
+@pytest.mark.long
+def test_a_cluster_behind_certificates_makes_the_same_bytes(encrypted, tmp_path):
+    cluster, ours = encrypted
+    assert cluster.address.startswith("tls://")
+    sweep, words = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), ("batch", "--json")
+    by_options = unitcad(*words, sweep, "-o", tmp_path / "a", "--scheduler", cluster.address, *ours)
+    assert by_options.returncode == 0, by_options.stderr
+    assert json.loads(by_options.stdout)["ok"] == 4
+    configured = {
+        "DASK_DISTRIBUTED__COMM__TLS__CA_FILE": ours[1],
+        "DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT": ours[3],
+        "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY": ours[5],
+    }
+    by_dask = unitcad(
+        *words, sweep, "-o", tmp_path / "b", "--scheduler", cluster.address, env={**environment(), **configured}
+    )
+    assert by_dask.returncode == 0, by_dask.stderr
+    here = unitcad(*words, sweep, "-o", tmp_path / "here", "-j", 1, "--cache", tmp_path / "other")
+    assert here.returncode == 0, here.stderr
+    assert bytes_of(tmp_path / "a") == bytes_of(tmp_path / "b") == bytes_of(tmp_path / "here")
+
+
+@pytest.mark.long
+def test_who_is_not_of_the_authority_is_not_talked_to(encrypted, tmp_path):
+    cluster, ours = encrypted
+    others, sweep = _authority("others"), ring_sweep(tmp_path / "s", heights=[2.0])
+    for words in (others, (*ours[:2], *others[2:])):
+        done = unitcad("batch", sweep, "-o", tmp_path / "o", "--scheduler", cluster.address, *words)
+        assert done.returncode == 2, done.stderr
+        assert done.stderr.startswith(f"error: --scheduler {cluster.address}: ")
+        assert len(done.stderr.splitlines()) == 1
+        assert not (tmp_path / "o" / "variants.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("address", "files", "message"),
+    [
+        ("tls://127.0.0.1:9", [], "needs --tls-ca-file, --tls-cert and --tls-key"),
+        ("tls://127.0.0.1:9", ["none.pem"], "--tls-ca-file = '{}/none.pem': there is no such file"),
+        ("tls://127.0.0.1:9", ["text", "text", "text"], "the certificates can't be used: "),
+        ("tcp://127.0.0.1:9", ["text"], "--tls-ca-file = '{}/text': needs a --scheduler at tls://"),
+        (None, ["text"], "--tls-ca-file = '{}/text': needs a --scheduler at tls://"),
+    ],
+)
+def test_certificates_that_can_not_be_used(address, files, message, tmp_path):
+    (tmp_path / "text").write_text("no certificate\n")
+    opened = Workers(None, address, Certificates(*(tmp_path / file for file in files))).executor()
+    with pytest.raises(UnitcadError) as error, opened:
+        pass
+    assert message.format(tmp_path) in str(error.value)
+
+
+BENCH = Path(__file__).parents[2] / "benchmarks" / "bench_nodes.py"
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0 or not shutil.which("ip"), reason="needs namespaces")
+def test_a_batch_on_four_nodes_outlives_worker_scheduler_and_parent(tmp_path):
+    for library in ("distributed", "s3fs", "moto"):
+        pytest.importorskip(library)
+    words = [sys.executable, str(BENCH), "--variants", "400", "--geometries", "4", "--only", "unit", "--no-check"]
+    done = subprocess.run(
+        [*words, "--json", str(tmp_path / "figures.json")], capture_output=True, text=True, check=False, timeout=1800
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert [killed["what"] for killed in figures["killed"]] == ["worker", "scheduler", "parent"]
+    assert figures["variants"] == 400

@@ -1,69 +1,54 @@
 """Nothing lost: each of these really kills, crashes, hangs, interrupts or fills."""
 
-from __future__ import annotations
-
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import psutil
 import pytest
 from batching import bytes_of, calls, command, environment, leftovers, ring_sweep, rows, unitcad
 
+from unitcad.cache import DiskStore, MemoryStore, MissingContent, disk
+from unitcad.errors import Unfinished, UnitcadError
+from unitcad.meshcheck import Limits, Options
+from unitcad.pipeline import make
+from unitcad.pipeline.write import build
+from unitcad.validation import load
+
 HEIGHTS = [float(h) for h in range(2, 9)]
 
 
-def _start(*words: object, **more) -> subprocess.Popen[str]:
+def _start(*words, **more):
     return subprocess.Popen(
         command(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(), **more
     )
 
 
-def _wait_for(what, seconds: float = 240.0) -> None:
+def _wait_for(what, seconds=240.0):
     end = time.monotonic() + seconds
     while not what():
         assert time.monotonic() < end, "waited in vain"
         time.sleep(0.02)
 
 
-def _whole(folder: Path) -> bool:
+def _whole(folder):
     manifest = json.loads((folder / "manifest.json").read_text())
     return all((folder / f["path"]).is_file() for part in manifest["parts"] for f in part["files"].values())
 
 
-def _results(out: Path) -> list[Path]:
+def _results(out):
     if not out.exists():
         return []
     return [path for path in out.iterdir() if path.is_dir() and not path.name.startswith(".tmp-")]
 
 
-def test_a_killed_parent_loses_nothing(tmp_path: Path) -> None:
-    sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
-    child = _start("batch", sweep, "-o", out, "-j", 2)
-    _wait_for(lambda: len(_results(out)) >= 3)
-    workers = psutil.Process(child.pid).children(recursive=True)
-    child.kill()
-    child.communicate()
-    psutil.wait_procs(workers, timeout=60)
-    assert not any(worker.is_running() and worker.status() != psutil.STATUS_ZOMBIE for worker in workers)
-    before = {folder.name: folder.stat().st_ino for folder in _results(out)}
-    assert all(map(_whole, _results(out)))
-    again = unitcad("batch", sweep, "-o", out, "-j", 2, "--json")
-    assert again.returncode == 0, again.stderr
-    summary = json.loads(again.stdout)
-    assert summary["ok"] == 7
-    # Whatever the first run finished is the same folder still, noted in the journal or not.
-    assert {folder.name: folder.stat().st_ino for folder in _results(out)}.items() >= before.items()
-    assert not leftovers(out)
-    whole = unitcad("batch", sweep, "-o", tmp_path / "whole", "-j", 0)
-    assert whole.returncode == 0
-    assert bytes_of(out) == bytes_of(tmp_path / "whole")
-
-
-def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path: Path) -> None:
+def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
     child = _start("batch", sweep, "-o", out, "-j", 2, "--json")
     _wait_for(lambda: len(_results(out)) >= 2)
@@ -85,7 +70,7 @@ def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path: Path) -> None:
         ("fails", [], "design ring.py:fails (line 32): ValueError: never"),
     ],
 )
-def test_a_variant_that_can_not_be_made_is_named(function: str, more: list[str], reason: str, tmp_path: Path) -> None:
+def test_a_variant_that_can_not_be_made_is_named(function, more, reason, tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", function), tmp_path / "out"
     done = unitcad("batch", sweep, "-o", out, "-j", 2, "--keep-going", "--json", *more)
     assert done.returncode == 1, done.stderr
@@ -99,14 +84,7 @@ def test_a_variant_that_can_not_be_made_is_named(function: str, more: list[str],
     assert "Traceback" not in done.stderr
 
 
-def test_variants_of_one_crashing_geometry_are_named_each(tmp_path: Path) -> None:
-    sweep, out = ring_sweep(tmp_path / "s", "crashes", [3.0, 4.0], materials=2), tmp_path / "out"
-    done = unitcad("batch", sweep, "-o", out, "-j", 1, "--keep-going")
-    assert done.returncode == 1
-    assert [row["status"] for row in rows(out)] == ["failed", "failed", "ok", "ok"]
-
-
-def test_without_keep_going_the_first_failure_stops_it(tmp_path: Path) -> None:
+def test_without_keep_going_the_first_failure_stops_it(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", "fails", [3.0, *HEIGHTS[3:]]), tmp_path / "out"
     done = unitcad("batch", sweep, "-o", out, "-j", 1)
     assert done.returncode == 1
@@ -115,25 +93,14 @@ def test_without_keep_going_the_first_failure_stops_it(tmp_path: Path) -> None:
     assert rows(out)[0]["status"] == "failed"
 
 
-def test_what_failed_once_is_tried_again(tmp_path: Path) -> None:
+def test_what_failed_once_is_tried_again(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", "fails_once"), tmp_path / "out"
     done = unitcad("batch", sweep, "-o", out, "-j", 1, "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["retried"] == 1
 
 
-def test_a_failed_variant_is_made_by_the_next_run(tmp_path: Path) -> None:
-    sweep, out = ring_sweep(tmp_path / "s", "fails_once"), tmp_path / "out"
-    (tmp_path / "s" / "failed").touch()
-    first = unitcad("batch", sweep, "-o", out, "--limit", 2)
-    assert first.returncode == 0, first.stderr
-    drawn = len(calls(tmp_path / "s"))
-    second = unitcad("batch", sweep, "-o", out, "--json")
-    assert json.loads(second.stdout)["taken_up"] == 2
-    assert len(calls(tmp_path / "s")) == drawn + 2
-
-
-def test_ctrl_c_stops_at_once_and_keeps_what_is_done(tmp_path: Path) -> None:
+def test_ctrl_c_stops_at_once_and_keeps_what_is_done(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
     child = _start("batch", sweep, "-o", out, "-j", 2, start_new_session=True)
     _wait_for(lambda: len(_results(out)) >= 2)
@@ -152,7 +119,7 @@ def test_ctrl_c_stops_at_once_and_keeps_what_is_done(tmp_path: Path) -> None:
     assert not leftovers(out)
 
 
-def test_two_batches_in_one_folder(tmp_path: Path) -> None:
+def test_two_batches_in_one_folder(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
     first = _start("batch", sweep, "-o", out, "-j", 2)
     _wait_for(lambda: (out / "journal.jsonl").exists())
@@ -164,7 +131,7 @@ def test_two_batches_in_one_folder(tmp_path: Path) -> None:
     assert [row["status"] for row in rows(out)] == ["ok"] * 7
 
 
-def test_no_space_left_stops_it_and_keeps_what_is_done(tmp_path: Path) -> None:
+def test_no_space_left_stops_it_and_keeps_what_is_done(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", "unit", HEIGHTS), tmp_path / "out"
     full = _run_with_full_disk(sweep, out, tmp_path)
     assert full.returncode == 1, full.stderr
@@ -179,7 +146,7 @@ def test_no_space_left_stops_it_and_keeps_what_is_done(tmp_path: Path) -> None:
     assert not leftovers(out)
 
 
-def _run_with_full_disk(sweep: Path, out: Path, tmp_path: Path) -> subprocess.CompletedProcess[str]:
+def _run_with_full_disk(sweep, out, tmp_path):
     """A run whose workers find the disk full from the fourth manifest on: by /dev/full."""
     site = tmp_path / "site"
     site.mkdir()
@@ -201,7 +168,7 @@ def _run_with_full_disk(sweep: Path, out: Path, tmp_path: Path) -> subprocess.Co
     )
 
 
-def test_a_refused_variant_stops_nothing(tmp_path: Path) -> None:
+def test_a_refused_variant_stops_nothing(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "out"
     sweep.write_text(
         'base = "./ring.toml"\nname = "rings"\n[sweep]\nmode = "zip"\n'
@@ -227,3 +194,103 @@ def test_what_failed_before_is_tried_again_last(tmp_path: Path) -> None:
     assert again.returncode == 1
     assert "stopped: variant 0:" in again.stderr
     assert [row["status"] for row in rows(out)] == ["failed", *["ok"] * 5]
+
+
+def test_a_cache_that_is_deleted_again_and_again_stops_no_batch(tmp_path: Path) -> None:
+    sweep, cache = ring_sweep(tmp_path / "s", "slow", HEIGHTS[:4]), tmp_path / "cache"
+    outs = [tmp_path / name for name in ("a", "b")]
+    running = [_start("batch", sweep, "-o", out, "-j", 2, "--cache", cache) for out in outs]
+    while any(child.poll() is None for child in running):
+        shutil.rmtree(cache, ignore_errors=True)
+        time.sleep(0.05)
+    for child in running:
+        _, told = child.communicate()
+        assert child.returncode == 0, told
+    assert bytes_of(outs[0]) == bytes_of(outs[1])
+    assert len(_results(outs[0])) == 4
+
+
+def test_a_half_deleted_cache_is_waited_for_and_another_folder_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(disk, "_CLAIM_S", 0.01)
+    half = tmp_path / "half"
+    (half / "content" / "ab").mkdir(parents=True)
+    with ThreadPoolExecutor(1) as others:
+        others.submit(lambda: (time.sleep(0.1), shutil.rmtree(half)))
+        DiskStore(half).close()
+    assert (half / disk.MARK).is_file()
+    (tmp_path / "theirs" / "content").mkdir(parents=True)
+    with pytest.raises(UnitcadError, match="is not a cache of unitcad, and not empty"):
+        DiskStore(tmp_path / "theirs")
+
+
+class Forgetful(MemoryStore):
+    """A store of which others delete each content before it is placed."""
+
+    def place(self, sha256: str, target: object) -> None:
+        raise MissingContent(sha256)
+
+
+def test_a_build_does_without_a_cache_that_keeps_nothing(tmp_path: Path) -> None:
+    built = build(load("single-embedded", ["output.formats=['stl']"]), tmp_path, only=["unit"], store=Forgetful())
+    assert _whole(built.folder)
+
+
+SPEC = ("single-embedded", ["output.formats=['stl']"])
+
+
+def test_an_unfinished_check_is_not_stored_and_the_next_build_is_right(monkeypatch, tmp_path):
+    store, out = DiskStore(tmp_path / "cache"), tmp_path / "out"
+    monkeypatch.setattr(make, "Options", partial(Options, limits=Limits(seconds=1e-9)))
+    for _ in range(2):
+        with pytest.raises(Unfinished, match=r"layer1\.stl: its check was not finished"):
+            build(load(*SPEC), out, only=("unit",), store=store)
+        assert not list(out.glob("[!.]*"))
+    monkeypatch.undo()
+    assert build(load(*SPEC), out, only=("unit",), store=store).ok
+
+
+def test_a_variant_whose_check_is_unfinished_fails_and_is_made_by_the_next_run(tmp_path):
+    """The first run's workers have no time for a check; each variant is tried twice, as after every failure."""
+    sweep, out = tmp_path / "sweep.toml", tmp_path / "out"
+    sweep.write_text('base = "single-embedded"\nname = "walls"\n[sweep]\n"layers.0.wall_mm" = [1.5, 2.0]\n')
+    hurry = tmp_path / "hurry"
+    hurry.mkdir()
+    tries = tmp_path / "tries"
+    (hurry / "sitecustomize.py").write_text(
+        "import unitcad.meshcheck as check\n"
+        "from dataclasses import replace\n"
+        "whole = check.check_bytes\n"
+        "def hurried(data, name, options):\n"
+        f"    open({str(tries)!r}, 'a').write('x')\n"
+        "    return whole(data, name, replace(options, limits=check.Limits(seconds=1e-9)))\n"
+        "check.check_bytes = hurried\n"
+    )
+    words = (
+        "batch",
+        sweep,
+        "-o",
+        out,
+        "-j",
+        1,
+        "--cache",
+        tmp_path / "cache",
+        "--formats",
+        "stl",
+        "--only",
+        "unit",
+        "--keep-going",
+    )
+    paths = os.pathsep.join([str(hurry), str(Path(__file__).parents[2])])
+    first = subprocess.run(
+        command(*words), capture_output=True, text=True, check=False, timeout=120,
+        env={**environment(), "PYTHONPATH": paths},
+    )  # fmt: skip
+    assert first.returncode == 1, first.stderr
+    assert [row["status"] for row in rows(out)] == ["failed", "failed"]
+    assert all("its check was not finished" in row["reason"] for row in rows(out))
+    assert len(tries.read_text()) == 4  # a variant that fails is tried once more
+    again = unitcad(*words, "--json")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["ok"] == 2

@@ -1,7 +1,5 @@
 """Estimate-only sweeps: the arrays give what a plain loop over single estimates gives, variant by variant."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -13,7 +11,7 @@ from unitcad.attenuation.edge.estimate_summary import summary
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_spec
 from unitcad.sweeps import BatchOptions, estimate_table
-from unitcad.sweeps.sweep import Sweep, from_file
+from unitcad.sweeps.sweep import from_file
 
 SILICONES = ["ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30"]
 BOTH = ["encapsulating", "single-embedded"]
@@ -57,18 +55,18 @@ SWEEPS = {
 }
 
 
-def _sweep(name: str) -> Sweep:
+def _sweep(name):
     base, axes = SWEEPS[name]
     return from_file({"base": base, "sweep": axes}, Path(), "test")
 
 
-def _rows(sweep: Sweep, out: Path) -> list[dict]:
+def _rows(sweep, out):
     estimate_table.write_estimates(sweep, out, BatchOptions(("estimate",)))
     return json.loads((out / "batch.json").read_text())["variants"]
 
 
 @pytest.mark.parametrize("name", SWEEPS)
-def test_the_table_is_what_single_estimates_give(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_table_is_what_single_estimates_give(name, tmp_path, monkeypatch):
     monkeypatch.setattr(estimate_table, "BLOCK", 7)  # so that blocks end in the middle of an axis
     sweep = _sweep(name)
     rows = _rows(sweep, tmp_path / "o")
@@ -90,7 +88,7 @@ def test_the_table_is_what_single_estimates_give(name: str, tmp_path: Path, monk
         assert estimate_table._free_axes(sweep) == [1, 2]
 
 
-def test_what_validation_refuses_is_refused_here(tmp_path: Path) -> None:
+def test_what_validation_refuses_is_refused_here(tmp_path):
     axes = {"layers.0.wall_mm": [1.0, 2.0, 3.0], "layers.0.material": ["ecoflex-00-10", "nonsense", "dragon-skin-30"]}
     sweep = from_file({"base": "embedded", "sweep": axes}, Path(), "test")
     rows = _rows(sweep, tmp_path / "o")
@@ -105,7 +103,7 @@ def test_what_validation_refuses_is_refused_here(tmp_path: Path) -> None:
     assert [row["status"] for row in rows] == ["ok", "refused", "ok"] * 2 + ["refused"] * 3
 
 
-def test_the_command_writes_the_same_table_each_time_and_no_folders(tmp_path: Path) -> None:
+def test_the_command_writes_the_same_table_each_time_and_no_folders(tmp_path):
     done = unitcad("batch", "all-materials", "--only", "estimate", "-o", tmp_path / "a", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["ok"] == 50
@@ -119,7 +117,7 @@ def test_the_command_writes_the_same_table_each_time_and_no_folders(tmp_path: Pa
     assert unitcad("batch", "thickness", "--only", "estimate", "-o", tmp_path / "a").returncode == 2
 
 
-def test_a_hundred_thousand_variants_are_validated_a_handful_of_times() -> None:
+def test_a_hundred_thousand_variants_are_validated_a_handful_of_times():
     axes = {"layers.0.material": SILICONES, "estimate.frequency_hz": {"start": 50.0, "stop": 250.0, "num": 20_000}}
     sweep = from_file({"base": "encapsulating", "sweep": axes}, Path(), "test")
     blocks = list(estimate_table.evaluate(sweep, sweep.count))

@@ -10,17 +10,16 @@ import typer
 from rich.table import Table
 
 from unitcad.accuracy.amplification import amplifications, extremes
-from unitcad.accuracy.left_out import left_out_rows
 from unitcad.accuracy.meshes import mesh_rows
 from unitcad.accuracy.responses import response_rows
+from unitcad.accuracy.skipped import skipped_rows
 from unitcad.accuracy.survey import survey_media, survey_specs
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson, Sets
 from unitcad.designs import design_of
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
-from unitcad.moulds.mould_set import MouldSet
-from unitcad.validation import load
+from unitcad.pipeline.subjects import load_subject
 
 _MEDIA, _SPECS = 20, 20
 _INPUTS = 8
@@ -37,7 +36,7 @@ _MESHES = {
 }
 _RESPONSE = {"rtol": "rtol", "error": "error", "bound": "bound", "over_bound": "of bound", "wavenumbers": "k", "s": "s"}
 _EXTREMES = {"what": "", "value": "value", "at": "at", "limit": "limit", "extreme": ""}
-_REQUESTS = {"request": "request", "s": "s", "saved_s": "saved", "left_out": "left out"}
+_REQUESTS = {"request": "request", "s": "s", "saved_s": "saved", "skipped": "skipped"}
 _MEDIA_HEADS = {
     "responses": "responses",
     "within_rtol": "within rtol",
@@ -50,7 +49,8 @@ _RANGES = ("ranges", "specs", "built", "refused", "faults", "longest_s")
 
 def accuracy(
     spec: Annotated[
-        str | None, typer.Argument(metavar="SPEC", help="Template or TOML file of a unit; default: the survey.")
+        str | None,
+        typer.Argument(metavar="SPEC", help="A unit or an array: template or TOML file; default: the survey."),
     ] = None,
     sets: Sets = None,
     media: Annotated[
@@ -65,7 +65,8 @@ def accuracy(
     """Measure the errors of meshes and response, their bounds and what they cost. Exit 1 if an error exceeds its bound.
 
     With SPEC: error against time at five tolerances, the inputs that move the results most, and the parts that a build
-    leaves out. Without SPEC: the bounds of random media, and builds of random specs.
+    leaves out. An array's response and inputs are those of its unit. Without SPEC: the bounds of random media, and
+    builds of random specs.
     """
     if spec is None:
         if sets:
@@ -80,9 +81,10 @@ def accuracy(
 
 def _one_spec(name: str, sets: Sequence[str] | None, as_json: bool) -> None:
 
-    spec = load(name, sets or ())
+    subject = load_subject(name, sets or ())
+    spec = subject.unit
     with progress("accuracy") as say:
-        data: dict[str, Any] = {"spec": spec.name, "meshes": mesh_rows(MouldSet(spec), say)}
+        data: dict[str, Any] = {"spec": subject.name, "meshes": mesh_rows(subject.moulds, say)}
         if design_of(spec).passes is not None:
             say("response")
             variant = estimate_input(spec)
@@ -90,14 +92,14 @@ def _one_spec(name: str, sets: Sequence[str] | None, as_json: bool) -> None:
             say("inputs")
             data["amplification"] = amplifications(spec, variant)
         say("requests")
-        data["left_out"] = left_out_rows(spec)
+        data["skipped"] = skipped_rows(subject)
     if as_json:
         print_json(_finite(data))
     else:
         _print_spec(data)
     broken = not all(row.get("within_bounds", True) for row in data["meshes"])
     if broken or any(not row["over_bound"] <= 1 for row in data.get("response", ())):
-        typer.echo(f"{spec.name}: an error exceeds its bound", err=True)
+        typer.echo(f"{subject.name}: an error exceeds its bound", err=True)
         sys.exit(1)
 
 
@@ -131,8 +133,8 @@ def _print_spec(data: dict[str, Any]) -> None:
         rows = [{**row, "extreme": "extreme" if row["extreme"] else ""} for row in data["extremes"]]
         _table("Stiff or extreme", _EXTREMES, rows)
         _print_amplification(data["amplification"]["results"])
-    rows = [{**row, "left_out": ", ".join(one["what"] for one in row["left_out"])} for row in data["left_out"]]
-    _table("Left out by a request, and what that saves", _REQUESTS, rows)
+    rows = [{**row, "skipped": ", ".join(one["output"] for one in row["skipped"])} for row in data["skipped"]]
+    _table("Time saved by requests for fewer outputs", _REQUESTS, rows)
 
 
 def _print_amplification(results: Sequence[dict[str, Any]]) -> None:

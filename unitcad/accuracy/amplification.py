@@ -1,4 +1,4 @@
-"""What makes a spec's body and unit stiff or extreme, and how far a change of 1e-6 in an input moves the results."""
+"""Properties that make a spec stiff or extreme, and the amplification of a change of 1e-6 in an input."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _motions(variants: Sequence[EstimateInput]) -> np.ndarray:
 
 
 def extremes(spec: Spec, variant: EstimateInput) -> list[dict[str, Any]]:
-    """Return what may make the design stiff or extreme: a number, where it is, and from which value on it is one."""
+    """Return the properties that may make the design stiff or extreme: a number, its place, and its threshold."""
     medium = body(variant.tissue)
     omega = 2.0 * math.pi * variant.frequency.middle
     bodies = list(zip((*medium.layers, medium.half_space), variant.tissue, medium.materials(omega), strict=True))

@@ -1,4 +1,4 @@
-"""What becomes of a spec: a build that passes every check, a refusal with a field, or a fault of this program."""
+"""The outcome of a spec: a build that passes every check, a refusal with a field, or a fault of this program."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ def build_outcome(data: dict[str, Any]) -> Outcome:
         return Outcome(CRASH, f"{type(error).__name__}: {error}", seconds=time.perf_counter() - start)
     seconds = time.perf_counter() - start
     worst: dict[str, float] = {}
-    for finding in manifest["laws"]:
+    for finding in manifest["mould_checks"]:
         worst[finding["code"]] = max(worst.get(finding["code"], 0.0), abs(finding["value"]))
-    if broken := [f"{f['code']} {f['where']} = {f['value']:g}" for f in manifest["laws"] if not f["ok"]]:
+    if broken := [f"{f['code']} {f['where']} = {f['value']:g}" for f in manifest["mould_checks"] if not f["ok"]]:
         return Outcome(MOULD_CHECK, "; ".join(broken), worst=worst, seconds=seconds)
     if manifest["check"]["errors"]:
         errors = [f"{f['code']} {f['message']}" for f in manifest["check"]["findings"] if f["severity"] == "error"]

@@ -1,6 +1,6 @@
 """Random specs from documented ranges: one drawing routine; hypothesis chooses in the tests, a seed in the long study.
 
-Each field is drawn by itself, so that nothing but the ranges decides what fits: a spec inside them may well be refused.
+Each field is drawn independently, so only the ranges decide: a spec inside them may well be refused.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ class Choose(Protocol):
 
 @dataclass(frozen=True)
 class Ranges:
-    """The range of each field: (least, largest), mm where a length.
+    """The range of each field: (smallest, largest), lengths in mm.
 
-    `tail_share` is half the tail's width over the core's radius, drawn instead of the width where it is given. `edges`
-    is the share of lengths that lie on an end of their range, `singles` that of specs with one cavity.
+    `tail_share` is half the tail's width over the core's radius, drawn in place of the width if given. `edges`
+    is the share of lengths at an end of their range, `singles` that of specs with one cavity.
     """
 
     diameter_mm: tuple[float, float]

@@ -24,7 +24,7 @@ _DISTANCES = np.arange(31) * 1e-3
 
 @dataclass(frozen=True)
 class Comparison:
-    """A response beside its reference: the largest error and its bound, both over the largest |u|.
+    """A response compared with its reference: the largest error and its bound, both over the largest |u|.
 
     over_bound: largest error over its own bound, of one component at one radius. An error is counted only by as much as
     it exceeds the reference's own bound.
@@ -36,7 +36,7 @@ class Comparison:
 
 
 def compare(response: Response, reference: Response) -> Comparison:
-    """Compare a response with its reference; what is no number is infinitely far from it."""
+    """Compare a response with its reference; NaN has an infinite error."""
     u, exact, bound, doubt = (
         np.array([getattr(one, f"{kind}_{name}") for name in COMPONENTS])
         for one, kind in ((response, "u"), (reference, "u"), (response, "error"), (reference, "error"))

@@ -111,7 +111,7 @@ def survey_specs(count: int, seed: int, say: Say) -> dict[str, Any]:
 
 
 def _spec(job: Job) -> Outcome:
-    """Return what becomes of a spec. Runs in a worker process."""
+    """Return the outcome of a spec. Runs in a worker process."""
     return outcome(seeded_spec(job[1], job[0]))
 
 

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 K = TypeVar("K")
 PROCESSOR = time.process_time
-"""A clock that counts this process's processor seconds alone."""
+"""A clock that counts only this process's processor seconds."""
 PROCESSOR_NOTE = (
     "Times are processor seconds of all threads: waiting on a busy machine is not in them, a cache that is shared with "
     "other programs is."
@@ -20,7 +20,7 @@ PROCESSOR_NOTE = (
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds: median, lower and upper quartile (all one number for a single run); `value`: what the last run gave."""
+    """Seconds: median, lower and upper quartile, all equal for a single run; `value`: the last run's result."""
 
     median: float
     low: float
@@ -40,7 +40,7 @@ def interleaved(
 ) -> dict[K, Timing]:
     """Time every call `repeats` times, in turn; a first round warms up and does not count.
 
-    clock: seconds; `PROCESSOR` for work in one thread, where waiting on a busy machine must not count.
+    clock: seconds; `PROCESSOR` for work in one thread, for which waiting on a busy machine must not count.
     """
     seconds: dict[K, list[float]] = {name: [] for name in calls}
     values: dict[K, Any] = {}

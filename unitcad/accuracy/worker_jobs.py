@@ -45,7 +45,7 @@ def in_order(
 def _within(patience: float, call: Callable[[J], T], job: J) -> T:
     """Return call(job), in a worker; the system ends this process after `patience` seconds of its processor time.
 
-    A loaded machine changes nothing of that. What waits, and takes no processor time, ends by the clock, later.
+    A loaded machine changes nothing of that. A call that waits, without processor time, ends later by the clock.
     """
     counted = hasattr(signal, "setitimer")  # not on Windows: there the clock has to do
     faulthandler.dump_traceback_later(patience * (_WAITING if counted else 1), exit=True)

@@ -1,1 +1,1 @@
-"""What `import unitcad` offers beside the rooms' own classes: a function a command, for Python and notebooks."""
+"""The functions of `import unitcad`, one for each command, for Python and notebooks."""

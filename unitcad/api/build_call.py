@@ -1,4 +1,4 @@
-"""`unitcad.build` and what it returns."""
+"""`unitcad.build` and its result."""
 
 # pyright: strict
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Buildable(Protocol):
 class BuildResult(Built):
     """A built variant, or several units together: its folder, its manifest and the unit's spec.
 
-    `manifest` is manifest.json as data: parts, mould checks, mesh checks, what was left out; mm, mm2 and mm3.
+    `manifest` is manifest.json as data: parts, mould checks, mesh checks, skipped outputs; mm, mm2 and mm3.
     """
 
     spec: Spec
@@ -46,14 +46,14 @@ class BuildResult(Built):
 
     def __repr__(self) -> str:
         folder = notebook.shortened(self.folder.name, 80)
-        return f"BuildResult({folder}: {', '.join(f'{count} {what}' for what, count in self._counts)})"
+        return f"BuildResult({folder}: {', '.join(f'{count} {noun}' for noun, count in self._counts)})"
 
     def _repr_html_(self) -> str:
         rows = [(part["name"], part["made"], part["material"], part["volume_mm3"]) for part in self.manifest["parts"]]
         bodies = notebook.table(("body", "made", "material", "volume, mm³"), rows, str(self.folder))
         broken = [
             (finding["code"], finding["where"], finding["value"], finding["limit"])
-            for finding in self.manifest["laws"]
+            for finding in self.manifest["mould_checks"]
             if not finding["ok"]
         ]
         checks = notebook.table(("mould check", "place", "value", "limit"), broken, "broken") if broken else ""
@@ -63,7 +63,7 @@ class BuildResult(Built):
     @property
     def _counts(self) -> list[tuple[str, int]]:
         """The numbers of bodies, files, broken mould checks and errors in meshes."""
-        broken = sum(not finding["ok"] for finding in self.manifest["laws"])
+        broken = sum(not finding["ok"] for finding in self.manifest["mould_checks"])
         return [
             ("bodies", len(self.manifest["parts"])),
             ("files", len(self.manifest["files"])),
@@ -83,12 +83,12 @@ def build(
     report: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> BuildResult:
-    """Build a unit and its moulds, or an array of units, into a folder below `out`, and return what was built.
+    """Build a unit and its moulds, or an array of units, into a folder below `out`, and return the result.
 
     `source` and `set` are as for `unitcad.load`; `source` may also be the name, file or data of an array, or an array
     that `unitcad.arrays.load_array` returned. `formats` ("stl", "3mf", "step", "svg", "png",
-    "glb") and `only` ("unit", "moulds", "estimate", "casting") choose what is made. Without `check` mould checks and
-    mesh checks are left out. `report` writes report.html, one offline page. `progress` is called with the name of each
+    "glb") and `only` ("unit", "moulds", "estimate", "casting") choose the outputs. Without `check` mould checks and
+    mesh checks are skipped. `report` writes report.html, one offline page. `progress` is called with the name of each
     step.
     `BuildResult.ok` tells whether every check passed; volumes and sizes of the result are in mm3 and mm.
     Raises Refusal or UnitcadError before anything is written.

@@ -1,4 +1,4 @@
-"""`unitcad.check` as a function, and what it returns."""
+"""`unitcad.check` as a function, and its result."""
 
 # pyright: strict
 from __future__ import annotations
@@ -22,7 +22,7 @@ from unitcad.meshcheck.rules.s_scale import unit_named
 StrPath = str | os.PathLike[str]
 
 _MOST = 1e9
-"""What a limit is below: faces, seconds, processes."""
+"""Upper bounds of the limits: faces, seconds, processes."""
 _MOST_CODES = 5
 """Codes that a result's repr lists."""
 
@@ -83,8 +83,8 @@ def check(
     `files` are files, folders or globs. `printer`, a name of the catalogue or an entry, asks for the rules of fit and
     printability. `unit` ("mm", "in" and so on) is that of formats that have none. `select` and `ignore` are prefixes
     of codes; `shells` is the number expected; with `strict`, crossings too shallow for any printer are errors.
-    `timeout` is in seconds a file. With `jobs` above 1 worker processes check the files. What is wrong with a file, or
-    that it is missing, is in the result; lengths in mm. Raises Refusal or UnitcadError for an invalid argument.
+    `timeout` is in seconds a file. With `jobs` above 1 worker processes check the files. Faults of a file, and missing
+    files, are findings in the result; lengths in mm. Raises Refusal or UnitcadError for an invalid argument.
     """
     if printer is not None:
         if isinstance(printer, str):

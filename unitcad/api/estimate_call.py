@@ -1,4 +1,4 @@
-"""`unitcad.estimate` and what it returns."""
+"""`unitcad.estimate` and its result."""
 
 # pyright: strict
 from __future__ import annotations
@@ -26,12 +26,12 @@ class EdgeEstimate:
 
     @property
     def answer(self) -> str:
-        """The two lines that lead the estimate: what is measured or expected, and the paper's analytic model."""
+        """The two lines that lead the estimate: the measured or expected level, and the paper's analytic model."""
         return "\n".join(summary(self.data)["lines"])
 
     @property
     def edge(self) -> dict[str, float | None]:
-        """The amplitude at the edge over the motor's, by model; None where no number can be given."""
+        """The amplitude at the edge over the motor's, by model; None if no number can be given."""
         return {model: row["edge"] for model, row in summary(self.data)["models"].items()}
 
     @property
@@ -71,7 +71,7 @@ def estimate(
     """Estimate the vibration at a unit's edge, and on the skin beyond it.
 
     `source` and `set` are as for `unitcad.load`. `models` ("rule", "published", "corrected", "divider"; "fem", which
-    needs scikit-fem and seconds) and `frequency_hz` stand in for the spec's. Nothing is drawn or written. Raises
+    needs scikit-fem and seconds) and `frequency_hz` replace the spec's. Nothing is drawn or written. Raises
     Refusal for a value that is not valid, and for a custom design that no model describes.
     """
     spec = load(source, set)

@@ -1,4 +1,4 @@
-"""An array with everything settled: what `array_file` makes of a file and what the rest of this room sees.
+"""The resolved array, which `array_file` makes of a file and which the rest of this room reads.
 
 The flat frame, in mm: z = 0 at the skin and upwards away from it, x along the columns and round the limb, y along the
 rows' axis and the limb's. Seen from outside, rows are lettered from the top (the largest y), columns numbered along x.
@@ -58,7 +58,7 @@ class Sheet:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Array:
-    """Units at their places on one sheet. `radius_mm`: of the limb, None where it is flat.
+    """Units at their places on one sheet. `radius_mm`: of the limb, None if it is flat.
 
     `layout`: the table that the places came from. `asked`: plain data that gives the same array when read again.
     """

@@ -33,10 +33,10 @@ from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import fields_of
 from unitcad.spec.toml import text_of
+from unitcad.spec.toml_lines import line_of
 from unitcad.text import listed
 from unitcad.validation import custom_templates, default_template, from_data, templates
 from unitcad.validation.dotted import ABSENT, at
-from unitcad.validation.faults import line_of
 from unitcad.validation.load import changed, override
 from unitcad.validation.shipped_files import named_file, shipped_files
 from unitcad.validation.tables import Changes, changes_of
@@ -88,7 +88,7 @@ def expanded(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
 
 
 def unit_data(given: Any, field: str, folder: Path) -> Any:
-    """Return the plain data of a unit's spec: what `like` names, with the other keys in place of its own."""
+    """Return the plain data of a unit's spec: that of `like`, with the other keys replaced."""
     at_field = field if isinstance(given, str) else f"{field}.like"
     if isinstance(given, str):
         given = {"like": given}
@@ -212,7 +212,7 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
 
 
 def makeable_array(data: Mapping[str, Any]) -> Array:
-    """Return the array of plain data as `array_of` does. Raises Refusal also where no tools or circuit can be made."""
+    """Return the array of plain data as `array_of` does. Raises Refusal also if no tools or circuit can be made."""
     array = array_of(data)
     made_plan(array)
     return array
@@ -230,9 +230,9 @@ def made_plan(array: Array) -> Plan:
 def _locate(
     refusal: Refusal, path: Path, file: Mapping[str, Any], written: Mapping[str, Any], whole: Mapping[str, Any]
 ) -> None:
-    """Name the file and the line of a refused value that stands in an array file, and not in an option.
+    """Add file and line to the refusal of a value that comes from an array file and not from an option.
 
-    Nor where an option changed its table: another `layout.kind` has other keys. `written` is the file's data with the
+    Not if an option changed its table: another `layout.kind` has other keys. `written` is the file's data with the
     whole spec of each unit, `whole` that with the options in it.
     """
     table = refusal.field.rpartition(".")[0]
@@ -253,9 +253,9 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
     except UnknownKey as key:
         limit = key.limit.replace("`unitcad schema`", "`unitcad schema array`")
         raise UnknownKey(key.field, key.value, limit, key.nearest) from None
-    way = construction_of(asked.array, asked.body.cast)
-    if way.cast == "curved" and asked.body.radius_mm is None:
-        raise Refusal("body.radius_mm", None, "a curved mould needs the radius of the limb that it goes round", 40.0)
+    way = construction_of(asked.array, asked.limb.cast)
+    if way.cast == "curved" and asked.limb.radius_mm is None:
+        raise Refusal("limb.radius_mm", None, "a curved mould needs the radius of the limb that it goes round", 40.0)
     cavities = asked.moulds.cavities
     if not way.own_tails and cavities != (1, 1):
         limit = "all units are cast in one pour, so their moulds have no cavities side by side: leave it out"
@@ -263,7 +263,7 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
     if asked.circuit is not None and way.own_tails:
         limit = "its units are held with their own circuits; [circuit] is one for all, laid into notches"
         raise Refusal("array", asked.array, limit, "back-sheet")
-    points = _points(kind, table, asked.body.radius_mm)
+    points = _points(kind, table, asked.limb.radius_mm)
     if len(points) > MOST_PLACES:
         raise Refusal("layout", len(points), f"an array has at most {MOST_PLACES} units")
     places = places_of(asked, points)
@@ -289,8 +289,8 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
     return Array(
         name=asked.name,
         construction=asked.array,
-        cast=asked.body.cast,
-        radius_mm=asked.body.radius_mm,
+        cast=asked.limb.cast,
+        radius_mm=asked.limb.radius_mm,
         layout=dict(asked.layout),
         places=tuple(
             Placed(name=p.name, x=p.x, y=p.y, angle_deg=angle, unit=each)
@@ -310,24 +310,24 @@ def _points(kind: LayoutKind, table: Any, radius: float | None) -> list[Point]:
 
 
 def _check_closes(asked: AskedArray, table: Any, sheet: Sheet, middle: float, apart: float) -> None:
-    """Raise Refusal for a sheet that is longer than its way round the limb, with what would fit.
+    """Raise Refusal for a sheet that is longer than its way round the limb, with the values that would fit.
 
-    `middle`: radius of the sheet's middle; `apart`: what two units of a band need from middle to middle (mm).
+    `middle`: radius of the sheet's middle; `apart`: least distance of two units of a band, from middle to middle (mm).
     """
     length, closed = sheet.outline[2] - sheet.outline[0], 2 * math.pi * middle
     if length <= closed + 2 / 1024:
         return
     limit = (
         f"round the limb the sheet's middle has {closed:.4g} mm, and the sheet is {length:.4g} mm long: its ends would "
-        "lie over each other. Fewer units, narrower margins and slots, or a wider limb"
+        "overlap. Fewer units, narrower margins and slots, or a wider limb"
     )
     if isinstance(table, RingTable):
-        # One pitch is left for what the sheet is longer than from the first unit to the last.
+        # One pitch remains for the parts of the sheet beyond the first and the last unit.
         needed = max(length - (table.count - 1) * closed / table.count, apart)
         fits = int(closed / needed + 1e-9)
         raise Refusal("layout.count", table.count, limit, fits if fits > 1 else None)
-    radius = asked.body.radius_mm or 0.0
-    raise Refusal("body.radius_mm", radius, limit, up(length / (2 * math.pi) - (middle - radius)))
+    radius = asked.limb.radius_mm or 0.0
+    raise Refusal("limb.radius_mm", radius, limit, up(length / (2 * math.pi) - (middle - radius)))
 
 
 def with_formats(array: Array, formats: Iterable[str]) -> Array:
@@ -382,7 +382,7 @@ def _check_held(
     asked: AskedArray,
     places: dict[int, int],
 ) -> None:
-    """Raise Refusal for a unit that the sheet can't hold, with a template's name that is accepted there."""
+    """Raise Refusal for a unit that does not fit the sheet, with the name of a template that does."""
     fields = {n: f"place.{i}.unit" for n, i in places.items() if asked.place[i].unit is not None}
     for field, unit in {fields.get(n, "unit"): unit for n, unit in enumerate(units)}.items():
         if why := way.unfit(unit, sheet):
@@ -415,7 +415,7 @@ def _check_apart(
             gap, why = max(apart[id(units[i])], apart[id(units[j])])
             needed = (units[i].diameter_mm + units[j].diameter_mm) / 2 + gap
             short = needed - ((p.x - q.x) ** 2 + (p.y - q.y) ** 2) ** 0.5
-            # What snapping two centres to the grid may take.
+            # Largest error of snapping two centres to the grid.
             if short > 2 / 1024 and (worst is None or short > worst[0] + 1e-9):
                 one, other = sorted((p, q), key=lambda point: (point.row, point.column))
                 worst = short, one, other, needed, why

@@ -27,13 +27,13 @@ from unitcad.text import number
 CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg", "crosstalk-edge.svg"), "circuit.svg"
 LARGEST = 8_000_000
 """Bytes of a drawing or picture, at most."""
-SIDES = ("skin-side", "worn", "back")
+SIDES = ("skin-side", "bent", "back")
 WORDS = {
     "patch-skin-side.png": "The patch from the skin's side",
     "patch-back.png": "The patch from its back",
-    "patch-worn.png": "The patch round its limb",
-    "tools.png": "Tools and what is cast, taken apart",
-    "crosstalk-patch.svg": "What reaches each unit from the others, on the patch",
+    "patch-bent.png": "The patch round its limb",
+    "tools.png": "Tools and cast silicone, taken apart",
+    "crosstalk-patch.svg": "Vibration at each unit from all others, on the patch",
     "crosstalk.svg": "Crosstalk from each unit (row) to each other one (column)",
     "crosstalk-edge.svg": "The same, at the nearest edge of the other unit",
     "circuit.svg": "Outline of the circuit, pads and rows",
@@ -42,7 +42,7 @@ ARRAY_FILE = "array.toml"
 
 
 class ArrayManifest(Manifest):
-    """An array's manifest: `laws`, `check` and `parts` are those of its tools and sheet and of its units.
+    """An array's manifest: `mould_checks`, `check` and `parts` are those of its tools and sheet and of its units.
 
     `array` has construction, layout, sheet, and the places with the folder of their unit's own result.
     """
@@ -85,7 +85,7 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
 
 
 def _model(folder: Path, warn: Callable[[str], None]) -> dict[str, Any] | None:
-    """Return what the 3D view shows; None, and a warning, where it can't be made, as of a unit that runs code."""
+    """Return what the 3D view shows; None, and a warning, if it can't be made, as of a unit that runs code."""
     try:
         return array_model(array_of(read_toml(folder / ARRAY_FILE, links=False)))
     except UnitcadError as error:
@@ -94,7 +94,7 @@ def _model(folder: Path, warn: Callable[[str], None]) -> dict[str, Any] | None:
 
 
 class _Shown:
-    """What the page shows of a folder's files; a file that is not there shows nothing, a damaged one is warned of."""
+    """Files of a folder for the page; a missing one shows nothing, a damaged one a warning."""
 
     def __init__(self, folder: Path, warn: Callable[[str], None]) -> None:
         self.folder, self.warn = folder, warn
@@ -145,21 +145,21 @@ def _worn(array: Mapping[str, Any]) -> str:
     between = f", {number(100 * flat, 2)} % between units that stay flat" if flat else ""
     if array["cast"] == "curved":
         return (
-            f"<p>Cast round the limb, where it lies unstretched. Laid flat for its circuit, the sheet's faces are "
-            f"stretched by {number(100 * bent['strain'], 2)} %{between}. At its edge a unit stands "
+            f"<p>Cast around the limb: worn, it is not stretched. Laid flat for its circuit, the sheet's faces are "
+            f"stretched by {number(100 * bent['strain'], 2)} %{between}. At its edge a unit is "
             f"{number(bent['sagitta_mm'], 2)} mm off the skin (computed).</p>"
         )
     return (
         f"<p>Cast flat and bent: the sheet's middle, at a radius of {number(bent['middle_radius_mm'], 4)} mm, keeps "
         f"its length. A whole turn is {number(bent['closed_length_mm'], 4)} mm, which leaves "
         f"{number(bent['between_ends_mm'], 3)} mm between the ends. The sheet's faces are stretched by "
-        f"{number(100 * bent['strain'], 2)} %{between}. At its edge a unit that stays flat stands "
+        f"{number(100 * bent['strain'], 2)} %{between}. At its edge a unit that stays flat is "
         f"{number(bent['sagitta_mm'], 2)} mm off the skin (computed).</p>"
     )
 
 
 def _chips(manifest: ArrayManifest) -> str:
-    findings, check = manifest["laws"], manifest["check"]
+    findings, check = manifest["mould_checks"], manifest["check"]
     passed = sum(each["ok"] for each in findings)
     good = passed == len(findings) and not check["errors"]
     chips = [f"{passed} of {len(findings)} mould checks passed"] if findings else ["not checked"]
@@ -225,37 +225,37 @@ def _places(array: Mapping[str, Any]) -> str:
         [p["name"], number(p["x_mm"], 4), number(p["y_mm"], 4), p["unit"].rpartition("/")[2]] for p in array["places"]
     ]
     if array["construction"] == "pockets":
-        hidden = {tail["place"]: tail for tail in array.get("hidden_tails", [])}
+        covered = {tail["place"]: tail for tail in array.get("covered_tails", [])}
         note += " The angle is that of the tail, counter-clockwise from x."
         head += ["tail's angle, degrees", "tail's end"]
         for row, place in zip(rows, array["places"], strict=True):
-            row += [number(place["angle_deg"], 4), _tail_end(hidden.get(place["name"]))]
+            row += [number(place["angle_deg"], 4), _tail_end(covered.get(place["name"]))]
     return f'<p class="note">{note}</p>' + _table(head, rows)
 
 
-def _tail_end(hidden: Mapping[str, Any] | None) -> str:
-    """Say where a tail ends: under the sheet it has to be made longer, or wires soldered on."""
-    if hidden is None:
+def _tail_end(covered: Mapping[str, Any] | None) -> str:
+    """Return the end of a tail in words: under the sheet it has to be made longer, or wires soldered on."""
+    if covered is None:
         return "not under the sheet"
-    blocked, turn = hidden["blocked_by"], hidden.get("angle_deg")
-    longer = f"{hidden['field']} = {number(hidden['length_mm'])} reaches the edge"
+    blocked, turn = covered["blocked_by"], covered.get("angle_deg")
+    longer = f"{covered['field']} = {number(covered['length_mm'])} reaches the edge"
     if turn is not None:
         blocked, longer = "", f"with angle_deg = {number(turn)} it comes out"
     return (
-        f"under the sheet, {number(hidden['short_mm'], 2)} mm before its edge along the tail: "
+        f"under the sheet, {number(covered['short_mm'], 2)} mm before its edge along the tail: "
         f"{f'{blocked} is in the way: solder wires on' if blocked else f'{longer}, or solder wires on'}"
     )
 
 
 def _checks(manifest: ArrayManifest) -> str:
-    findings = manifest["laws"]
+    findings = manifest["mould_checks"]
     if not findings:
         return ""
     passed = Counter(each["code"] for each in findings if each["ok"])
     every = Counter(each["code"] for each in findings)
     meaning = {code: check.demands for code, check in mould_checks().items()}
     rows = [(code, meaning.get(code, ""), f"{passed[code]} of {count}") for code, count in sorted(every.items())]
-    table = _table(("code", "what it demands", "passed"), rows)
+    table = _table(("code", "condition", "passed"), rows)
     broken = "".join(
         f"<li>{escape(each['code'])} {escape(each['where'])}: {each['value']:.3g} {escape(each['unit'])}, limit "
         f"{each['limit']:.3g}. {escape(each['advice'])}</li>"

@@ -15,7 +15,7 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.constructions.pockets import hold_strain
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds
-from unitcad.arrays.tails import hidden_tails, longer_tails, where_they_end
+from unitcad.arrays.tails import covered_tails, longer_tails, where_they_end
 from unitcad.casting.bill import Item, bill, consumed, injecting, motor_name, mould_plates
 from unitcad.casting.figures import (
     LAY_IN_MIN,
@@ -40,7 +40,7 @@ from unitcad.casting.pouring import (
 )
 from unitcad.casting.pouring import release as flat_release
 from unitcad.casting.pouring import shown as grams_shown
-from unitcad.casting.preparation import cleaning, fall, joining, level, printing
+from unitcad.casting.preparation import Printing, cleaning, fall, joining, level, printing
 from unitcad.casting.procedure import Procedure, pour_of, procedure, times
 from unitcad.casting.steps import NEEDS, BenchStep, Phase, duration, phases
 from unitcad.casting.views import picture_path, views
@@ -89,7 +89,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
     under_lid = PatchMoulds(injected_spec, moulds.plan, array=moulds.array)
     known, cells = catalogue.materials(spec.materials), len(flat.plan.layout.cells)
     silicones = [known[each.material] for each in moulds.plan.steps]
-    # In the words of the whole set: what is cast flat bonds later, so its cup gets no release agent.
+    # In the words of the whole set: flat castings bond later, so their cups get no release agent.
     flat_batches = [
         Batch(moulds, each, silicone, volume, cells)
         for each, silicone, volume in zip(flat.plan.steps, silicones[:-1], layer_volumes_mm3[:-1], strict=True)
@@ -142,7 +142,7 @@ def _heights(moulds: PatchMoulds) -> Iterator[float]:
 
 
 def _base(moulds: PatchMoulds) -> str:
-    """Return what the base of the last pour is called."""
+    """Return the name of the last pour's base."""
     return spaced(moulds.plan.base_of(moulds.plan.steps[-1]))
 
 
@@ -152,7 +152,7 @@ def _sort_curved(moulds: PatchMoulds) -> BenchStep:
     cups = listed(f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps[:-1])
     return BenchStep(
         "Sort the pieces",
-        f"Print the pieces as they lie in their files, without supports. All are engraved {label}. The flat ones are "
+        f"All are engraved {label}. The flat ones are "
         f"for Layer 1: the base has a b before it, and of the cups {cups}. The curved ones are for the last pour: "
         f"{_base(moulds)} has B{last.index:X} before it, {spaced(last.lid or '')} L{last.index:X}.",
         picture_path("pieces"),
@@ -161,7 +161,7 @@ def _sort_curved(moulds: PatchMoulds) -> BenchStep:
 
 
 def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
-    """Say how the inner layers leave their flat base and come to lie on the curved one."""
+    """Return the steps by which the inner layers move from their flat base to the curved one."""
     units, base, step = len(moulds.arranged.places), _base(moulds), moulds.plan.steps[-1]
     lid = spaced(step.lid or "")
     cast = "Layer 1" if step.index == 2 else f"Layers 1 to {step.index - 1}"
@@ -179,7 +179,7 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
     yield BenchStep(
         f"Filament into {base}",
         f"Cut {units} straight pieces of filament, {_lengths(moulds)} mm long. Hold {base} in the hand and push one "
-        "up through each core from below, until its lower end is flush with the underside. Then stand it down on a "
+        "up through each core from below, until its lower end is flush with the underside. Then put it down on a "
         "flat board: it bears the filaments, so none can sink. Trim the upper end flush with the core's top with a "
         "knife.",
         _picture(step, "filament"),
@@ -188,10 +188,9 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
     )
     yield BenchStep(
         f"Level {base}",
-        f"Put {base} where it will stay and {lid} on it, dry. Lay a phone with its level, or a small spirit level, on "
-        f"{lid}, along it and across, and put paper under a corner of {base} until it shows less than 5 degrees: so "
-        f"much the vents clear (C400). Lift {lid} off again. {base.capitalize()} stays there: it is filled and cured "
-        "on this spot.",
+        f"Put {base} in its final place and {lid} on it, dry. Lay a level on {lid}, along it and across, and put paper "
+        f"under a corner of {base} until it shows none; within 5 degrees is good enough, since the vents clear so "
+        f"much. Lift {lid} off; leave {base} there until it is cured.",
         _picture(step, "level"),
         minutes=5.0,
         needs=("level", "paper"),
@@ -205,8 +204,8 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
     )
     yield BenchStep(
         f"Lay {cast} in",
-        f"Lay each one over its core of {base}, at the place where it was cast: A1 on A1, its notches over the fins. "
-        "Press its edge down all round until it lies on the floor of its moat and its top flat on the core: what "
+        f"Lay each one over its core of {base}, at the place of its casting: A1 on A1, its notches over the fins. "
+        "Press its edge down all round until it is on the moat's floor and its top flat on the core: silicone that "
         "creeps under it fills the cavity's mouth. No release agent and no grease on core or moat.",
         _picture(step, "laid-in"),
         minutes=LAY_IN_MIN * units / 2,
@@ -232,8 +231,8 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
     yield BenchStep(
         f"Lid {step.index} on",
         f"Draw a thin line of petroleum jelly on the curved land of {base} round the sheet's bed, near its outer edge. "
-        f"Put {lid} on over the pins: one of them stands off the rectangle of the others, so it goes on one way only. "
-        f"Press it down until it bears on the land all round; at both ends, beside the pins, a slit of {slit} mm stays "
+        f"Put {lid} on over the pins: one of them is off the rectangle of the others, so it goes on one way only. "
+        f"Press it down until it bears on the land all round; at both ends, near the pins, a slit of {slit} mm stays "
         "open.",
         _picture(step, "lid-on"),
         minutes=LIFT_MIN,
@@ -245,7 +244,7 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
 def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
     return BenchStep(
         f"Lid {step.index} off",
-        "Take off what held the lid down. Lay a screwdriver into the slit at either end, beside the pins, and turn "
+        "Take off the tape or clamps of the lid. Lay a screwdriver into the slit at either end and turn "
         f"both a little at a time, until {spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents "
         "tear off at the sheet. Trim them flush with a knife.",
         _picture(step, "lid-off"),
@@ -277,7 +276,7 @@ def _out_of_curved(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
 
 
 def _bonds(moulds: PatchMoulds) -> Iterator[BondFace]:
-    """Yield every face of the tools that forms what bonds later."""
+    """Yield every face of the tools that forms a later bond face."""
     *inner, last = moulds.plan.steps
     for step in inner:
         yield BondFace(Face(step.cup, "bore"), f"layer {step.index + 1}")
@@ -313,7 +312,7 @@ def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchSt
 
 
 ONCE = frozenset(NEEDS)
-"""What one piece, dab or roll of is enough for every casting."""
+"""Things of which one piece, dab or roll is enough for every casting."""
 
 
 def pocket_bill(
@@ -333,7 +332,7 @@ def pocket_bill(
 
 
 def counts(array: Array) -> list[int]:
-    """Return how many places hold each distinct unit, in the order of `Array.units`."""
+    """Return the number of places with each distinct unit, in the order of `Array.units`."""
     held = Counter(array.units.index(place.unit) for place in array.places)
     return [held[i] for i in range(len(array.units))]
 
@@ -353,14 +352,14 @@ def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
 
 def _wires(array: Array) -> Iterator[Item]:
     """List the wires of the tails that end under the sheet, two for each: a motor has two poles."""
-    if hidden := hidden_tails(array):
-        longest = number(max(tail.short_mm for tail in hidden), 2)
+    if covered := covered_tails(array):
+        longest = number(max(tail.short_mm for tail in covered), 2)
         note = f"thin and insulated, two for each tail that ends under the sheet, at least {longest} mm and a connector"
-        yield Item("lead wire", 2 * len(hidden), "piece", "bought", note)
+        yield Item("lead wire", 2 * len(covered), "piece", "bought", note)
 
 
 def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
-    """Yield the lines of the units' bills for all units: their pieces once, what is used up as often as it is."""
+    """Yield the lines of the units' bills for all units: their pieces once, consumables as often as they are used."""
     for spec, count, (folder, unit) in zip(array.units, counts(array), units.items(), strict=True):
         times = castings(count, unit)
         inside = {motor_name(spec), "flexible circuit", "wire"}
@@ -379,9 +378,9 @@ def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
 
 
 def _added(items: Iterable[Item]) -> list[Item]:
-    """Return a bill in which each thing stands once: what is used up is added, of what is reused the most is taken.
+    """Return a bill with one line a thing: consumables are added, of reused things the largest number counts.
 
-    A thing that is used up in two sizes has a line for each; of a tool in two sizes the larger one does.
+    A consumable in two sizes has a line for each; of a tool in two sizes the larger one remains.
     """
     found: dict[tuple[str, str, str], Item] = {}
     for item in items:
@@ -425,20 +424,20 @@ def pocket_procedure(
         *joining(moulds),
         # The sheet must not get thinner at one end by more than a dent.
         level(
-            f"{fall(moulds)}. Put the tray where it will stay. Lay a phone with its level, or a small spirit level, on "
-            "the cores, which are as high as the wall, along the tray and across, and put paper under a corner until "
-            "it shows less. The tray stays there: it is poured and cured on this spot."
+            "Put the tray in its final place. Lay a level on the cores, which are as high as the wall, along the tray "
+            f"and across, and put paper under a corner until it shows none. {fall(moulds)} Leave the tray there until "
+            "it is cured."
         ),
     )
     poured = (
         *mixed(batch),
         *struck(
             batch,
-            "Pour in a thin thread, first along the wall and round every core, until the tray stands over its rim and "
-            "the cores are covered. Prick the bubbles that you see with a pin.",
-            "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke from end to "
-            "end: it runs on rim and cores. What it takes goes into the groove.",
-            " The film that it leaves on the cores cures too and is trimmed at the end.",
+            "Pour in a thin thread, first along the wall and round every core, until it rises over the rim and "
+            "the cores are covered. Prick bubbles with a pin.",
+            "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke: it runs on rim "
+            "and cores. The rest goes into the groove.",
+            " The film on the cores is trimmed at the end.",
             len(array.places),
             1,
             picture_path,
@@ -462,7 +461,7 @@ def pocket_procedure(
         earliest_finish_min=finish,
         bench_min=sum(phase.bench_min for phase in until),
         time_line=line,
-        printing=tuple(_printing(moulds, printed_mm3, array, units)),
+        printing=_printing(moulds, printed_mm3, array, units),
         preparation=(*cast, *prepared),
         off_grid=(),
         unit_heights=(),
@@ -505,9 +504,9 @@ def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
         filled = "one casting" if times == 1 else f"{times} castings, one after the other,"
         take = "takes" if times == 1 else "take"
         whole, bench = unit.time_line[-1].end_min, sum(phase.bench_min for phase in unit.time_line)  # motors in
-        # One sheet is cast, beside the first of them.
+        # One sheet is cast, at the same time as the first of them.
         after = duration(_first_cure(units)) if not i else ""
-        beside = f"Begin the sheet beside them, while their first pour cures, {after} from now." if after else ""
+        beside = f"Begin the sheet while their first pour cures, {after} from now." if after else ""
         more = "" if unit.cells >= count else " More cavities (moulds.cavities) or a second set of moulds save days."
         yield BenchStep(
             "Cast the units",
@@ -526,21 +525,22 @@ def _sort(moulds: PatchMoulds) -> str:
         listed(mould_plates(moulds)),
     )
     return (
-        f"Print tray ({tray}){_and_blade(moulds)} as they lie in {files}, without supports. The tray is engraved "
+        f"Print tray ({tray}){_and_blade(moulds)} as in {files}, without supports. The tray is engraved "
         f"{seen(f'B{moulds.plan.label}')}."
     )
 
 
 def _and_blade(moulds: PatchMoulds) -> str:
-    """Name the blade where it is printed too."""
+    """Name the blade if it is printed too."""
     return " and blade" * all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
 
 
-def _printing(moulds: PatchMoulds, solid_mm3: float, array: Array, folders: Iterable[str]) -> Iterator[str]:
-    yield from printing(moulds, solid_mm3)
+def _printing(moulds: PatchMoulds, solid_mm3: float, array: Array, folders: Iterable[str]) -> Printing:
+    sheet = printing(moulds, solid_mm3)
     of_units = zip(folders, array.units, strict=True)
     files = (f"{folder}/{file}" for folder, unit in of_units for file in mould_plates(MouldSet(unit)))
-    yield f"The units' moulds: {listed(files)}, as their casting.md says."
+    units = f"The units' moulds: {listed(files)}, as their casting.md says."
+    return replace(sheet, how=(*sheet.how, units))
 
 
 def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
@@ -558,14 +558,14 @@ def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
 
 def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
     """Say how the units go in, and which way each one's tail points."""
-    if hidden := hidden_tails(array):
+    if covered := covered_tails(array):
         yield BenchStep(
-            "Wires on hidden tails",
-            f"{counted(len(hidden), 'tail')} would end under the sheet, {where_they_end(hidden)}. Nothing can be "
-            "joined to them once the units are in. Solder wires to the end of each now, longer than this way by what "
-            "the connector needs, and try the motor again. They leave between sheet and skin. Longer tails need none "
-            f"where the way is free. {longer_tails(hidden)}",
-            minutes=SOLDER_MIN * len(hidden),
+            "Wires on covered tails",
+            f"{counted(len(covered), 'tail')} would end under the sheet, {where_they_end(covered)}. Nothing can be "
+            "joined to them once the units are in. Solder wires to the end of each now, longer than this way by the "
+            "connector's length, and try the motor again. They leave between sheet and skin. Longer tails need none "
+            f"if the way is free. {longer_tails(covered)}",
+            minutes=SOLDER_MIN * len(covered),
             needs=("soldering iron and solder",),
         )
     strains = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units}
@@ -576,7 +576,7 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
         for angle, places in groupby(ordered, key=lambda place: place.angle_deg)
     )
     turned = (
-        " Turn each one until its tail points where it belongs. Angles count counter-clockwise from the way along a "
+        " Turn each one until its tail points in its direction. Angles count counter-clockwise from the way along a "
         f"row to the right, seen from the back: {ways}."
         if any(unit.fpcb or unit.wires for unit in array.units)
         else ""
@@ -586,8 +586,8 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
     yield BenchStep(
         "Units in",
         f"Lay the sheet down with its back up, as it came out of the tray. Push each unit up into its pocket from "
-        f"below, back first, until the pocket's lower edge stands {over} mm over the unit's skin side all round: the "
-        f"pocket stretches by {stretch} and holds it. Water with a drop of soap helps; it dries.{turned} {names}",
+        f"below, back first, until the pocket's lower edge is {over} mm over the unit's skin side all round: the "
+        f"pocket stretches by {stretch} and grips it. Water with a drop of soap helps; it dries.{turned} {names}",
         picture_path("units-in"),
         minutes=PUSH_MIN * len(array.places),
     )
@@ -608,7 +608,7 @@ def array_procedure(
     """Return the procedure of an array's construction.
 
     layer_volumes_mm3: a volume a pour of the sheet's tools; printed_mm3: volume of these tools; of_units: the procedure
-    of each distinct unit by its folder, read where units are cast apart.
+    of each distinct unit by its folder, read if units are cast apart.
     """
     way = moulds.construction
     if way.own_tails:

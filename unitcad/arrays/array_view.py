@@ -1,4 +1,4 @@
-"""What the viewer shows of an array: the patch, each distinct body once with its places, and the tools by pours."""
+"""The scene of an array in the viewer: the patch, each distinct body once with its places, and the tools by pours."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from unitcad.shape import union
 from unitcad.shape.body import Body
 
 BELOW = 14.0
-"""How far what is put into a sheet is drawn out of it towards the skin, mm."""
+"""Distance by which inserted parts are drawn out of a sheet, towards the skin, mm."""
 
 
 def array_model(array: Array) -> dict[str, Any]:
-    """Return an array for the page in the form of `viewer_models.model`: the patch; tools with what is cast in them.
+    """Return an array for the page in the form of `viewer_models.model`: the patch; tools with their silicone.
 
-    Raises UnitcadError where the tools can't be made any more.
+    Raises UnitcadError if the tools can't be made any more.
     """
     model = {**patch_model(array), **tools_model(array)}
     return model | {key: compressed(model[key]) for key in ("unit", "moulds")}
 
 
 def patch_model(array: Array) -> dict[str, Any]:
-    """Return the patch for the viewer, its GLB file as bytes; a body that stands at several places is there once.
+    """Return the patch for the viewer, its GLB file as bytes; a body at several places is there once.
 
     Lengths in mm.
     """
@@ -73,9 +73,9 @@ def patch_glb(moulds: MouldSet, parts: Sequence[PatchPart]) -> bytes:
 
 
 def tools_model(array: Array) -> dict[str, Any]:
-    """Return the tools of an array's sheet for the viewer, and what is cast in them: a GLB file as bytes, each pour.
+    """Return the tools of an array's sheet for the viewer, and their silicone: a GLB file as bytes, each pour.
 
-    Lengths in mm. Raises UnitcadError where the tools can't be made.
+    Lengths in mm. Raises UnitcadError if the tools can't be made.
     """
     moulds = patch_moulds(array).blank
     plan, apart = moulds.plan, dict(taken_apart(moulds))

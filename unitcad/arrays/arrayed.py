@@ -3,7 +3,7 @@
 array.toml  manifest.json  casting.md  casting.json  bom.csv  step1-section.svg
 patch/      the patch as it is worn: STL of the sheet, STEP and GLB of all
 moulds/     the tools of the sheet
-units/NAME/ a unit's own result, as `unitcad build` makes it: with moulds where units are cast apart
+units/NAME/ a unit's own result, as `unitcad build` makes it: with moulds if units are cast apart
 pictures/   patch, tools, pours
 steps/      the state of the moulds at each step of the procedure
 """
@@ -42,7 +42,7 @@ from unitcad.arrays.limb import bending_record
 from unitcad.arrays.offers import offered
 from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_parts
 from unitcad.arrays.patch_pictures import picture_names, pictures
-from unitcad.arrays.tails import hidden_tails, hidden_tails_warning
+from unitcad.arrays.tails import covered_tails, covered_tails_warning
 from unitcad.cache import Store, digest
 from unitcad.casting.pictures import pictures as bench_pictures
 from unitcad.casting.procedure import Procedure
@@ -63,10 +63,10 @@ from unitcad.pipeline.manifest import (
     UNCHECKED,
     BodyFile,
     Geometry,
-    LeftOut,
     Manifest,
     MeshFinding,
     PartRecord,
+    Skipped,
     counted,
     printed_mm3,
 )
@@ -178,7 +178,7 @@ class Arrayed(Compound):
             parts, shared = [*parts, *made], shared | files
         drawn: list[str] = []
         tracks = crowded_tracks(array) if has_circuit(array) else []
-        warned = [*hidden_tails_warning(array), *tracks, *shallow_grooves(moulds), *play_missing(moulds)]
+        warned = [*covered_tails_warning(array), *tracks, *shallow_grooves(moulds), *play_missing(moulds)]
         if {"unit", "moulds"} & set(only):
             progress("pictures")
             shown = _pictures(moulds, store)
@@ -197,7 +197,7 @@ class Arrayed(Compound):
         more, lacking = extras(array, only)
         own |= more
         manifest = _manifest(array, moulds, only, check, shape, units, parts, drawn, own, warned)
-        manifest["left_out"] += [LeftOut(what=what, why=why) for what, why in lacking.items()]
+        manifest["skipped"] += [Skipped(output=output, reason=reason) for output, reason in lacking.items()]
         return finished(manifest, own, shared, store)
 
 
@@ -211,7 +211,7 @@ def unit_folders(array: Array) -> dict[str, Spec]:
 
 
 def _unit(array: Array, unit: Spec, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
-    """Return a unit's own result; where it is cast with the sheet, without moulds and casting."""
+    """Return a unit's own result; without moulds and casting if it is cast with the sheet."""
     apart = construction_of(array.construction, array.cast).own_tails
     wanted = [name for name in only if apart or name not in ("moulds", "casting")] or ["unit"]
     progress.prefix = "unit: "
@@ -301,7 +301,9 @@ def _manifest(
     every = [*parts]
     for folder, product in units.items():
         manifest = product.manifest
-        findings += [FindingRecord(**{**each, "where": f"{folder}: {each['where']}"}) for each in manifest["laws"]]
+        findings += [
+            FindingRecord(**{**each, "where": f"{folder}: {each['where']}"}) for each in manifest["mould_checks"]
+        ]
         meshes += [
             MeshFinding(**{**each, "path": f"{folder}/{each['path']}"}) for each in manifest["check"]["findings"]
         ]
@@ -322,12 +324,12 @@ def _manifest(
             {**step, "material": moulds.plan.steps[step["index"] - 1].material}
             for step in (shape["steps"] if shape else [])
         ],
-        laws=findings,
+        mould_checks=findings,
         estimate=first["estimate"],
         check=counted(meshes),
         pictures=drawn,
         casting=sorted(path for path in own if path in CASTING) or None,
-        left_out=list(_left_out(array, only, check, first["left_out"])),
+        skipped=list(_skipped(array, only, check, first["skipped"])),
         versions={"unitcad": __version__, **kernel_versions(array.unit.output.formats)},
         files={},
         array=_record(array, units),
@@ -335,7 +337,7 @@ def _manifest(
 
 
 def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
-    """Return what the manifest says of the array itself."""
+    """Return the manifest's block of the array itself."""
     folders_of = list(units)
     sheet = array.sheet
     return {
@@ -364,7 +366,7 @@ def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
             }
             for p in array.places
         ],
-        "hidden_tails": [asdict(tail) for tail in hidden_tails(array)],
+        "covered_tails": [asdict(tail) for tail in covered_tails(array)],
     }
 
 
@@ -376,11 +378,11 @@ def _under(folder: str, part: PartRecord) -> PartRecord:
     return {**part, "name": f"{folder}: {part['name']}", "files": files}
 
 
-def _left_out(array: Array, only: Sequence[str], check: bool, of_unit: list[LeftOut]) -> Iterator[LeftOut]:
+def _skipped(array: Array, only: Sequence[str], check: bool, of_unit: list[Skipped]) -> Iterator[Skipped]:
     if not check:
-        yield LeftOut(what="mould checks", why=UNCHECKED)
-        yield LeftOut(what="mesh checks", why=UNCHECKED)
+        yield Skipped(output="mould checks", reason=UNCHECKED)
+        yield Skipped(output="mesh checks", reason=UNCHECKED)
     for name in OUTPUTS:
         if name not in only:
-            yield LeftOut(what=name, why="not asked for (--only)")
-    yield from (each for each in of_unit if each["why"] == NO_KERNEL)
+            yield Skipped(output=name, reason="not asked for (--only)")
+    yield from (each for each in of_unit if each["reason"] == NO_KERNEL)

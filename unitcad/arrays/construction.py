@@ -1,4 +1,4 @@
-"""A way to make an array: what it demands of the units and how its sheet lies on them; found by its name."""
+"""A way to make an array: its conditions on the units and the place of its sheet; found by its name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from unitcad.spec import Spec
 
 
 class Level(NamedTuple):
-    """Where a sheet lies, mm over the skin, and the thickest that would fit there."""
+    """Place of a sheet, mm over the skin, and the thickest one that would fit there."""
 
     low: float
     high: float
@@ -33,14 +33,14 @@ class Construction:
 
     mixed         whether single places may hold another unit
     own_tails     whether units are cast whole by their own moulds, each with the tail of its own circuit
-    thickness_mm  of the sheet where the file gives none
+    thickness_mm  of the sheet if the file gives none
     apart         least distance between the edges of two units, mm, and why
-    level         from the distinct units, a thickness and the limb's radius (None: flat) to where the sheet lies
-    unfit         from a unit and the sheet to why the sheet can't hold it; "" where it can
+    level         from the distinct units, a thickness and the limb's radius (None: flat) to the sheet's place
+    unfit         from a unit and the sheet to the reason why it does not fit; "" if it does
     bodies        the silicone that an array has besides its units, as cast
-    plan          tools and pours of those bodies; raises Refusal where they can't be made
-    assembly      how motors and circuit go into what was cast, a sentence each; () where they are in the units
-    greased       what gets petroleum jelly before the cup of a pour (from 1) is put on; "" where nothing does
+    plan          tools and pours of those bodies; raises Refusal if they can't be made
+    assembly      how motors and circuit go into the silicone, a sentence each; () if they are in the units
+    greased       faces that get petroleum jelly before the cup of a pour (from 1) is put on; "" if none does
     """
 
     name: str
@@ -66,7 +66,7 @@ def constructions() -> dict[str, Construction]:
 def construction_of(name: Name, cast: Cast) -> Construction:
     """Return a construction cast flat, or curved. Raises Refusal for one that is cast flat only."""
     if (name, cast) not in _found():
-        raise Refusal("body.cast", cast, f"{name} are cast flat and bent; a back sheet can be cast curved", "flat")
+        raise Refusal("limb.cast", cast, f"{name} are cast flat and bent; a back sheet can be cast curved", "flat")
     return _found()[name, cast]
 
 

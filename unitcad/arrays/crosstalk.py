@@ -19,7 +19,7 @@ from unitcad.attenuation.inputs import Drive, EstimateInput, body
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input, estimate_spec
-from unitcad.text import listed, number
+from unitcad.text import listed, number, some
 
 BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
 MOST_LOADED = 100
@@ -29,7 +29,7 @@ ASSUMPTIONS = [
     "The decay is that of the bare, laterally uniform skin under each unit's own motor; the other units, the sheet and "
     "the circuit are not on it.",
     "A flat motor's force turns in the plane of the skin: |u| is then alike at every angle, and needs no direction.",
-    "|u| is the root of the sum of the squares of the three components' amplitudes. `axial_u_z` is |u_z| alone under "
+    "|u| is the root of the sum of the squares of the three components' amplitudes. `axial_u_z` is only |u_z| under "
     "an axial drive, which some print.",
     "Sums are in one unit's level at its edge, as if every unit were driven to that level.",
 ]
@@ -168,7 +168,7 @@ def crosstalk(
     """Return an array's crosstalk as JSON-ready data.
 
     `matrix`: the decay between each two units by drive, rows the unit that drives, to the other's centre and nearest
-    edge, null for itself, at the units' own frequencies; `sums`: what adds up at each place; `band`: the same at the
+    edge, null for itself, at the units' own frequencies; `sums`: the sum at each place; `band`: the same at the
     nearest neighbour and the worst place over frequencies (Hz); `absolute`: a range; `masses`: with the
     masses of the others on the skin. Raises Refusal for a unit without an estimate, a frequency that no body takes,
     and for masses of more than `MOST_LOADED` units.
@@ -290,7 +290,7 @@ def _absolute(units: Decays, own: np.ndarray, worst: int, ranged: Mapping[str, M
 
 
 def _masses(units: Decays) -> dict[str, Any]:
-    """Return by what factor the units' masses on the skin change the sums at each place, own drives and frequency.
+    """Return the factor by which the units' masses on the skin change the sums at each place, own drives and frequency.
 
     By the model of `attenuation.receivers`: every unit loads the skin under it, those between two others too.
     """
@@ -299,7 +299,7 @@ def _masses(units: Decays) -> dict[str, Any]:
         raise Refusal("--masses", n, f"are worked out for at most {MOST_LOADED} units at once")
     frequencies = {one.frequency.middle for one in units.inputs}
     if len(frequencies) > 1:
-        shown = " and ".join(f"{hertz:g}" for hertz in sorted(frequencies))
+        shown = some(f"{hertz:g}" for hertz in sorted(frequencies))
         limit = "units that load each other's skin are worked out at one frequency (estimate.frequency_hz)"
         raise Refusal("--masses", f"{shown} Hz", limit)
     omega = 2.0 * math.pi * frequencies.pop()
@@ -377,17 +377,17 @@ def crosstalk_csv(array: Array, band: Sequence[float] = BAND_HZ) -> bytes:
 
 
 IN_BRACKETS = (
-    "In brackets is the range: tissue moduli, damping, thicknesses and frequency taken to both ends of their ranges, "
-    "and what a unit that sticks to the skin or rests on it changes."
+    "In brackets is the range: tissue moduli, damping, thicknesses and frequency at both ends of their ranges, "
+    "and a unit that sticks to the skin or rests on it."
 )
 ALIKE = 1e-3
 """Sums that differ by less, as a share, are called alike."""
 Crosstalk = Mapping[str, Any]
-"""What `crosstalk_matrix.crosstalk` returns."""
+"""The result of `crosstalk`."""
 
 
 def crosstalk_lines(data: Crosstalk) -> list[str]:
-    """Return the answer, the nearest neighbour first: what reaches it, what adds up, and the range over the models."""
+    """Return the answer, the nearest neighbour first: its share, the sums, and the range over the models."""
     nearest, worst = data["nearest"], data["worst"]
     if nearest is None:
         return ["A single unit has no neighbour: there is no crosstalk."]
@@ -406,14 +406,14 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
         at = [place["name"] for place in data["places"]].index(worst["place"])
         changes = masses["root_sum_of_squares_changes_by"][at], masses["sum_changes_by"][at]
         lines.append(
-            f"The units' masses on the skin change what {worst['place']} gets by x {number(changes[0], 3)} (root of "
+            f"The units' masses on the skin change the sum at {worst['place']} by x {number(changes[0], 3)} (root of "
             f"the sum of squares) and x {number(changes[1], 3)} (in phase)."
         )
     return [*lines, IN_BRACKETS]
 
 
 def _most(data: Crosstalk) -> str:
-    """Name the place that gets the most; places that stand alike differ by what their centres are rounded to."""
+    """Name the place that gets the most; equivalent places differ by the rounding of their centres."""
     values = data["sums"]["own_drive"]["root_sum_of_squares"]
     alike = max(values) - min(values) <= ALIKE * max(values)
     return "all get alike" if alike else f"{data['worst']['place']} gets the most"
@@ -422,7 +422,7 @@ def _most(data: Crosstalk) -> str:
 def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:
     """Return each array's crosstalk over that of the first: nearest neighbour, and the sums at the worst places.
 
-    In units' own levels at their edge. A ratio is None where one of the two is a single unit.
+    In units' own levels at their edge. A ratio is None if one of the two is a single unit.
     """
     first, found = every[0], []
     for other in every[1:]:
@@ -446,7 +446,7 @@ def ratio_line(one: Mapping[str, Any]) -> str:
         "worst place, root of squares": one["root_sum_of_squares"],
         "in phase": one["sum"],
     }
-    said = listed(f"{what} x {number(value, 3, zeros=True)}" for what, value in parts.items() if value is not None)
+    said = listed(f"{change} x {number(value, 3, zeros=True)}" for change, value in parts.items() if value is not None)
     body = "" if one["same_body"] else " (on another body)"
     return (
         f"{one['array']} over {one['over']}: {said or 'nothing to compare'}{body}, in edge levels of their own units."
@@ -492,7 +492,7 @@ def _band(data: Crosstalk) -> str:
             f"{number(100 * most[1], 2)} to {number(100 * least[1], 2)} % ({drive} drive)."
         )
     return (
-        f"From {number(shares[0][0])} to {number(shares[-1][0])} Hz the nearest neighbour's share lies between "
+        f"From {number(shares[0][0])} to {number(shares[-1][0])} Hz the nearest neighbour's share is between "
         f"{number(100 * least[1], 2)} % at {number(least[0])} Hz and {number(100 * most[1], 2)} % at "
         f"{number(most[0])} Hz ({drive} drive)."
     )

@@ -46,9 +46,9 @@ def heat_map_svg(data: Mapping[str, Any], drive: str | None = None, target: str 
     left, top = (64.0, 74.0) if n <= _MOST_NAMES else (34.0, 60.0)
     high = _largest(value for row in matrix for value in row if value is not None)
     wide, tall = max(left + n * cell + _SCALE_PX, 470.0), top + n * cell + 20.0
-    what = {"centre": "the middle", "nearest_edge": "the nearest edge"}[target]
+    part = {"centre": "the middle", "nearest_edge": "the nearest edge"}[target]
     driven = " and ".join(sorted(set(drives)))
-    head = f"{data['array']}: how much of a unit's motion at its edge reaches {what} of another, % ({driven} drive)"
+    head = f"{data['array']}: how much of a unit's motion at its edge reaches {part} of another, % ({driven} drive)"
     parts = [_open(wide, tall), _text(8, 20, head, 12, "start")]
     parts += _cells(matrix, left, top, cell, high)
     for i, name in enumerate(names if n <= _MOST_NAMES else ()):
@@ -77,7 +77,7 @@ def patch_map_svg(
     circuit: Profile | None = None,
     key: str = "root_sum_of_squares",
 ) -> str:
-    """Return the patch from outside as an SVG document: sheet, strap slots, units by name, the circuit where given.
+    """Return the patch from outside as an SVG document: sheet, strap slots, units by name, the circuit if given.
 
     With the `data` of `crosstalk_matrix.crosstalk` each unit is coloured by the amplitude that all others together give
     it, in per cent of one unit's level at its edge; `key`: "root_sum_of_squares", or "sum" for the worst phases.
@@ -146,12 +146,12 @@ def _cells(matrix: Sequence[Sequence[float | None]], left: float, top: float, ce
 
 
 def _largest(values: Iterable[float]) -> float:
-    """Return the value that the scale of colours ends at: the largest, 1 where there is none, as of a single unit."""
+    """Return the value that the scale of colours ends at: the largest, 1 if there is none, as of a single unit."""
     return max(values, default=0.0) or 1.0
 
 
 def _share(value: float, high: float) -> float:
-    """Return where a value lies from 0 to `high`, as both are written."""
+    """Return a value's place from 0 to `high`, as both are written."""
     return float(_percent(value)) / float(_percent(high))
 
 
@@ -162,7 +162,7 @@ def _colour(share: float) -> str:
 
 
 def _ink(share: float) -> str:
-    """Return the colour of what is written on the colour of a share."""
+    """Return the text's colour on the colour of a share."""
     return "#ffffff" if share > 0.55 else _INK
 
 
@@ -209,7 +209,7 @@ JSON = "crosstalk.json"
 def crosstalk_files(
     array: Array, circuit: Profile | None = None, data: dict[str, Any] | None = None
 ) -> dict[str, bytes]:
-    """Return the files by their names; `circuit` is drawn on the patch, `data` what `crosstalk` gave, if it is known.
+    """Return the files by their names; `circuit` is drawn on the patch, `data` the result of `crosstalk`, if known.
 
     Raises Refusal for units without an estimate.
     """
@@ -228,7 +228,7 @@ STEP = "circuit.step"
 
 
 def extras(array: Array, only: Sequence[str]) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Return circuit and crosstalk files by their paths, as the outputs `only` ask for, and why one was left out.
+    """Return circuit and crosstalk files by path, for the outputs `only`, and the reason for a missing one.
 
     Raises Refusal for a circuit that does not fit.
     """

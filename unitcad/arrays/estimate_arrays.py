@@ -38,7 +38,7 @@ def array_summary(array: Array, folder: Path, manifest: Manifest) -> Iterator[st
         lines = in_short(json.loads((folder / "casting.json").read_bytes()))
         yield from (line for line in lines if line not in told)
         yield from _more_cavities(array)
-    if checks := manifest["laws"]:
+    if checks := manifest["mould_checks"]:
         check, passed = manifest["check"], sum(entry["ok"] for entry in checks)
         files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
@@ -93,7 +93,7 @@ def estimate_arrays(
     for one in compared:
         screen.print(ratio_line(one), soft_wrap=True)
     if not details:
-        typer.echo("--details prints what each unit gets, the pairs, the band and the assumptions")
+        typer.echo("--details prints the sum at each unit, the pairs, the band and the assumptions")
 
 
 def _print_details(data: Mapping[str, Any]) -> None:
@@ -115,7 +115,7 @@ def _sums(data: Mapping[str, Any], names: Sequence[str]) -> Table:
     mixed = len({place["drive"] for place in data["places"]}) > 1
     labels = {"own_drive": "own", "flat": "flat", "axial": "axial", "axial_u_z": "axial u_z"}
     labels = {key: label for key, label in labels.items() if mixed or key != "own_drive"}
-    table = Table("unit", title=f"what all other units make there, times one unit's edge level: {_HOW}")
+    table = Table("unit", title=f"sum of all other units there, times one unit's edge level: {_HOW}")
     for label in labels.values():
         table.add_column(f"{label}\nroot")
         table.add_column(f"{label}\nsum")

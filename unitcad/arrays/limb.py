@@ -25,13 +25,13 @@ def axis(array: Array, x: float) -> tuple[float, float, float]:
 
 
 def bent(array: Array, shape: Shape, x: float, y: float = 0.0) -> Shape:
-    """Return what is drawn about the z axis as it stands at a place of the flat frame (mm)."""
+    """Return a shape drawn about the z axis at a place of the flat frame (mm)."""
     radius = array.radius_mm or 0.0
     return moved(rotated(moved(shape, 0.0, y, radius), "y", angle_deg(array, x)), z=-radius)
 
 
 def at_place(array: Array, shape: Shape, place: Placed) -> Shape:
-    """Return what is drawn about the z axis at its place in the frame that the silicone is cast in."""
+    """Return a shape drawn about the z axis at its place in the frame of the casting."""
     if array.cast == "curved":
         return bent(array, shape, place.x, place.y)
     return moved(shape, place.x, place.y)
@@ -43,7 +43,7 @@ def barrel(array: Array, radius: float) -> Shape:
 
 
 def slice_of(array: Array, first: float, last: float) -> Shape:
-    """Draw all that lies between two places of the flat frame (mm), planes through the limb's axis."""
+    """Draw all between two places of the flat frame (mm), planes through the limb's axis."""
     reach = 2 * array.back_radius_mm
     turns = (math.radians(angle_deg(array, x)) for x in (last, first))
     corners = ((reach * math.sin(turn), reach * math.cos(turn)) for turn in turns)
@@ -52,7 +52,7 @@ def slice_of(array: Array, first: float, last: float) -> Shape:
 
 
 def inside_of_end(array: Array, *, left: bool) -> Shape:
-    """Draw all that lies on the sheet's side of its left or right end: a plane through the axis, with round corners."""
+    """Draw all on the sheet's side of its left or right end: a plane through the axis, with round corners."""
     sheet = array.sheet
     x0, y0, x1, y1 = sheet.outline
     r, far, quarter = sheet.corner_mm, 3 * array.back_radius_mm, math.tan(math.pi / 8)
@@ -83,10 +83,9 @@ class Bending:
 
     middle_radius  of the sheet's middle, which keeps its length; the ring round the limb is closed at 2 pi times it
     ends           from one end of the sheet to the other, round the limb, along its middle
-    strain         of the sheet's two faces where it bends alike everywhere
-    strain_between the same where the units stay flat and the sheet between them bends alone; None where units lie
-                   side by side all the way
-    sagitta        from the limb's skin to a unit's, at the edge of a unit that stays flat and touches in its middle
+    strain         of the sheet's two faces if it bends equally everywhere
+    strain_between the same if the units stay flat and only the sheet between them bends; None if units touch all the
+    way sagitta        from the limb's skin to a unit's, at the edge of a unit that stays flat and touches in its middle
     """
 
     radius: float
@@ -104,7 +103,7 @@ class Bending:
 
 
 def bending(array: Array) -> Bending | None:
-    """Return how an array bends round its limb; None where it is worn flat."""
+    """Return how an array bends round its limb; None if it is worn flat."""
     radius, middle = array.radius_mm, array.middle_radius_mm
     if radius is None or middle is None:
         return None
@@ -122,7 +121,7 @@ def bending(array: Array) -> Bending | None:
 
 
 def bent_stretches(array: Array) -> tuple[tuple[str, float], ...]:
-    """Return where a plan's silicone stretches as the array is bent, or laid flat, and by how many percent."""
+    """Return the layers of a plan that stretch as the array is bent, or laid flat, and their strains in percent."""
     bent = bending(array)
     if not bent:
         return ()

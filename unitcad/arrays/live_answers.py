@@ -1,4 +1,4 @@
-"""What the page is told about an array: its form, the patch, its tools judged, its crosstalk."""
+"""Answers to the page about an array: its form, the patch, its tools judged, its crosstalk."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_of, array_templates, expanded, makeable_array, to_toml
 from unitcad.arrays.array_procedure import array_procedure
-from unitcad.arrays.array_tables import AskedArray, BodyTable, CircuitTable, SheetTable
+from unitcad.arrays.array_tables import AskedArray, CircuitTable, LimbTable, SheetTable
 from unitcad.arrays.array_view import patch_model, tools_model
 from unitcad.arrays.arrayed import unit_folders
 from unitcad.arrays.crosstalk import crosstalk, crosstalk_lines
@@ -28,13 +28,14 @@ from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
 from unitcad.serve.messages import Answer, Field, Group, Trusted
-from unitcad.serve.unit_answers import holds_code as unit_holds_code
+from unitcad.serve.unit_answers import has_code as unit_holds_code
 from unitcad.serve.unit_answers import printed_mm3, unit_procedure
 from unitcad.spec.custom_code import files_named
 from unitcad.spec.toml import from_json, read_toml, to_json
+from unitcad.spec.toml_lines import line_of
 from unitcad.validation import templates
 from unitcad.validation.dotted import at
-from unitcad.validation.faults import every_fault, line_of
+from unitcad.validation.faults import every_fault
 
 as_toml = to_toml
 
@@ -45,12 +46,12 @@ def judge(data: dict[str, Any]) -> Mapping[str, Any]:
 
 
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
-    """Return what `judge` does. Raises UnitcadError also for an array whose tools or circuit can't be made."""
+    """Return the result of `judge`. Raises UnitcadError also for an array whose tools or circuit can't be made."""
     return makeable_array(data).asked
 
 
 def asked_toml(text: str, data: Mapping[str, Any], array: Array, trusted: Trusted) -> str:
-    """Return what a text asks for as TOML that names no file: the text itself where it names none."""
+    """Return a text as TOML that names no file: the text itself if it names none."""
     return to_toml(array) if named_files(data) else text
 
 
@@ -79,7 +80,7 @@ def faults_of(first: Refusal, whole: dict[str, Any], text: str) -> list[Refusal]
 
 
 def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the whole data of a shipped array: of the same construction and kind of layout, where there is one."""
+    """Return the whole data of a shipped array: of the same construction and kind of layout, if there is one."""
     shipped = [expanded(read_toml(path), path.parent) for path in array_templates().values()]
     alike = [one for one in shipped if one["layout"]["kind"] == at(data, "layout.kind")] or shipped
     return next((one for one in alike if one["array"] == data.get("array")), alike[0])
@@ -111,8 +112,8 @@ def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[
     yield from ((f"{field}.design", unit) for field, unit in found.items() if isinstance(unit, dict))
 
 
-def holds_code(array: Array) -> bool:
-    """Tell whether a unit of an array holds code. Raises Refusal where it may not run."""
+def has_code(array: Array) -> bool:
+    """Tell whether a unit of an array has code. Raises Refusal if it may not run."""
     return any([unit_holds_code(unit) for unit in array.units])
 
 
@@ -122,7 +123,7 @@ def as_data(array: Array) -> dict[str, Any]:
 
 
 def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
-    """Return the form of an array's plain data; `array` None where the data is refused."""
+    """Return the form of an array's plain data; `array` None if the data is refused."""
     holds = array.asked if array else {}
     choices = {
         **choices_of(data),
@@ -140,11 +141,11 @@ def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
     if table is not None:
         made.append(Group("layout", "Layout", [*_with_kinds(fields(table, "layout", data, holds, choices), choices)]))
     made.append(Group("sheet", "Sheet", [*fields(SheetTable, "sheet", data, holds, choices)]))
-    made.append(Group("body", "Body", [*fields(BodyTable, "body", data, holds, choices)]))
+    made.append(Group("limb", "Limb", [*fields(LimbTable, "limb", data, holds, choices)]))
     there = isinstance(data.get("circuit"), dict)
     rows = [*fields(CircuitTable, "circuit", data, holds, choices)] if there else []
     made.append(Group("circuit", "Common circuit", rows, there, optional=True))
-    # What the array's tables leave out its unit has.
+    # The unit has the keys that the array's tables lack.
     return [*made, *table_groups(LAST_TABLES, data, array.asked["unit"] if array else {}, choices)]
 
 
@@ -179,7 +180,7 @@ def _tools(array: Array, answer: Answer) -> None:
 
 @lru_cache(maxsize=8)
 def _checked(unit: str, apart: bool) -> list[dict[str, Any]]:
-    """Return what the mould checks find on a unit, given as JSON: with its moulds where it is cast `apart`."""
+    """Return the findings of the mould checks on a unit, given as JSON: with its moulds if it is cast `apart`."""
     return [dict(finding.as_dict()) for finding in (check_moulds if apart else check_unit)(MouldSet(from_json(unit)))]
 
 
@@ -193,7 +194,7 @@ def _crosstalk(array: Array, answer: Answer) -> None:
     data = crosstalk(array)
     answer.lines = crosstalk_lines(data)
     answer.drawings = [
-        ("What reaches each unit from the others, on the patch", patch_map_svg(array, data)),
+        ("Vibration at each unit from all others, on the patch", patch_map_svg(array, data)),
         ("Crosstalk from each unit (row) to each other one (column)", heat_map_svg(data)),
     ]
 

@@ -1,4 +1,4 @@
-"""What a refused array offers in place of the refused value: changes that are tried out, and accepted."""
+"""Offers for a refused array: changes that were tried and accepted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from unitcad.text import number
 from unitcad.validation.dotted import at, drop, put
 
 Judge = Callable[[dict[str, Any]], object]
-"""Makes an array of plain data; raises Refusal for what can't be made."""
+"""Makes an array of plain data; raises Refusal for data that can't be made."""
 _MOST = 8
 """Changes that are tried together."""
 _PITCH = "layout.pitch_mm"
@@ -31,11 +31,11 @@ _COUNTS: dict[str, dict[str, str]] = {
     "hex": {"moulds.bed_x_mm": "rings", "moulds.bed_y_mm": "rings"},
     "ring": {"moulds.bed_x_mm": "count", "moulds.bed_y_mm": "bands"},
 }
-"""What makes an array of a kind of layout shorter along each side of the bed."""
+"""Keys that shorten an array of a kind of layout along each side of the bed."""
 
 
 def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
-    """Return the refusal of plain data, its nearest value one that is accepted, or with what has to change as well."""
+    """Return the refusal of plain data with a nearest value that is accepted, or with the further changes needed."""
     if type(refusal) is not Refusal or (refusal.nearest is None and not refusal.field.endswith(_OF_TAIL)):
         return refusal
     changes: dict[str, object] = {refusal.field: refusal.nearest}
@@ -67,14 +67,14 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
 
 
 def _present_pitches(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the pitch by its path, or both of a grid's; {} where the layout has none."""
+    """Return the pitch by its path, or both of a grid's; {} if the layout has none."""
     pitch = at(data, _PITCH)
     both = {f"{_PITCH}.{axis}": mm for axis, mm in enumerate(pitch)} if isinstance(pitch, list | tuple) else {}
     return {_PITCH: pitch} if isinstance(pitch, int | float) else both
 
 
 def _nearer(refusal: Refusal, nearest: Any, data: Mapping[str, Any], judge: Judge) -> object:
-    """Return a bed that is accepted and smaller than the one that was found, where tries between find one."""
+    """Return a bed that is accepted and smaller than the one that was found, if tries between find one."""
     low, high, same = float(str(refusal.value)), float(nearest), 0
     while (middle := math.floor((low + high) * 5) / 10) > low:
         met = _met(data, {refusal.field: middle}, judge)
@@ -140,7 +140,7 @@ def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judg
 
 
 def _met(data: Mapping[str, Any], changes: Mapping[str, object], judge: Judge) -> Refusal | None:
-    """Return what data with changes is refused for; None where it is accepted."""
+    """Return the refusal of data with changes; None if it is accepted."""
     tried = copy.deepcopy(dict(data))
     try:
         for path, value in changes.items():
@@ -170,7 +170,7 @@ def _pitches(refusal: Refusal, data: Mapping[str, Any]) -> Iterator[dict[str, ob
 
 
 def _shorter_slot(data: Mapping[str, Any], judge: Judge) -> dict[str, object]:
-    """Return the longest strap slot, in whole mm, that leaves room for cuts; {} where slots are not the cause."""
+    """Return the longest strap slot, in whole mm, that leaves room for cuts; {} if slots are not the cause."""
     path = "sheet.strap_slot_mm"
     slot = at(data, path)
     if not isinstance(slot, list | tuple) or _met(data, {path: None}, judge) is not None:
@@ -200,7 +200,7 @@ def _refused_for(bed: str, data: Mapping[str, Any], changes: Mapping[str, object
 
 
 def _largest(most: int, fits: Callable[[int], bool]) -> int:
-    """Return the largest whole number below `most` that fits, where all below one that fits do; 0 for none."""
+    """Return the largest whole number below `most` that fits, if all below one that fits do; 0 for none."""
     low, high = 0, most
     while high - low > 1:
         middle = (low + high) // 2

@@ -33,7 +33,7 @@ SHEET = "sheet"
 
 
 class PatchPart(NamedTuple):
-    """A body in its own frame, its name among the parts, the places that it stands at; without any it is in place."""
+    """A body in its own frame, its name among the parts, its places; without any it is in place."""
 
     name: str
     body: Body
@@ -43,8 +43,8 @@ class PatchPart(NamedTuple):
 def patch_parts(array: Array) -> tuple[PatchPart, ...]:
     """Return the distinct bodies of the whole patch: the silicone that the units share, then each distinct unit's own.
 
-    Units that are cast in one pour with the sheet are there with what is bought for them, but for a circuit of their
-    own: the array's takes its place.
+    Units that are cast in one pour with the sheet are there with their bought parts, but without a circuit of their
+    own: the array's replaces it.
     """
     way = construction_of(array.construction, array.cast)
     shared = way.bodies(array)
@@ -89,8 +89,8 @@ def _at_places(array: Array, part: PatchPart) -> tuple[Body, ...]:
 class PatchMoulds(MouldSet):
     """The silicone of an array besides its units, as it is cast, and the tools and pours of it.
 
-    `spec` is that of the array's unit with the patch's own layers (see `patch_moulds`): what checks and procedure read
-    of lengths, silicones and lab. Frame of the tools, mm.
+    `spec` is that of the array's unit with the patch's own layers (see `patch_moulds`): the lengths, silicones and lab
+    for checks and procedure. Frame of the tools, mm.
     """
 
     array: Array | None = None
@@ -114,7 +114,7 @@ class PatchMoulds(MouldSet):
 
     @cached_property
     def geometry(self) -> str:
-        """What the geometry reads, as a text: places, sheet and lengths, no silicone and no name."""
+        """The inputs of the geometry, as a text: places, sheet and lengths, no silicone and no name."""
         array = self.arranged
         distinct = [to_json(with_formats(geometric(unit))) for unit in array.units]
         places = [(p.name, p.x, p.y, p.angle_deg, array.units.index(p.unit)) for p in array.places]
@@ -142,7 +142,7 @@ class PatchMoulds(MouldSet):
 
     @cached_property
     def pushed_in(self) -> tuple[Body, ...]:
-        """The units that pockets hold, at their places over the sheet as it is cast."""
+        """The units in the pockets, at their places over the sheet as it is cast."""
         if not self.construction.own_tails:
             return ()
         low = self.arranged.sheet.low
@@ -150,10 +150,10 @@ class PatchMoulds(MouldSet):
 
     @cached_property
     def together(self) -> tuple[tuple[str, tuple[Shape, ...]], ...]:
-        """What shares the space of the patch, by name: of pockets the units, and the sheet as it lies round them.
+        """The solids in the space of the patch, by name: of pockets the units, and the sheet stretched around them.
 
-        A pocket is stretched to its unit's radius: what the hold takes of the sheet is none of the overlap. A turned
-        unit's polygon lies within the circle round the pocket's.
+        A pocket is stretched to its unit's radius: the hold is no overlap. A turned unit's polygon is within the circle
+        round the pocket's.
         """
         if not self.construction.own_tails:
             return super().together
@@ -170,7 +170,7 @@ class PatchMoulds(MouldSet):
 
     @cached_property
     def cast_flat(self) -> PatchMoulds | None:
-        """The flat tools and pours of the inner layers alone, where the last pour is cast round the limb; else None.
+        """The flat tools and pours of only the inner layers, if the last pour is cast around the limb; otherwise None.
 
         Its silicone, motors and circuit are those of the whole array, laid flat.
         """
@@ -190,16 +190,16 @@ class PatchMoulds(MouldSet):
 
     @property
     def makes(self) -> str:
-        """What comes out of the mould."""
+        """The casting out of the mould."""
         return "sheet" if self.construction.own_tails else "patch"
 
     @property
     def across(self) -> str:
-        """What to measure across."""
+        """The lengths to measure."""
         x0, y0, x1, y1 = self.arranged.sheet.outline
         if self.arranged.cast == "curved":
             along, radius = y1 - y0, self.arranged.radius_mm or 0.0
-            return f"The sheet: {along:.2f} mm along the limb. Every unit lies on a tube of radius {radius:.2f} mm."
+            return f"The sheet: {along:.2f} mm along the limb. Every unit sits on a tube of radius {radius:.2f} mm."
         middles = f" Between the middles of neighbouring units: {pitch:.2f} mm." if (pitch := self._pitch) else ""
         return f"The sheet: {x1 - x0:.2f} x {y1 - y0:.2f} mm, before it is bent.{middles}"
 
@@ -211,12 +211,12 @@ class PatchMoulds(MouldSet):
 
     @property
     def poured_across(self) -> tuple[str, float]:
-        """The widest surface that lies open in a pour: the sheet's longer side, mm."""
+        """The widest open surface of a pour: the sheet's longer side, mm."""
         x0, y0, x1, y1 = self.arranged.sheet.outline
         return "sheet", max(x1 - x0, y1 - y0)
 
     def greased(self, step: Step) -> str:
-        """Return what gets petroleum jelly before a cup is put on, in the construction's words."""
+        """Return the faces that get petroleum jelly before a cup is put on, in the construction's words."""
         return self.construction.greased(self.arranged, step.index)
 
     @property
@@ -235,7 +235,7 @@ class PatchMoulds(MouldSet):
 
     @cached_property
     def plan(self) -> Plan:
-        """Tools and pours. Raises Refusal where the moulds can't be made."""
+        """Tools and pours. Raises Refusal if the moulds can't be made."""
         if self.altered:
             return self.altered
         try:
@@ -269,12 +269,12 @@ class PatchMoulds(MouldSet):
 
 
 def patch_moulds(array: Array, altered: Plan | None = None) -> PatchMoulds:
-    """Return the mould set of an array's sheet; `altered` stands in for its plan: a set with a fault, for tests."""
+    """Return the mould set of an array's sheet; `altered` replaces its plan: a set with a fault, for tests."""
     return PatchMoulds(patch_spec(array), altered, array=array)
 
 
 def patch_spec(array: Array) -> Spec:
-    """Return the spec that stands for the sheet: the unit's lengths, silicones and lab, and the sheet as its layers."""
+    """Return the spec of the sheet: the unit's lengths, silicones and lab, and the sheet as its layers."""
     unit, way = array.unit, construction_of(array.construction, array.cast)
     layers = (CastLayer(material=array.sheet.material, wall_mm=array.sheet.margin_mm, cap_mm=array.sheet.thickness_mm),)
     if not way.own_tails:

@@ -20,11 +20,11 @@ FINEST = 2.0
 """Length of an edge, at most, before it is mapped, mm: a long one would cut across the arc."""
 
 
-def worn(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mesh of a cast solid as it lies round the limb: vertices (n, 3) in mm and faces (m, 3).
+def bent(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mesh of a cast solid around the limb: vertices (n, 3) in mm and faces (m, 3).
 
     x becomes the angle x over the middle's radius, z the distance from the limb's axis, which is y: the sheet's middle
-    keeps its length. The middle of the array is on top. What was cast curved lies so already. Raises ValueError for an
+    keeps its length. The middle of the array is on top. A curved casting is so already. Raises ValueError for an
     array that is worn flat.
     """
     radius, middle = array.radius_mm, array.middle_radius_mm
@@ -38,7 +38,7 @@ def worn(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
 
 
 def wrapped(points: np.ndarray, radius: float, middle: float) -> np.ndarray:
-    """Return points (n, 3) of the flat frame as they lie round a limb (mm)."""
+    """Return points (n, 3) of the flat frame, bent around a limb (mm)."""
     angle, distance = points[:, 0] / middle, radius + points[:, 2]
     return np.column_stack([distance * np.sin(angle), points[:, 1], distance * np.cos(angle)])
 
@@ -54,7 +54,7 @@ def limb(array: Array) -> Manifold:
 SIZE = (960, 640)
 """Of a picture, px."""
 FOLDER = "pictures"
-WORN = f"{FOLDER}/patch-worn.png"
+WORN = f"{FOLDER}/patch-bent.png"
 GAP = 8.0
 """Between two pieces taken apart, mm."""
 _Eye = tuple[float, float, float]
@@ -65,11 +65,11 @@ SKIN_SIDE, BACK, ABOVE = (0.45, -0.8, -0.9), (0.45, -0.8, 0.9), (0.45, -1.0, 0.5
 
 
 def picture_names(moulds: PatchMoulds) -> dict[str, str]:
-    """Return what each picture shows, by its path: from the skin's side, from the back, the tools, each pour."""
+    """Return the scene of each picture, by its path: from the skin's side, from the back, the tools, each pour."""
     names = {
         f"{FOLDER}/patch-skin-side.png": "The patch from the skin's side",
         f"{FOLDER}/patch-back.png": "The patch from its back",
-        f"{FOLDER}/tools.png": "The tools and what is cast, taken apart",
+        f"{FOLDER}/tools.png": "The tools and the silicone, taken apart",
     }
     if moulds.arranged.radius_mm is not None:
         names[WORN] = "The patch round its limb"
@@ -95,17 +95,17 @@ def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> Surfa
 
 
 def _worn(moulds: PatchMoulds) -> Iterator[Surface]:
-    """Yield the limb, and the patch's bodies as they lie round it."""
+    """Yield the limb, and the patch's bodies around it."""
     array = moulds.arranged
     yield Surface(*arrays(limb(array)), SKIN)
     for body in patch_bodies(array):
-        yield Surface(*worn(array, moulds.mesh(body)), body.colour)
+        yield Surface(*bent(array, moulds.mesh(body)), body.colour)
 
 
 def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:
     """Yield tools and cast layers and how far each is moved (mm) to be shown apart.
 
-    One over the other in the order of the pours; the pieces of a tool beside each other.
+    One over the other in the order of the pours; the pieces of a tool next to each other.
     """
     plan, top = moulds.plan, -np.inf
     first = [tool for tool in plan.tools if tool.step is None and tool.kind != "blade"]
@@ -125,13 +125,13 @@ def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float,
 
 
 def laid_elsewhere(plan: Plan, step: Step) -> bool:
-    """Tell whether what a pour casts is taken out and laid into the last pour in another place."""
+    """Tell whether a pour's silicone is taken out and inserted into the last pour at another place."""
     last = plan.steps[-1]
     return step.index < last.index and not set(step.layer) <= set(last.earlier)
 
 
 def _of_pour(moulds: PatchMoulds, step: Step) -> Iterator[tuple[Body, ...]]:
-    """Yield what stands in one pour alone, from below: base and filaments, what is laid in, cup, what is cast, lid."""
+    """Yield the parts of one pour, from below: base and filaments, inserted layers, cup, silicone, lid."""
     plan, colours = moulds.plan, {body.step: body for body in moulds.unit}
     own = (*plan.standing(step, "base"), *plan.standing(step, "stub"))
     yield tuple(tool for tool in own if tool.step == step.index)

@@ -1,4 +1,4 @@
-"""Tools that are larger than the bed: where they are cut, the weep of a seam, labels of the pieces."""
+"""Tools that are larger than the bed: their cuts, the weep of a seam, labels of the pieces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from unitcad.shape.lettering import HEIGHT
 from unitcad.spec import Spec
 
 ROUNDING = 0.97
-"""Of the limit, at most: lengths stand for what the check measures on the meshes, which is within 3 % of it."""
+"""Fraction of the limit: the computed weep is within 3 % of the one that the check measures on the meshes."""
 
 
 def sheet_mm2(array: Array) -> float:
@@ -29,7 +29,7 @@ def sheet_mm2(array: Array) -> float:
 
 
 def weep(array: Array, seams: Sequence[Seam], outline: Box, heights: tuple[float, float]) -> float:
-    """Return what a tool's seams hold, mm3. `heights` of what is cut within the sheet and beside it, mm."""
+    """Return the volume in a tool's seams, mm3. `heights` of the cut parts within the sheet and next to it, mm."""
     x0, y0, x1, y1 = array.sheet.outline
     total = 0.0
     for seam in seams:
@@ -42,7 +42,7 @@ def weep(array: Array, seams: Sequence[Seam], outline: Box, heights: tuple[float
 def too_much(
     array: Array, outline: Box, heights: tuple[float, float], layer_mm3: float
 ) -> Callable[[Sequence[Seam]], str]:
-    """Return what says why seams take more of a layer's volume than C250 lets them, "" where they do not.
+    """Return the reason why seams take more of a layer's volume than C250 allows, "" if they do not.
 
     `outline` and `heights` as those of `weep`.
     """
@@ -61,10 +61,10 @@ Side = Literal["top", "bottom", "left", "right"]
 
 
 class Strip(NamedTuple):
-    """The strip of a tool that texts stand on, all round inside `outer` and away from it by `inset`, mm.
+    """The strip of a tool for texts, all around inside `outer` and away from it by `inset`, mm.
 
     `stroke` of the characters; `heights` from z to z that are engraved. Pieces are looked at for a side of the tool in
-    the order `first`, then the rest. `taken`: what texts keep clear of; where that is None they stand in the middle.
+    the order `first`, then the rest. `taken`: areas to avoid; with None texts are in the middle.
     """
 
     outer: Box
@@ -76,9 +76,9 @@ class Strip(NamedTuple):
 
 
 def on_pieces(strip: Strip, rows: Sequence[Sequence[str]], seams: Sequence[Seam]) -> list[Shape]:
-    """Draw a row of texts on each piece of a tool: the first of the `rows` that has room there, else the last.
+    """Draw a row of texts on each piece of a tool: the first of the `rows` that has room there, otherwise the last.
 
-    Where the tool is cut the piece's number stands after them. A piece without an outer edge has none.
+    If the tool is cut the piece's number follows them. A piece without an outer edge has none.
     """
     x0, y0, x1, y1 = strip.outer
     columns, lines = intervals((x0, x1), seams, "x"), intervals((y0, y1), seams, "y")[::-1]
@@ -112,7 +112,7 @@ def _on_piece(strip: Strip, rows: Sequence[Sequence[str]], within: Mapping[Side,
 
 
 def _on_side(strip: Strip, side: Side, texts: Sequence[str], start: float) -> Iterator[Shape]:
-    """Draw texts on one side of the strip, beside each other, from `start` along it."""
+    """Draw texts on one side of the strip, one after the other, from `start` along it."""
     x0, y0, x1, y1 = strip.outer
     high = HEIGHT * strip.stroke
     if side in ("top", "bottom"):
@@ -125,7 +125,7 @@ def _on_side(strip: Strip, side: Side, texts: Sequence[str], start: float) -> It
 
 
 def _start(strip: Strip, side: Side, texts: Sequence[str], within: Interval) -> float | None:
-    """Return where texts begin on a side: in the middle, or beside its margin, clear of what is taken; None: nowhere.
+    """Return the start of texts on a side: in the middle, or next to its margin, clear of taken areas, or None.
 
     `within` is the piece's interval along that side.
     """
@@ -154,10 +154,10 @@ def _margin(strip: Strip, side: Side, within: Interval) -> float:
 EDGE = 0.5
 """From a tooth to the sheet's edge, at least, mm: beyond it a groove would cut the tooth."""
 THROUGH = 2.5
-"""A stepping line is straight so far to either side of a row's middle, mm: fins of the row end beside it."""
+"""A stepping line is straight so far to either side of a row's middle, mm: fins of the row end next to it."""
 
 STEPS = (0,), (0, 1, 2, 1)
-"""What stepping lines follow from row to row, in half pitches: two steps to one side leave room for a tooth."""
+"""Steps of lines from row to row, in half pitches: two steps to one side leave room for a tooth."""
 
 
 def box_feature(x0: float, y0: float, x1: float, y1: float) -> Feature:
@@ -186,10 +186,10 @@ def sized(
     close: Sequence[Feature],
     under: Sequence[Feature] = (),
 ) -> tuple[Sized, ...]:
-    """Return a tool with its `outline` along x and along y, where it exceeds the bed.
+    """Return a tool with its `outline` along x and along y, if it exceeds the bed.
 
-    Cuts lie between the features `clear` where that gives pieces that fit, else between `close`, which none may meet.
-    A straight line may cross what lies `under` the tool, teeth stand clear of it. Raises Refusal for a sheet that is
+    Cuts are between the features `clear` if that gives pieces that fit, otherwise between `close`, which none may meet.
+    A straight line may cross features `under` the tool, teeth may not. Raises Refusal for a sheet that is
     too narrow for a dovetail.
     """
     moulds = array.unit.moulds
@@ -218,13 +218,13 @@ def longer_than_bed(spec: Spec, length: float) -> bool:
 
 
 def intervals(ends: Interval, seams: Iterable[Seam], across: Axis) -> list[Interval]:
-    """Return what each piece of a tool has to itself along an axis, between the teeth at its ends, from below."""
+    """Return the extent of each piece of a tool along an axis, between the teeth at its ends, from below."""
     marks = sorted(seam.extent for seam in seams if seam.across == across)
     return [(a[1], b[0]) for a, b in pairwise([(ends[0], ends[0]), *marks, (ends[1], ends[1])])]
 
 
 def _across(array: Array, across: Axis) -> Interval:
-    """Return where along a seam its teeth may stand: within the sheet, clear of the groove round it."""
+    """Return the possible places of teeth along a seam: within the sheet, clear of the groove round it."""
     x0, y0, x1, y1 = array.sheet.outline
     low, high = (y0, y1) if across == "x" else (-x1, -x0)
     least = LARGE.tip + 2 * EDGE
@@ -252,7 +252,7 @@ def _stepping(array: Array, features: Sequence[Feature]) -> Iterator[Place]:
 
 
 def _passes(row: Sequence[Placed], start: float, pitch: float) -> float:
-    """Return where a row of places is passed: the gap, or the place beside the row, that is nearest to `start`."""
+    """Return the point at which a line passes a row: the gap, or the place next to the row, nearest to `start`."""
     beside = [row[0].x - pitch / 2, row[-1].x + pitch / 2]
     if not beside[0] < start < beside[1]:
         return start
@@ -260,7 +260,7 @@ def _passes(row: Sequence[Placed], start: float, pitch: float) -> float:
 
 
 def _line(passed: Sequence[tuple[float, float]], through: float) -> tuple[Point, ...]:
-    """Return the line that passes each row (y, x), `through` mm to either side of it straight where it turns there."""
+    """Return the line that passes each row (y, x), straight for `through` mm to either side if it turns there."""
     line = [(passed[0][1], -FAR)]
     for (y, x), (above, after) in pairwise(passed):
         if x != after:
@@ -269,7 +269,7 @@ def _line(passed: Sequence[tuple[float, float]], through: float) -> tuple[Point,
     line = list(dict.fromkeys([*line, (passed[-1][1], FAR)]))
     kept = [line[0]]
     for point, after in pairwise(line[1:]):
-        # None where the line goes straight on.
+        # None if the line goes straight on.
         if to_segment(point, kept[-1], after) > 1e-3:
             kept.append(point)
     return (*kept, line[-1])

@@ -58,18 +58,18 @@ BESIDE_SLOT = 2.0
 LEAST_THICKNESS = 0.5
 """Of a sheet, mm."""
 HOLD_MM = 0.2
-"""How much smaller than its unit's a pocket's radius is where nothing else is asked for, mm."""
+"""Default difference of the radii of unit and pocket, mm."""
 MOST_HOLD = 0.25
 """Hoop strain of a pocket round its unit, at most (assumed)."""
 BUCKLES = "assumed: a sheet stretched further buckles, and squeezes the unit out of round"
 
 
 def middle_radius(asked: AskedArray, way: Construction, units: list[Spec]) -> float | None:
-    """Return the radius of the sheet's middle round the limb, mm; None where the array is worn flat."""
-    if asked.body.radius_mm is None:
+    """Return the radius of the sheet's middle round the limb, mm; None if the array is worn flat."""
+    if asked.limb.radius_mm is None:
         return None
-    level = way.level(_distinct(units), _thickness(asked, way, _distinct(units)), asked.body.radius_mm)
-    return asked.body.radius_mm + (mm(level.low) + mm(level.high)) / 2
+    level = way.level(_distinct(units), _thickness(asked, way, _distinct(units)), asked.limb.radius_mm)
+    return asked.limb.radius_mm + (mm(level.low) + mm(level.high)) / 2
 
 
 def _distinct(units: list[Spec]) -> tuple[Spec, ...]:
@@ -77,10 +77,10 @@ def _distinct(units: list[Spec]) -> tuple[Spec, ...]:
 
 
 def _thickness(asked: AskedArray, way: Construction, units: tuple[Spec, ...]) -> float:
-    """Return the sheet's thickness; where none is asked for, the construction's, or as much as there is room for."""
+    """Return the sheet's thickness; if none is asked for, the construction's, or as much as there is room for."""
     if asked.sheet.thickness_mm is not None:
         return asked.sheet.thickness_mm
-    most = down(way.level(units, way.thickness_mm, asked.body.radius_mm).most)
+    most = down(way.level(units, way.thickness_mm, asked.limb.radius_mm).most)
     return min(way.thickness_mm, most) if most >= LEAST_THICKNESS else way.thickness_mm
 
 
@@ -92,16 +92,16 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
     material = table.material or distinct[0].layers[-1].material
     catalogue.choose("sheet.material", material, known)
     hold = HOLD_MM if table.hold_mm is None else table.hold_mm
-    level = way.level(distinct, thickness, asked.body.radius_mm)
+    level = way.level(distinct, thickness, asked.limb.radius_mm)
     if thickness > level.most + 1e-9:
-        limit = f"beside the units' tails and backs there is room for a sheet of {level.most:.4g} mm"
+        limit = f"between the units' tails and backs there is room for a sheet of {level.most:.4g} mm"
         raise Refusal(
             "sheet.thickness_mm", thickness, limit, down(level.most) if level.most >= LEAST_THICKNESS else None
         )
     if way.own_tails:
         _check_hold(hold, distinct, float(known[material].elongation_pct))
     elif table.hold_mm is not None:
-        raise Refusal("sheet.hold_mm", table.hold_mm, f"{asked.array} has no pockets that hold units: leave it out")
+        raise Refusal("sheet.hold_mm", table.hold_mm, f"{asked.array} has no pockets for units: leave it out")
     margin = table.margin_mm
     radii = [unit.diameter_mm / 2 for unit in units]
     x0 = min(p.x - r for p, r in zip(points, radii, strict=True)) - margin
@@ -190,7 +190,7 @@ LONGEST = 1500.0
 
 
 def check_length(asked: AskedArray, points: Sequence[Point], outline: Box) -> None:
-    """Raise Refusal for a sheet that is too long: for what takes most of its length, with the value that fits."""
+    """Raise Refusal for a sheet that is too long: for the key with most of its length, with the value that fits."""
     for axis, ways in enumerate(zip(*((point.x, point.y) for point in points), strict=True)):
         length = outline[axis + 2] - outline[axis]
         over, span = length - LONGEST, max(ways) - min(ways)
@@ -207,7 +207,7 @@ def check_length(asked: AskedArray, points: Sequence[Point], outline: Box) -> No
 
 
 def _beside(asked: AskedArray, axis: int) -> list[tuple[str, float]]:
-    """Return what the sheet has at either end along an axis: field and value, mm."""
+    """Return the sheet's ends along an axis: field and value, mm."""
     sheet = asked.sheet
     found = [("sheet.margin_mm", sheet.margin_mm)]
     if sheet.strap_slot_mm and axis == 0:
@@ -222,7 +222,7 @@ def _of_layout(asked: AskedArray, axis: int, span: float) -> tuple[str, float, f
         return "layout.points_mm", round(span, 3), 0.0
     if layout["kind"] == "ring":
         if axis == 0:
-            return "body.radius_mm", asked.body.radius_mm or 0.0, 2 * math.pi * (1 - 1 / layout["count"])
+            return "limb.radius_mm", asked.limb.radius_mm or 0.0, 2 * math.pi * (1 - 1 / layout["count"])
         pitch, field = layout["band_pitch_mm"], "layout.band_pitch_mm"
     else:
         pitch, field = layout["pitch_mm"], "layout.pitch_mm"

@@ -64,19 +64,19 @@ def tail_half_width(unit: Spec) -> float:
 
 
 def tail_length(unit: Spec) -> float:
-    """Return how far a unit's tail or wires stand out of it, mm."""
+    """Return the length of a unit's tail or wires outside it, mm."""
     return unit.fpcb.tail_length_mm if unit.fpcb else unit.wires.length_mm if unit.wires else 0.0
 
 
 def angles(points: Sequence[Point], units: Sequence[Spec], asked: Mapping[int, float], sheet: Sheet) -> list[float]:
-    """Return each unit's angle, degrees: what was `asked` for, by its number, else the nearest free way.
+    """Return each unit's angle, degrees: the `asked` one, by its number, or the nearest free way.
 
     Raises Blocked for the first unit whose tail finds none.
     """
     try:
         return _laid(points, units, asked, sheet, out=True)
     except Blocked:
-        # A tail that was turned to come out may stand in the way of another.
+        # A tail that was turned to come out may block another.
         return _laid(points, units, asked, sheet, out=False)
 
 
@@ -108,9 +108,9 @@ def _laid(
                 break
             drawn = tails(units[i], points[i].x, points[i].y, angle, i)
             why = in_the_way(drawn, i, points, radii, near[i], laid, slots)
-            if not why and (free is None or not ends_hidden(units[i], drawn, sheet)):
+            if not why and (free is None or not ends_covered(units[i], drawn, sheet)):
                 free = angle, drawn
-                if not (out and ends_hidden(units[i], drawn, sheet)):
+                if not (out and ends_covered(units[i], drawn, sheet)):
                     break
         if free is None:
             longest = _longest(i, candidates(points[i]), points, units, radii, near[i], laid, slots)
@@ -149,7 +149,7 @@ def in_the_way(
     laid: Sequence[Sequence[Tail]],
     slots: Sequence[Box],
 ) -> str:
-    """Return what a unit's tails run into; "" for nothing."""
+    """Return the obstacle of a unit's tails; "" for none."""
     for tail in drawn:
         start, end = (tail.x0, tail.y0), (tail.x1, tail.y1)
         for j in near:
@@ -176,7 +176,7 @@ def _longest(
     laid: Sequence[Sequence[Tail]],
     slots: Sequence[Box],
 ) -> float:
-    """Return the longest tail that finds a way at one of the angles, mm in steps of 0.1; 0 where none does."""
+    """Return the longest tail that finds a way at one of the angles, mm in steps of 0.1; 0 if none does."""
     free = [tails_of if j != owner else [] for j, tails_of in enumerate(laid)]
 
     def fits(tenths: int) -> bool:
@@ -195,11 +195,11 @@ def _longest(
     return low / 10
 
 
-def ends_hidden(unit: Spec, drawn: Sequence[Tail], sheet: Sheet) -> bool:
+def ends_covered(unit: Spec, drawn: Sequence[Tail], sheet: Sheet) -> bool:
     """Tell whether a unit's tails end under the sheet."""
     exit = dimensions(unit).exit
     if exit is None or exit.high > sheet.low + EPS:
-        return False  # the tail lies on the sheet
+        return False  # the tail is on the sheet
     return any(_way_out(start, along, sheet, EPS) > 0 for tail in drawn for start, along in _end(tail))
 
 
@@ -244,14 +244,14 @@ MOST_NAMES = 12
 
 
 @dataclass(frozen=True)
-class HiddenTail:
+class CoveredTail:
     """A tail, or a bundle of wires, whose end the sheet covers.
 
-    short_mm    from its end to where all of its width is out, along it
+    short_mm    from its end to the place at which all of its width is out, along it
     length_mm   of the tail that would come out, beyond the unit's edge
     field       the spec's key of that length
-    blocked_by  what stands in the straight way there; "" where it is free
-    angle_deg   at which the tail as it is would come out; None where none of the angles that are tried is free
+    blocked_by  the obstacle of the straight way there; "" if it is free
+    angle_deg   at which the tail as it is would come out; None if none of the angles that are tried is free
     """
 
     place: str
@@ -262,8 +262,8 @@ class HiddenTail:
     angle_deg: float | None
 
 
-def hidden_tails(array: Array) -> tuple[HiddenTail, ...]:
-    """Return the tails that end under the sheet, in the order of places; () where the sheet covers none."""
+def covered_tails(array: Array) -> tuple[CoveredTail, ...]:
+    """Return the tails that end under the sheet, in the order of places; () if the sheet covers none."""
     if not construction_of(array.construction, array.cast).own_tails:
         return ()
     points = [Point(place.name, place.x, place.y) for place in array.places]
@@ -271,7 +271,7 @@ def hidden_tails(array: Array) -> tuple[HiddenTail, ...]:
     laid = [_tails(place, i) for i, place in enumerate(array.places)]
     found = []
     for i, place in enumerate(array.places):
-        if not ends_hidden(place.unit, laid[i], array.sheet):
+        if not ends_covered(place.unit, laid[i], array.sheet):
             continue
         short = to_edge(laid[i], array.sheet)
         length = tail_length(place.unit) + short
@@ -284,38 +284,38 @@ def hidden_tails(array: Array) -> tuple[HiddenTail, ...]:
         def free(angle: float, place: Placed = place, i: int = i, near: Sequence[int] = near) -> bool:
             """Tell whether the tail as it is comes out at an angle."""
             turned = tails(place.unit, place.x, place.y, angle, i)
-            if ends_hidden(place.unit, turned, array.sheet):
+            if ends_covered(place.unit, turned, array.sheet):
                 return False
             return not in_the_way(turned, i, points, radii, near, laid, array.sheet.strap_slots)
 
         turn = next((angle for angle in candidates(points[i]) if free(angle)), None)
-        found.append(HiddenTail(place.name, round(short, 2), _typed(length), field, blocked, turn))
+        found.append(CoveredTail(place.name, round(short, 2), _typed(length), field, blocked, turn))
     return tuple(found)
 
 
-def where_they_end(hidden: Sequence[HiddenTail], most_names: int = 0) -> str:
+def where_they_end(covered: Sequence[CoveredTail], most_names: int = 0) -> str:
     """Say how far before the sheet's edge tails end, measured along them, the farthest last."""
 
-    def short(tail: HiddenTail) -> float:
+    def short(tail: CoveredTail) -> float:
         return float(number(tail.short_mm, 2))
 
-    groups = groupby(sorted(hidden, key=short), key=short)
+    groups = groupby(sorted(covered, key=short), key=short)
     first, *others = (f"{number(way)} mm%s at {_names(same, most_names)}" for way, same in groups)
     return listed([first % " before its edge, measured along the tail,", *(other % "" for other in others)])
 
 
-def longer_tails(hidden: Sequence[HiddenTail], most_names: int = 0) -> str:
+def longer_tails(covered: Sequence[CoveredTail], most_names: int = 0) -> str:
     """Say which tails would come out turned, which if they were longer, and which have no straight way there."""
 
-    def wanted(tail: HiddenTail) -> tuple[str, float]:
+    def wanted(tail: CoveredTail) -> tuple[str, float]:
         return tail.field, tail.length_mm
 
-    turned = [(tail.angle_deg, tail) for tail in hidden if tail.angle_deg is not None]
+    turned = [(tail.angle_deg, tail) for tail in covered if tail.angle_deg is not None]
     said = [
         f"With angle_deg = {number(angle)} {_names((tail for _, tail in same), most_names)} would come out as it is."
         for angle, same in groupby(sorted(turned, key=lambda pair: pair[0]), key=lambda pair: pair[0])
     ]
-    straight = [tail for tail in hidden if tail.angle_deg is None]
+    straight = [tail for tail in covered if tail.angle_deg is None]
     free = sorted((tail for tail in straight if not tail.blocked_by), key=wanted)
     said += [
         f"With {field} = {number(length)} {_names(same, most_names)} would reach the edge."
@@ -326,13 +326,13 @@ def longer_tails(hidden: Sequence[HiddenTail], most_names: int = 0) -> str:
     return " ".join(said)
 
 
-def hidden_tails_warning(array: Array) -> list[str]:
-    """Return the warning of tails that end under the sheet; [] where none does."""
-    hidden = hidden_tails(array)
-    if not hidden:
+def covered_tails_warning(array: Array) -> list[str]:
+    """Return the warning of tails that end under the sheet; [] if none does."""
+    covered = covered_tails(array)
+    if not covered:
         return []
     return [
-        f"tails end under the sheet, {where_they_end(hidden, MOST_NAMES)}. {longer_tails(hidden, MOST_NAMES)} "
+        f"tails end under the sheet, {where_they_end(covered, MOST_NAMES)}. {longer_tails(covered, MOST_NAMES)} "
         "Solder wires to a tail that stays under the sheet before its unit goes in"
     ]
 
@@ -346,7 +346,7 @@ def _typed(length: float) -> float:
     return math.ceil(length * 10 - 1e-3) / 10
 
 
-def _names(tails: Iterable[HiddenTail], most: int) -> str:
+def _names(tails: Iterable[CoveredTail], most: int) -> str:
     """Return the tails' places in words; with a `most` only so many, and the number of the others."""
     names = [tail.place for tail in tails]
     return listed([*names[:most], f"{len(names) - most} others"] if 0 < most < len(names) else names)

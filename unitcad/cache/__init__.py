@@ -8,10 +8,10 @@ all who share a folder:
     <root>/data/ab/<key>          checksum, newline, JSON
     <root>/files/ab/<key>         checksum, newline, JSON {"sha256", "size"}
     <root>/content/ab/<sha256>    the bytes, read-only, since results are hard links to them
-    <root>/unitcad-cache.lock     held while a store opens, and while one process collects alone
-    <root>/locks/<key>            held by the process that makes the entry
-    <root>/locks/open-<id>        held by each that has the cache open
-    <root>/tmp/                   what is being written
+    <root>/unitcad-cache.lock     locked while a store opens, and while one process collects
+    <root>/locks/<key>            locked by the process that makes the entry
+    <root>/locks/open-<id>        locked by each process that has the cache open
+    <root>/tmp/                   files being written
 """
 
 from unitcad.cache.collect import DEFAULT_LIMIT_MB, Usage, collect, usage

@@ -1,4 +1,4 @@
-"""Usage of a cache on disk, and removal of what was used longest ago."""
+"""Usage of a cache on disk, and removal of the entries used longest ago."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from unitcad.errors import UnitcadError
 
 DEFAULT_LIMIT_MB = 4096
 GRACE_S = 600.0
-"""While another process has the cache open, what was used within this time is not collected."""
+"""While another process has the cache open, entries used within this time are not collected."""
 
 
 @dataclass(frozen=True)
@@ -28,16 +28,16 @@ class Usage:
 
 
 def usage(root: Path) -> Usage:
-    """Return what the cache at `root` holds. Raises UnitcadError where there is none."""
+    """Return the usage of the cache at `root`. Raises UnitcadError if there is none."""
     _expect(root)
     entries, contents = _scan(root, "data") + _scan(root, "files"), _scan(root, "content")
     return Usage(len(entries), len(contents), sum(size for _, size, _ in entries + contents))
 
 
 def collect(root: Path, limit_bytes: int) -> Usage:
-    """Remove the entries used longest ago until at most `limit_bytes` are left; returns what was removed.
+    """Remove the entries used longest ago until at most `limit_bytes` are left; return the removed usage.
 
-    While another process has the cache open, what was used within GRACE_S stays. Raises UnitcadError where there is no
+    While another process has the cache open, entries used within GRACE_S stay. Raises UnitcadError if there is no
     cache.
     """
     _expect(root)
@@ -99,7 +99,7 @@ def _collect(root: Path, limit: int, newest: float | None) -> Usage:
 
 
 def _contents_of(entry: Path) -> list[str]:
-    """Return the contents that a file's entry keeps; data keep none: what they name is checked when they are read."""
+    """Return the contents that an entry of a file refers to; an entry of data refers to none."""
     if entry.parent.parent.name != "files":
         return []
     try:

@@ -27,9 +27,11 @@ from unitcad.files import regular, write_new
 
 MARK = "unitcad-cache"
 GATE = "unitcad-cache.lock"
-"""The lock held while a store opens, and while one process collects alone."""
+"""The lock of a store that opens, and of the one process that collects."""
 FOLDERS = ("data", "files", "content", "locks", "tmp")
 _POLL_S = 0.01
+_CLAIMS, _CLAIM_S = 40, 0.05
+"""How often a cache that is being deleted is tried, and the pause between, s."""
 _DECODED = 64
 """Entries that a store keeps decoded: variants of a geometry read the same few."""
 
@@ -110,7 +112,7 @@ class DiskStore:
     def size(self, sha256: str) -> int:
         if sha256 in self._held:
             return len(self._held[sha256])
-        # What was verified before is not checked again here: `place` checks it, and content has one size.
+        # Verified contents are not checked again here: `place` checks it, and content has one size.
         if sha256 not in self._verified and not self.has(sha256):
             raise self._missing(sha256)
         return self._verified[sha256][1]
@@ -126,7 +128,7 @@ class DiskStore:
             raise self._missing(sha256) from None
 
     def place(self, sha256: str, target: str | os.PathLike[str]) -> None:
-        """Make a hard link at `target`; a copy where links fail (other disk, no right, no support)."""
+        """Make a hard link at `target`; a copy if links fail (other disk, no right, no support)."""
         if not self.has(sha256):
             raise self._missing(sha256)
         if sha256 in self._held:
@@ -211,7 +213,7 @@ class DiskStore:
                 os.utime(path)
 
     def _write(self, path: Path, content: bytes, shared: bool = False) -> None:
-        """Write a file whole; what results share is read-only, and on the disk when this ends. Raises OSError."""
+        """Write a file whole; shared files are read-only, and on the disk when this ends. Raises OSError."""
         try:
             self._put(path, content, shared)
         except (FileNotFoundError, NotADirectoryError):  # the cache was removed meanwhile
@@ -251,9 +253,9 @@ class DiskStore:
 
 
 def default_root() -> Path:
-    """Return UNITCAD_CACHE, or unitcad in the user's cache folder, where the system keeps such folders.
+    """Return UNITCAD_CACHE, or unitcad in the user's cache folder, on this system.
 
-    Raises UnitcadError where there is no home.
+    Raises UnitcadError if there is no home.
     """
     chosen = os.environ.get("UNITCAD_CACHE")
     if chosen:
@@ -271,7 +273,7 @@ def read(path: Path) -> bytes:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, a link or a whole folder where one of the cache's files belongs; nothing where that fails."""
+    """Remove a file, a link or a whole folder at the place of a cache file; nothing if that fails."""
     try:
         path.unlink(missing_ok=True)
     except OSError:
@@ -290,20 +292,36 @@ def _signature(path: str) -> tuple[int, int, int]:
 
 
 def _claim(root: Path) -> None:
-    """Make a folder a cache, or refuse one that holds something else."""
+    """Make a folder a cache, or refuse one with other contents.
+
+    A cache that another process is deleting has lost its mark and some of its folders: it is waited for.
+    """
+    for left in reversed(range(_CLAIMS)):
+        if _claimed(root, last=not left):
+            return
+        time.sleep(_CLAIM_S)
+
+
+def _claimed(root: Path, last: bool) -> bool:
+    """Make a folder a cache; False for one that may be half deleted, which is refused at the `last` try."""
     try:
         root.mkdir(parents=True, exist_ok=True)
         if not (root / MARK).exists():
             # A process that claims the folder at the same time writes the mark first.
             others = {path.name for path in root.iterdir()} - {MARK, GATE}
             if others not in (set(), set(FOLDERS)) and not (root / MARK).exists():
+                if others <= set(FOLDERS) and not last:
+                    return False
                 raise UnitcadError(f"{root}: is not a cache of unitcad, and not empty; choose another with --cache")
             (root / MARK).write_text("unitcad keeps shared results here; it may be deleted at any time\n", "utf-8")
         for name in FOLDERS:
             (root / name).mkdir(exist_ok=True)
+        return True
     except (FileExistsError, NotADirectoryError):
         raise UnitcadError(f"{root}: is a file, not a folder; choose another with --cache") from None
     except OSError as error:
+        if isinstance(error, FileNotFoundError) and not last:
+            return False
         raise UnitcadError(f"{root}: can't be used as a cache: {error.strerror}") from None
 
 
@@ -314,9 +332,9 @@ def lock(path: Path) -> FileLock:
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold a lock by one thread of one process at a time; a process that dies releases it, and no file stays.
+    """Lock for one thread of one process at a time; a process that dies releases it, and no file stays.
 
-    Where there can be no lock (read-only, no space, no folder) the block runs without: work may then be done twice.
+    If there can be no lock (read-only, no space, no folder) the block runs without: work may then be done twice.
     """
     taken = lock(path)
     if path.parent.is_dir():  # else the lock would make it, and a removed cache would look like another program's
@@ -329,7 +347,7 @@ def held(path: Path) -> Iterator[None]:
 
 
 def free(path: Path) -> bool:
-    """Tell whether nobody holds the lock on a file; the file, left by a process that died, is then removed."""
+    """Tell whether the lock on a file is free; the file, left by a process that died, is then removed."""
     taken = lock(path)
     try:
         taken.acquire(blocking=False)

@@ -1,4 +1,4 @@
-"""Named bytes in a folder, or in an object store that fsspec knows: read, write whole, make if absent, list."""
+"""Named bytes in a folder or in a bucket of S3: read, write whole, make if absent, list."""
 
 from __future__ import annotations
 
@@ -9,25 +9,26 @@ import uuid
 from pathlib import Path
 from typing import Any, Protocol
 
-from unitcad.errors import Missing, UnitcadError, WrongArgument, missing_extra
+from unitcad.errors import UnitcadError, WrongArgument, missing_extra
 from unitcad.files import write_new
 
-_IMPATIENT = {"s3": {"config_kwargs": {"connect_timeout": 5, "read_timeout": 60, "retries": {"max_attempts": 2}}}}
-"""Options of file systems that else try for minutes to reach a server."""
+S3 = "s3://"
+_IMPATIENT = {"connect_timeout": 5, "read_timeout": 60, "retries": {"max_attempts": 2}}
+"""Options of the S3 client, which otherwise tries for minutes to reach a server."""
 
 _ALL = os.R_OK | os.W_OK | os.X_OK
 _HALF = re.compile(r"([a-z][a-z0-9+.-]+):")
 
 
 class Objects(Protocol):
-    """A place for named bytes. Every method raises OSError where the place can't be reached, or refuses."""
+    """A place for named bytes. Every method raises OSError if the place can't be reached, or refuses."""
 
     def get(self, name: str, start: int = 0, end: int | None = None) -> bytes:
         """Return an object, or its bytes from `start` to `end`. Raises FileNotFoundError."""
         ...
 
     def put(self, name: str, content: bytes) -> None:
-        """Write an object whole, in place of what is there."""
+        """Write an object whole, and replace an existing one."""
         ...
 
     def create(self, name: str, content: bytes) -> bool:
@@ -35,7 +36,7 @@ class Objects(Protocol):
         ...
 
     def size(self, name: str) -> int | None:
-        """Return an object's bytes; None where there is none."""
+        """Return an object's bytes; None if there is none."""
         ...
 
     def sizes(self, below: str) -> dict[str, int]:
@@ -100,28 +101,16 @@ class FolderObjects:
         return fresh
 
 
-class FsspecObjects:
-    """Objects of a file system of fsspec, such as an S3-compatible store. Its own settings say how it is reached.
-
-    Where a file system can't make a file only if it is absent, the last of several writers at one moment wins.
-    """
+class S3Objects:
+    """Objects of a bucket of S3 or of a compatible server, which s3fs finds by its settings and the environment."""
 
     def __init__(self, address: str) -> None:
         try:
-            import fsspec
+            import s3fs
         except ImportError:
-            raise missing_extra("store", f"--store {address}: needs fsspec") from None
-        protocol = address.partition("://")[0]
-        try:
-            options = {"use_listings_cache": False, "skip_instance_cache": True, **_IMPATIENT.get(protocol, {})}
-            self.fs: Any
-            self.fs, self.root = fsspec.core.url_to_fs(address, **options)
-        except ImportError as error:
-            raise Missing(f"--store {address}: {error}") from None
-        except OSError as error:
-            raise UnitcadError(f"--store {address}: can't be reached ({error})") from None
-        except (ValueError, TypeError) as error:
-            raise UnitcadError(f"--store {address}: not an address of a store ({error})") from None
+            raise missing_extra("store", f"--store {address}: needs s3fs") from None
+        self.fs: Any = s3fs.S3FileSystem(use_listings_cache=False, skip_instance_cache=True, config_kwargs=_IMPATIENT)
+        self.root = address.removeprefix(S3)
 
     def get(self, name: str, start: int = 0, end: int | None = None) -> bytes:
         with _plain_errors():
@@ -139,10 +128,6 @@ class FsspecObjects:
                 self.fs.pipe_file(f"{self.root}/{name}", content, mode="create")
             except FileExistsError:
                 return False
-            except (NotImplementedError, ValueError, TypeError):
-                if self.size(name) is not None:
-                    return False
-                self.put(name, content)
             return True
 
     def size(self, name: str) -> int | None:
@@ -155,44 +140,34 @@ class FsspecObjects:
     def sizes(self, below: str) -> dict[str, int]:
         with _plain_errors():
             found = self.fs.find(f"{self.root}/{below}", detail=True)
-        start = len(self.fs._strip_protocol(self.root)) + 1
+        start = len(self.root) + 1
         return {path[start:]: info["size"] for path, info in found.items()}
 
 
 def objects_at(address: str) -> Objects:
-    """Return the objects at an address: a path, file://PATH, or what fsspec knows (s3://bucket/path).
-
-    Raises UnitcadError for an address that is none, and Missing without the extra for it.
-    """
-    folder = _folder_of(address)
-    return FsspecObjects(address) if folder is None else FolderObjects(Path(folder))
+    """Return the objects at an absolute address. Raises Missing without the extra for S3."""
+    return S3Objects(address) if address.startswith(S3) else FolderObjects(Path(address))
 
 
 def absolute(address: str) -> str:
-    """Return an address as every process may use it: that of a folder as its path from the root.
+    """Return the address of a store for every process: the path of a folder from the root, or s3://bucket/path.
 
-    Raises WrongArgument for half an address, such as s3:/bucket.
+    Raises WrongArgument for another kind of address.
     """
-    folder = _folder_of(address)
-    if folder is None:
-        return address
-    if half := _HALF.match(folder):
-        why = f"an address begins with {half[1]}://; a folder of that name is ./{folder}"
-        raise WrongArgument("store", address, why, folder.replace(":", "://", 1).replace(":///", "://"))
-    return str(Path(folder).absolute())
-
-
-def _folder_of(address: str) -> str | None:
-    """Return the folder of a path, file://PATH or local://PATH; None for what fsspec knows."""
-    scheme, parted, path = address.partition("://")
-    if not parted or len(scheme) == 1:
-        return address
-    return path if scheme in ("file", "local") else None
+    scheme, parted, rest = address.partition("://")
+    if not address or (parted and len(scheme) > 1 and (scheme != "s3" or not rest.strip("/"))):
+        raise WrongArgument("store", address, "takes a folder, or a bucket of S3 such as s3://bucket/path", "store")
+    if scheme == "s3" and parted:
+        return address.rstrip("/")
+    if half := _HALF.match(address):
+        why = f"an address begins with {half[1]}://; a folder of that name is ./{address}"
+        raise WrongArgument("store", address, why, address.replace(":", "://", 1).replace(":///", "://"))
+    return str(Path(address).absolute())
 
 
 @contextlib.contextmanager
 def _plain_errors():
-    """Turn what a file system's library raises into OSError: each library has its own errors for a lost connection."""
+    """Turn the errors of a file system's library into OSError: libraries differ in them."""
     try:
         yield
     except (OSError, UnitcadError):

@@ -5,7 +5,7 @@
     <address>/entries/ab/<key>        checksum, newline, JSON
     <address>/packs/ab/<sha256>       records of several variants in a row
 
-Whatever is read is compared with its SHA-256. What was cut on the way is read again.
+All content is compared with its SHA-256 when it is read. Truncated content is read again.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _AT_ONCE = 8
 class SharedStore:
     """A store at an address that any number of processes on any number of machines use at once.
 
-    `claim` makes the place a store, or refuses one that holds something else. All methods raise OSError where the place
-    can't be reached after TRIES tries.
+    `claim` makes the place a store, or refuses one with other contents. All methods raise OSError if the place can't be
+    reached after TRIES tries.
     """
 
     def __init__(self, address: str) -> None:
@@ -51,7 +51,7 @@ class SharedStore:
         return isinstance(self.objects, FolderObjects)
 
     def claim(self) -> None:
-        """Make the place a store. Raises UnitcadError where it can't be reached, or holds something else."""
+        """Make the place a store. Raises UnitcadError if it can't be reached, or has other contents."""
         try:
             if _tried(lambda: self.objects.size(MARK), 2) is None:
                 if isinstance(self.objects, FolderObjects) and self.objects.root.is_dir():
@@ -69,7 +69,7 @@ class SharedStore:
             raise UnitcadError(f"--store {self.address}: can't be reached ({_line(error)})") from None
 
     def expect(self) -> None:
-        """Raise UnitcadError where there is no store at the address, or it can't be reached."""
+        """Raise UnitcadError if there is no store at the address, or it can't be reached."""
         try:
             if _tried(lambda: self.objects.size(MARK), 2) is None:
                 raise UnitcadError(f"{self.address}: there is no store of unitcad")
@@ -77,7 +77,7 @@ class SharedStore:
             raise UnitcadError(f"{self.address}: can't be reached ({_line(error)})") from None
 
     def keep(self, content: bytes, *, kind: str = "content", anew: bool = False) -> str:
-        """Keep content; return its SHA-256 (hex). What is there is not written again, unless `anew`."""
+        """Keep content; return its SHA-256 (hex). Existing content is not written again, unless `anew`."""
         sha256 = digest(content)
         name = _name(kind, sha256)
         if anew:
@@ -89,7 +89,7 @@ class SharedStore:
         return sha256
 
     def size(self, sha256: str, kind: str = "content") -> int | None:
-        """Return the bytes of what is there of a kind; None where there is nothing."""
+        """Return the stored bytes of a kind; None if there is nothing."""
         return _tried(lambda: self.objects.size(_name(kind, sha256)))
 
     def noted(self, sha256: str) -> bool:
@@ -108,7 +108,7 @@ class SharedStore:
                 list(pool.map(lambda content: self.keep(content, anew=anew), waiting))
 
     def content(self, sha256: str) -> bytes:
-        """Return content by its SHA-256. Raises MissingContent where it is not there, or damaged."""
+        """Return content by its SHA-256. Raises MissingContent if it is not there, or damaged."""
         return self._whole(_name("content", sha256), lambda found: digest(found) == sha256)
 
     def part(self, pack: str, start: int, end: int, sha256: str) -> bytes:
@@ -116,7 +116,7 @@ class SharedStore:
         return self._whole(_name("packs", pack), lambda found: digest(found) == sha256, start, end)
 
     def entry(self, key: str) -> Any:
-        """Return the data under a key; None where there are none, or damaged ones."""
+        """Return the data under a key; None if there are none, or damaged ones."""
         try:
             found = self._whole(_name("entries", key), lambda found: _unpacked(key, found) is not None)
         except MissingContent:
@@ -124,13 +124,13 @@ class SharedStore:
         return _unpacked(key, found)
 
     def enter(self, key: str, data: Any, *, anew: bool = False) -> bool:
-        """Write data under a key, if there are none: False where another writer was first. `anew` replaces them."""
+        """Write data under a key, if there are none: False if another writer was first. `anew` replaces them."""
         payload = json.dumps(data, ensure_ascii=False, allow_nan=False).encode()
         packed = digest(f"{key}\n".encode() + payload).encode() + b"\n" + payload
         name = _name("entries", key)
         if not anew and _tried(lambda: self.objects.create(name, packed)):
             return True
-        if anew or self.entry(key) is None:  # what is there is damaged
+        if anew or self.entry(key) is None:  # the stored entry is damaged
             _tried(lambda: self.objects.put(name, packed))
             return True
         return False
@@ -140,7 +140,7 @@ class SharedStore:
         return {name.rpartition("/")[2]: size for name, size in _tried(lambda: self.objects.sizes(kind)).items()}
 
     def _whole(self, name: str, whole: Callable[[bytes], bool], start: int = 0, end: int | None = None) -> bytes:
-        # What stayed damaged is read once from then on: many variants share a content.
+        # Content that stayed damaged is read once from then on: many variants share a content.
         for left in reversed(range(1 if (name, start) in self._damaged else TRIES)):
             try:
                 found = _tried(lambda: self.objects.get(name, start, end))
@@ -157,7 +157,7 @@ class SharedStore:
 
 
 def _tried(work: Callable[[], T], tries: int = TRIES) -> T:
-    """Return what `work` returns, tried again after an OSError; what is not there, or is full, stays so."""
+    """Return what `work` returns, tried again after an OSError; MissingContent and a full store are not tried again."""
     for left in reversed(range(tries)):
         try:
             return work()

@@ -87,7 +87,7 @@ class MemoryStore:
         self._elsewhere = dict(known.sizes) if known else {}
 
     def bundle(self) -> Bundle:
-        """Return what is here now."""
+        """Return the current contents."""
         return Bundle(dict(self._data), dict(self._files), {sha: self.size(sha) for sha in self._files.values()})
 
     @contextlib.contextmanager

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from unitcad.casting.drawings import grip_of, side_places, tape_places, tongue_prop
+from unitcad.casting.drawings import side_places, tape_places, tongue_prop
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch
 from unitcad.casting.steps import NEEDS, BenchStep
 from unitcad.export.threemf import layout
@@ -16,7 +16,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
 from unitcad.shape.column import extent
 from unitcad.spec import Spec, assumed_lengths, motor_of
-from unitcad.text import cell, listed, number
+from unitcad.text import cell, number
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,14 @@ def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
     )
 
 
+def grouped(items: Iterable[Item]) -> dict[str, list[Item]]:
+    """Return a bill by what a person does: print, buy, have."""
+    groups: dict[str, list[Item]] = {"print": [], "buy": [], "have": []}
+    for item in items:
+        groups["print" if item.made.startswith("printed") else "buy" if item.made == "bought" else "have"].append(item)
+    return {name: items for name, items in groups.items() if items}
+
+
 def to_csv(items: Iterable[Item]) -> str:
     """Return the bill as CSV with a header; quantities to four significant digits."""
     text = io.StringIO()
@@ -80,7 +88,7 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
         if tool.kind == "stub":
             length = f"{dims.core_height - moulds.plate[0] + plan.layout.plate[1] + 10:.0f} mm each"
             item = "filament stub"
-            note = f"{number(lengths.filament_mm, 3)} mm printer filament, {length}, the end bent by a right angle"
+            note = f"{number(lengths.filament_mm, 3)} mm printer filament, {length}"
         elif tool.kind == "blade" and tool.made == "cut":
             made = "tool"
             note = f"a straight bar of metal, {plan.layout.plate[1] * 2:.0f} mm long or longer: the bed takes no blade"
@@ -100,8 +108,8 @@ def motor_name(spec: Spec) -> str:
 def _inside(moulds: MouldSet) -> Iterator[Item]:
     cells, spec = len(moulds.plan.layout.cells), moulds.spec
     note = f"{number(spec.motor.diameter_mm, 3)} x {number(spec.motor.thickness_mm, 3)} mm"
-    if assumed := assumed_lengths(spec):
-        note += f", assumed: {listed(assumed)}"
+    if any(key.startswith("motor.") for key in assumed_lengths(spec)):
+        note += " (assumed)"
     if motor := motor_of(spec):
         ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}
         note += "".join(f", {number(value, 3)} {unit}" for unit, value in ratings.items() if value)
@@ -129,28 +137,27 @@ def injecting(batches: Sequence[Batch]) -> Iterator[Item]:
 def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], after: int = 0) -> Iterator[Item]:
     """List what pours and steps take; `after`: mixes after the pours."""
     pours, cups = len(moulds.plan.steps), moulds.plan.of_kind("cup")
-    yield Item("mixing cups and sticks", pours + after, "set", "bought", "no latex, no sulphur clay: they inhibit")
-    yield Item("gloves", pours, "pair", "bought", "nitrile or vinyl; latex inhibits")
+    yield Item("mixing cups and sticks", pours + after, "set", "bought", "no latex, no sulphur clay")
+    yield Item("gloves", pours, "pair", "bought", "nitrile or vinyl")
     yield Item("scale", 1, "piece", "tool", f"shows {number(moulds.spec.casting.scale_resolution_g, 3)} g")
     if cups:
-        note = f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide, for the pry slots"
+        note = f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide"
         yield Item("flat screwdrivers", 2, "piece", "tool", note)
     for need in sorted({"caliper", *(need for step in steps for need in step.needs)}, key=[*NEEDS].index):
         yield Item(need, 1, *NEEDS[need])
     if prop := tongue_prop(moulds):
-        size = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm, {number(prop.thickness_mm, 3)} mm thick"
-        note = f"{size}: bears the tongues' {grip_of(moulds)}s"
+        note = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm, {number(prop.thickness_mm, 3)} mm thick"
         yield Item("pad of stacked card", len(prop.pads), "piece", "cut", note)
     if moulds.spec.casting.vacuum:
         least = CONTAINER * max(batch.mix.millilitres for batch in batches)  # one mix after the other
         chamber = f"a chamber that reaches {number(VACUUM_INHG, 3)} inHg"
-        note = f"at least {number(least, 2)} ml, since silicone foams up; {chamber}; used again for every mix"
+        note = f"at least {number(least, 2)} ml; {chamber}"
         yield Item("degassing container", 1, "piece", "tool", note, least)
     if moulds.spec.moulds.pour == "injected":
         yield from injecting(batches)
     elif cups:
         strips = 2 * (len(tape_places(moulds)) + len(side_places(moulds))) * pours
-        yield Item("adhesive tape", strips, "strip", "bought", "holds each cup down; 8 mm wide, 30 mm long")
+        yield Item("adhesive tape", strips, "strip", "bought", "8 mm wide, 30 mm long")
 
 
 def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tuple[Body, ...]]:

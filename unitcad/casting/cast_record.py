@@ -39,39 +39,50 @@ Cavity = Annotated[int, Meta(ge=1, le=999)]
 
 
 class CastPour(Table, frozen=True, kw_only=True):
-    """One pour as it was: the parts weighed in, and the times taken.
+    """One pour: weights and times."""
 
-    `pot_life_min`: from the first stir to the last strike. `cure_h`: from that strike to the cup's removal.
-    """
-
-    index: Annotated[Index, Meta(description="1 is the first pour, which casts layer 1")]
-    material: Text | None = None
-    lot: Annotated[Text | None, Meta(description="what the bottles say")] = None
-    part_a_g: Grams | None = None
-    part_b_g: Grams | None = None
-    mixed_at: Annotated[Text | None, Meta(description="ISO 8601, with the zone: 2026-03-14T09:30:00+01:00")] = None
-    pot_life_min: Annotated[float, Meta(ge=0.1, le=10000)] | None = None
-    cure_h: Annotated[float, Meta(ge=0.01, le=1000)] | None = None
-    notes: Annotated[tuple[Line, ...], Meta(max_length=200)] = ()
+    index: Annotated[Index, Meta(description="number of the pour; 1 casts layer 1")]
+    material: Annotated[Text | None, Meta(description="silicone")] = None
+    lot: Annotated[Text | None, Meta(description="lot on the bottles")] = None
+    part_a_g: Annotated[Grams | None, Meta(description="weight of part A")] = None
+    part_b_g: Annotated[Grams | None, Meta(description="weight of part B")] = None
+    mixed_at: Annotated[
+        Text | None, Meta(description="time of mixing, ISO 8601 with the zone: 2026-03-14T09:30:00+01:00")
+    ] = None
+    pot_life_min: Annotated[
+        Annotated[float, Meta(ge=0.1, le=10000)] | None, Meta(description="time from the first stir to the last strike")
+    ] = None
+    cure_h: Annotated[
+        Annotated[float, Meta(ge=0.01, le=1000)] | None,
+        Meta(description="time from that strike to the removal of the cup"),
+    ] = None
+    notes: Annotated[tuple[Line, ...], Meta(max_length=200, description="remarks")] = ()
 
 
 class WallPlaces(Table, frozen=True, kw_only=True):
-    """One layer's wall of one unit, measured at the skin at several places round it."""
+    """One layer's wall, measured at the skin."""
 
-    layer: Annotated[Index, Meta(description="1 is the innermost layer")]
-    places_mm: Annotated[tuple[Millimetres, ...], Meta(min_length=1, max_length=100)]
+    layer: Annotated[Index, Meta(description="number of the layer; 1 is the innermost")]
+    places_mm: Annotated[
+        tuple[Millimetres, ...],
+        Meta(min_length=1, max_length=100, description="the wall at several places around the unit"),
+    ]
 
 
 class CastUnit(Table, frozen=True, kw_only=True):
-    """One unit out of the mould. `mass_g` is its silicone, trimmed, without motor, circuit and wires."""
+    """One unit out of the mould."""
 
-    cavity: Annotated[Cavity, Meta(description="from 1; engraved beside it in hexadecimal digits")] = 1
-    usable: bool = True
-    height_mm: Millimetres | None = None
-    diameters_mm: Annotated[tuple[Millimetres, ...], Meta(max_length=100)] = ()
-    mass_g: Grams | None = None
+    cavity: Annotated[Cavity, Meta(description="number of the cavity from 1, engraved next to it in hexadecimal")] = 1
+    usable: Annotated[bool, Meta(description="false: the unit counts for nothing")] = True
+    height_mm: Annotated[Millimetres | None, Meta(description="height over all")] = None
+    diameters_mm: Annotated[
+        tuple[Millimetres, ...], Meta(max_length=100, description="diameter at the skin, in several directions")
+    ] = ()
+    mass_g: Annotated[
+        Grams | None, Meta(description="mass of the trimmed silicone, without motor, circuit and wires")
+    ] = None
     walls: Annotated[tuple[WallPlaces, ...], Meta(max_length=99)] = ()
-    notes: Annotated[tuple[Line, ...], Meta(max_length=200)] = ()
+    notes: Annotated[tuple[Line, ...], Meta(max_length=200, description="remarks")] = ()
 
     def wall_mm(self, layer: int) -> tuple[float, ...]:
         """Return what was measured of a layer's wall (from 1), mm; () where nothing was."""
@@ -79,24 +90,21 @@ class CastUnit(Table, frozen=True, kw_only=True):
 
 
 class CastRecord(Table, frozen=True, kw_only=True):
-    """One casting of one mould set.
+    """One casting of one mould set. bench.html writes this file."""
 
-    `spec` is the whole effective spec as plain data, so that the record tells what was cast without any other file.
-    """
-
-    format: Literal["unitcad cast record"]
-    version: Annotated[int, Meta(ge=1, le=1)]
-    spec_name: Text
-    spec_hash: Annotated[Text, Meta(description="the twelve digits that the result's folder ends in")]
-    cast_on: Annotated[Text, Meta(description="the day of the first pour: 2026-03-14")]
+    format: Annotated[Literal["unitcad cast record"], Meta(description="kind of file")]
+    version: Annotated[int, Meta(ge=1, le=1, description="version of the format")]
+    spec_name: Annotated[Text, Meta(description="name of the spec")]
+    spec_hash: Annotated[Text, Meta(description="twelve digits at the end of the result's folder")]
+    cast_on: Annotated[Text, Meta(description="day of the first pour: 2026-03-14")]
     label: Annotated[Text | None, Meta(description="four characters, as engraved on the moulds")] = None
-    spec: dict[str, Any] | None = None
-    room_c: Annotated[float, Meta(ge=-20, le=80)] | None = None
-    scale_resolution_g: Resolution | None = None
-    caliper_resolution_mm: Resolution | None = None
+    spec: Annotated[dict[str, Any] | None, Meta(description="the whole spec with its defaults")] = None
+    room_c: Annotated[Annotated[float, Meta(ge=-20, le=80)] | None, Meta(description="temperature of the room")] = None
+    scale_resolution_g: Annotated[Resolution | None, Meta(description="smallest step of the scale")] = None
+    caliper_resolution_mm: Annotated[Resolution | None, Meta(description="smallest step of the caliper")] = None
     pours: Annotated[tuple[CastPour, ...], Meta(max_length=99)] = ()
     units: Annotated[tuple[CastUnit, ...], Meta(max_length=999)] = ()
-    notes: Annotated[tuple[Line, ...], Meta(max_length=200)] = ()
+    notes: Annotated[tuple[Line, ...], Meta(max_length=200, description="remarks")] = ()
 
     def unit(self, cavity: int) -> CastUnit | None:
         """Return the unit of a cavity; None where the record has none."""

@@ -37,6 +37,8 @@ Laying in, pulling and peeling are for one cavity; `PER_CAVITY_MIN` is what each
 BAKE_H = 8.0
 STRIKE_AGAIN_MIN = 10.0
 """When what has wept or sunk is topped up and struck off again (assumed)."""
+ADHESIVE_CURE_H = 24.0
+"""A one-part silicone adhesive cures 2 mm deep in a day (maker's sheet of Momentive IS5628E)."""
 HELD_BACK_ML = 0.5
 """What a syringe's tip and plunger keep of the silicone drawn in (assumed: a 5 to 10 ml syringe, a wide tip)."""
 WITHOUT_VACUUM = 0.25
@@ -179,7 +181,7 @@ def wall_range(spec: Spec, layer: int, off_axis_mm: float) -> tuple[float, float
 
 @dataclass(frozen=True)
 class AfterPours:
-    """Silicone that is mixed after the pours to hold motors: `use` is "smear" or "ring", `grams` both parts."""
+    """Silicone that is mixed after the pours, for the `use` of a `Fitting`; `grams` of both parts."""
 
     silicone: Material
     use: str
@@ -253,17 +255,15 @@ class Batch:
         lid = self.step.lid
         if self.vacuum:
             said = (
-                f"Degas for {number(DEGASSING_MIN, 3)} min (assumed) at {number(VACUUM_INHG, 3)} inHg, in a "
-                f"container of at least {number(CONTAINER * self.mix.millilitres, 2)} ml: the silicone foams up and "
-                "falls back, then single bubbles rise. Let the air in slowly."
+                f"Degas for {number(DEGASSING_MIN, 3)} min at {number(VACUUM_INHG, 3)} inHg: it foams up and falls "
+                "back. Let the air in slowly."
             )
         else:
             allowed = WITHOUT_VACUUM * self.pot_min
             said = (
-                f"No vacuum (casting.vacuum): a bubble of {number(BUBBLE_MM, 3)} mm takes {number(self.rise_min, 2)} "
-                f"min through {number(self.step.rim, 3)} mm (Stokes, at the viscosity just mixed). That is optimistic, "
-                "since silicone thickens from the start: a quarter of the pot life, "
-                f"{number(allowed, 2)} min, is allowed. "
+                f"No vacuum: a bubble of {number(BUBBLE_MM, 3)} mm rises through {number(self.step.rim, 3)} mm in "
+                f"{number(self.rise_min, 2)} min at best (Stokes), and {number(allowed, 2)} min, a quarter of the pot "
+                "life, are allowed. "
             )
             where = "stand the syringe up, its tip up," if lid else "leave the mould alone"
             brush = "brush a thin coat of the mix now onto all that it will touch, then pour in a thread from one side"
@@ -283,7 +283,7 @@ class Batch:
         """All numbers of the pour with their sources."""
         casting, step, silicone, mix = self.moulds.spec.casting, self.step, self.silicone, self.mix
         cells = len(self.moulds.plan.layout.cells)
-        by_temperature = "assumed: half the time for every 10 K more; at 23 degC "
+        by_temperature = "assumed: half for every 10 K more; at 23 degC "
         digit = f"half of {number(casting.scale_resolution_g, 3)} g"
         practice = "assumed: usual practice"
         channels = " + sprue and vents" if step.channels else ""
@@ -293,7 +293,7 @@ class Batch:
         taken = f"({times}{channels})" if channels or not whole else times
         more = f"assumed: {casting.waste:.0%} more, at least {number(casting.minimum_mix_g, 3)} g"
         held_back = f"net, and {number(HELD_BACK_ML, 2)} ml that tip and plunger keep (assumed)"
-        stokes = "computed: Stokes' law at the viscosity just mixed, so optimistic; the bubble is assumed"
+        stokes = "computed: Stokes' law at the viscosity just mixed, so optimistic"
         ratio = f"mix ratio, {sourced(silicone.mix_ratio)}"
         kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
         weep = 100 * weep_mm3(self.moulds, step, silicone) / self.volume_mm3
@@ -335,11 +335,11 @@ def walls(moulds: MouldSet) -> tuple[Figure, ...]:
     if made.ribs:
         pressed = "pushed back on leaves" if leaf_mm(printer_of(spec)) else "crushed"
         depth = f"{pressed} by {number(lengths.rib_interference_mm, 3)} mm"
-        how = f"balance of {made.ribs} ribs that are {depth}, each up to {UNEVEN:.0%} stronger or weaker (assumed)"
+        how = f"{made.ribs} ribs {depth}, each up to {UNEVEN:.0%} stronger or weaker (assumed)"
         cups.append((made, "with ribs", how))
-    times = "1 x for Layer 1, 2 x beyond it" if len(spec.layers) > 1 else "1 x"
-    source = f"computed: cups up to {number(made.at_worst_mm, 2)} mm off the axis, {times}"
-    worst = f"where the gap is printed {number(made.off_mm, 3)} mm off, the printer's play"
+    times = ", twice beyond Layer 1" if len(spec.layers) > 1 else ""
+    source = f"computed: cups up to {number(made.at_worst_mm, 2)} mm off the axis{times}"
+    worst = f"if the gap is printed {number(made.off_mm, 3)} mm off"
     return (
         *(
             Figure(

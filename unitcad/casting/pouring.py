@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from unitcad.casting.drawings import grip_of, side_places, tape_places, tongue_prop
 from unitcad.casting.figures import (
+    ADHESIVE_CURE_H,
     DEGASSING_MIN,
-    HELD_BACK_ML,
     LAY_IN_MIN,
     LIFT_MIN,
     MIXING_MIN,
@@ -31,6 +31,7 @@ from unitcad.casting.steps import BenchStep
 from unitcad.casting.views import fed_through, picture_path
 from unitcad.catalogue import Material
 from unitcad.designs.design import Fitting
+from unitcad.designs.parts import ADHESIVE, bond
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.removal import CAST
@@ -39,13 +40,10 @@ from unitcad.spec import Spec
 from unitcad.text import listed, number, spaced
 
 TACK = (
-    "it is done when a gloved fingertip, pressed on lightly and lifted, comes off without a pull and without a trace, "
-    "and the dent of a fingernail springs back. If it still pulls or draws threads, wait half an hour and try again"
+    "done if a gloved finger comes off without a pull and a fingernail's dent springs back. If not, wait half an hour"
 )
 """How to tell cured silicone from tacky silicone."""
-LEVEL_AGAIN = (
-    "What runs under the plate may tilt it: look at the level once more, and put paper under until it is right."
-)
+LEVEL_AGAIN = "Look at the level again and correct it with paper."
 """How the step that holds a cup or a lid ends: nothing is moved between it and the cure."""
 
 
@@ -107,10 +105,8 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         bond = "Its outside" if plan.concentric else f"The face that Layer {n} touches"
         yield BenchStep(
             f"Wipe Layer {n - 1}",
-            f"Wipe Layer {n - 1} with isopropanol and let it dry. {bond} is the bond face: no release "
-            "agent on it, ever, no grease, no fingers. No sourced window exists for when to pour the next layer; as "
-            "soon as it is cured, on the same day, is the usual practice (assumed), and silicone bonds to cured "
-            "silicone of its kind.",
+            f"Wipe it with isopropanol and pour on the same day. {bond} is the bond face: no release "
+            "agent on it, ever, no grease, no fingers.",
             picture("bond-face"),
             minutes=2.0 * cells,
             needs=("isopropanol and lint-free wipes",),
@@ -127,43 +123,38 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     if any(body.kind in ("circuit", "wire") for body in step.inserts):
         yield BenchStep(
             "Grease the lead",
-            f"Coat the {lead(moulds)} thinly with petroleum jelly where the slot of cup {n} comes, outside "
-            "the cavity only: it keeps silicone from weeping out.",
+            f"Coat the {lead(moulds)} thinly with petroleum jelly where the slot of cup {n} comes, outside the cavity "
+            "only: silicone then can't weep out.",
             minutes=1.0 * cells,
             needs=("petroleum jelly",),
         )
     if flanks := moulds.greased(step):
         yield BenchStep(
             "Grease the flanks",
-            f"Before cup {n} goes on, smear petroleum jelly thinly on {flanks}. A film that shines, no beads: "
-            "it keeps silicone out of the slits beside the cup's slots. Wipe off what lies elsewhere.",
+            f"Before cup {n} goes on, smear petroleum jelly on {flanks}: a film that shines, no beads. It keeps "
+            "silicone out of the slits beside the cup's slots. Wipe it off everywhere else.",
             picture("grease"),
             minutes=1.0 * cells,
             needs=("petroleum jelly",),
         )
-    # Which faces get release agent, and why no other.
-    faces, agent = agent_faces(moulds, step), "No release agent on any piece: what is cast here bonds later."
+    # The faces that get release agent, and why no other does.
+    faces, agent = agent_faces(moulds, step), "No release agent: what is cast here bonds later."
     if faces and plan.pins:
-        earlier = f" or Layer {n - 1}" if n > 1 else ""
+        earlier = f" and Layer {n - 1}" if n > 1 else ""
         agent = (
-            f"Release agent, if any, sparingly and only on the sheet's bed and the bores of cup {n}: a "
-            "printed cup holds a thin sheet fast. Put it on away from the base and let it dry. None in the slots for "
-            f"the fins, and none on base{earlier}, ever: what bonds later is cast there."
+            f"Release agent, if any, thinly and only on the sheet's bed and the bores of cup {n}, away from the base: "
+            f"a printed cup holds a thin sheet fast. None in the slots for the fins, on the base{earlier}."
         )
     elif faces:
         where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)
-        agent = (
-            f"Release agent, if any, sparingly and only on {where}: put it on away from the base and let it dry. No "
-            f"other face gets any, the {holds(moulds)} neither."
-        )
-    # How the cup comes to stand where it should: by its ribs, or pushed as the one before.
+        agent = f"Release agent, if any, thinly and only on {where}, away from the {holds(moulds)}."
+    # What centres the cup: ribs, or a push as for the cup before.
     if ribs(spec, plan.layout):
-        on = "on and press it down evenly until it sits. Its ribs centre it: push it to no side."
+        on = "on and press it down evenly until it sits; its ribs centre it."
     elif plan.pins:
         on = (
-            "on over the pins, cut corner over cut corner, and press it down flat. The pins let "
-            f"it move by {number(plan.pins.clearance, 2)} mm each way: push it to and fro, along the base and across, "
-            "and leave it in the middle."
+            f"on over the pins, cut corner over cut corner, and press it flat. The pins leave "
+            f"{number(plan.pins.clearance, 2)} mm of play each way: leave it in the middle of that."
         )
     else:
         on = "on and push it towards the cut corner, "
@@ -177,24 +168,22 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         needs=("release agent",) if faces else (),
     )
     if tongues:
-        slot = "" if n == 1 else " and the slot that it left in the layer before"
         seat = number(window_length(moulds, step), 2)
         yield BenchStep(
             "Tongue in, grease",
-            f"Push {the_tongue} in through the window{slot}, hollow end ahead, until {seat} mm are still to go. Smear "
-            f"the {seat} mm just outside the cup thinly, on all four sides, with petroleum jelly: a film that shines, "
-            "no beads.",
+            f"Push {the_tongue} through the window, hollow end ahead. Stop {seat} mm before it is home. Grease that "
+            "length on all sides with petroleum jelly: a film that shines, no beads.",
             picture("tongue-in"),
             minutes=1.5 * cells,
             needs=("petroleum jelly",),
         )
         yield _tongue_home(moulds, n, the_tongue, picture("tongue-home"))
     if step.lid:
-        outside = f": outside {groove}, since what creeps under the lid runs in there" if step.groove else ""
+        outside = f", outside {groove}" if step.groove else ""
         yield BenchStep(
             f"Lid {n} on",
-            f"Draw a thin line of petroleum jelly all round the rim of cup {n}, near its outer edge{outside}. Put lid "
-            f"{n} on, cut corner over cut corner, and press it down.",
+            f"Draw a thin line of petroleum jelly round the rim of cup {n}, near its outer edge{outside}. Put lid {n} "
+            "on, cut corner over cut corner, and press it down.",
             picture("lid-on"),
             minutes=LIFT_MIN,
             needs=("petroleum jelly",),
@@ -208,28 +197,26 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         yield from injected(batch, picture("inject"))
     else:
         if cells == 1 or len(step.layer) > 1:
-            each = ", one cavity after the other, each" if len(step.layer) > 1 else ""
-            over = "it stands over its rim" if each else "the cavity stands over its rim"
-            poured = f"Pour in a thin thread{each} at one place until {over}."
+            where = "the cavity stands" if len(step.layer) == 1 else "it stands"
+            each = "" if len(step.layer) == 1 else ", one cavity after the other"
+            poured = f"Pour in a thin thread at one place until {where} over its rim{each}."
         else:
             poured = (
-                "Pour in a thin thread, first beside each unit's earlier layer until that is covered, so that no air "
-                "stays in the deep places, then from there outwards until the whole cavity stands over its rim."
+                "Pour in a thin thread, first beside each unit's earlier layer until that is covered, then outwards "
+                "until the whole cavity stands over its rim."
             )
         strip = not plan.concentric and plan.dimensions.core_height > step.rim
-        tool = "the blade upright, its narrow edge down"
+        tool = "the blade, upright, its narrow edge down,"
         if strip:
             tool = (
-                "a straight strip of stiff card or plastic, as wide as the cavity, held upright (what stands on the "
-                "base beside the cavity is higher than this rim and in the blade's way)"
+                "a strip of stiff card or plastic, as wide as the cavity (what stands beside it is in the blade's way),"
             )
         yield from struck(
             batch,
-            f"{poured} Prick the bubbles that you see with a pin.",
-            f"Strike off along the rim with {tool}, in one slow stroke from end to end; what it takes goes "
-            f"{f'into {groove}' if step.groove else 'onto a scrap, since this cup has no groove'}.",
-            f"{' The window weeps a little.' if tongues else ''} The film that it leaves on the rim cures too: it "
-            "lifts off with the cup, and what of it stays on the layer's edge is trimmed at the end.",
+            f"{poured} Prick bubbles with a pin.",
+            f"Draw {tool} along the rim in one slow stroke; the rest goes "
+            f"{f'into {groove}' if step.groove else 'onto a scrap: this cup has no groove'}.",
+            " The film on the rim lifts off with the cup.",
             cells,
             cells,
             picture,
@@ -242,44 +229,50 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     if tongues:
         yield BenchStep(
             "Tongue out FIRST",
-            f"Pull {'the tongue' if len(tongues) == 1 else 'every tongue'} out FIRST, straight along "
-            f"itself, by its {grip_of(moulds)}, over the card, with a steady pull. A cup lifted over a tongue tears "
-            "the layer. Then take the card away: it covers the pry slot.",
+            f"Pull {'the tongue' if len(tongues) == 1 else 'every tongue'} straight out by its {grip_of(moulds)}, over "
+            "the card: a cup lifted over it tears the layer. Take the card away.",
             picture("tongue-out"),
             minutes=PULL_MIN * len(tongues),
         )
     if step.lid:
         yield BenchStep(
             "Lid off",
-            f"Take off what held the lid down. The lid stands out over cup {n} all round: push its edge up "
-            "from below, with the thumbs or the blunt spatula on two opposite sides, a little at a time, the cup held "
-            "down. Then lift it straight up: sprue and vents tear off at the layer. Trim them flush with a knife.",
+            "Take off what held the lid down. Push the lid's edge up from below on two opposite sides, with thumbs or "
+            f"a blunt spatula, a little at a time, cup {n} held down. Lift it straight up: sprue and vents tear off. "
+            "Trim them flush with a knife.",
             picture("lid-off"),
             minutes=LIFT_MIN,
             needs=("sharp knife", "blunt spatula"),
         )
     if all(removal.piece != step.cup for removal in step.removals):
         return
-    seat, split = "base" if plan.pins else "plinth", len(plan.pieces_of(step.cup)) > 1
+    split = len(plan.pieces_of(step.cup)) > 1
     if split:
         pried = (
-            "Lay a screwdriver in every pry slot, its tip under the cup, and press the handles down a little at a "
-            "time, one after the other and round again; at a piece of the cup over no slot turn a blunt spatula under "
-            f"its outer edge. Its dovetails slide up and down: go on until every piece has come free of the {seat}."
+            "Lay a screwdriver in every pry slot, its tip under the cup, and press the handles down in turn, a little "
+            "at a time; at a piece over no slot turn a blunt spatula under its outer edge. Dovetails slide up and "
+            "down: go on until every piece is free."
         )
     else:
         pried = (
-            "Lay a screwdriver in each of the two pry slots, its tip under the cup. Press both handles down at once, a "
-            f"little at a time, until the cup comes free of the {seat}."
+            "Lay a screwdriver in each pry slot, its tip under the cup. Press both handles down together, little by "
+            "little."
         )
     yield BenchStep(
         f"Cup {n} off",
         f"{'' if step.lid else 'Take off what held the cup down. '}{pried} Lift cup {n} straight up. "
-        f"Layer {n} stays on the {holds(moulds)}.",
+        f"{recovery(moulds, n)}",
         picture("cup-off"),
         minutes=LIFT_MIN,
         needs=("blunt spatula",) if split else (),
     )
+
+
+def recovery(moulds: MouldSet, layer: int) -> str:
+    """Say where a layer stays when its cup goes, and what to do if it does not."""
+    stays = f"Layer {layer} should stay on the {holds(moulds)}"
+    back = "from the skin's side" if layer == len(moulds.plan.steps) else "and put it back"
+    return f"{stays}: if it comes off in the cup, push it out {back}."
 
 
 def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
@@ -295,19 +288,14 @@ def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
         pieces = " Each piece of cup and base that reaches these sides has one; one over a seam holds both pieces."
         if sides := len(side_places(moulds)):
             count = "a strip" if sides == 1 else f"{sides} strips"
-            pieces += f" On each of the two other sides {count} for the pieces between, as the picture shows."
+            pieces += f" The two other sides have {count} each, as the picture shows."
         if any(map(inner, split)):
-            pieces += (
-                " A piece without an outer edge has none: nothing lifts it while the silicone cures, and its dovetails "
-                "keep it in place sideways."
-            )
+            pieces += " A piece without an outer edge needs none."
     return BenchStep(
         f"Hold cup {cup} down",
-        f"Hold cup {cup} down while it is struck off: on each of the two sides "
-        f"{'where the filaments come out' if split else 'without a pry slot'} run "
-        f"{strips} from the cup's wall, below the rim, round the plate's edge to its underside, beside the "
-        f"filament where there is one{where}.{pieces} Clamps or weights do as well where they leave the rim "
-        f"free for the blade. {LEVEL_AGAIN}",
+        f"On each of the two sides {'where the filaments come out' if split else 'without a pry slot'} run {strips} "
+        f"from the cup's wall, below the rim, round the plate's edge to its underside{where}."
+        f"{pieces} {LEVEL_AGAIN}",
         picture,
         minutes=2.0,
         needs=("paper",),
@@ -318,7 +306,7 @@ def lid_held(step: Step, picture: str) -> BenchStep:
     """Say how a lid is held down while silicone is injected."""
     return BenchStep(
         f"Hold lid {step.index} down",
-        f"Hold it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. {LEVEL_AGAIN}",
+        f"Put rubber bands round lid and base, or a clamp, clear of sprue and vents. {LEVEL_AGAIN}",
         picture,
         minutes=2.0,
         needs=("paper",),
@@ -329,33 +317,24 @@ def _tongue_home(moulds: MouldSet, pour: int, the_tongue: str, picture: str) -> 
     """Say how the tongues come to stand, how to see that they do, and what bears their grips."""
     marked, grip, one = len(moulds.plan.steps) > 1 and pour == 1, grip_of(moulds), the_tongue == "the tongue"
     if pour == 1:
-        mark = (
-            f" Mark {the_tongue} with a pen where it leaves the cup's wall: in the next pour the mark shows where it "
-            "stops."
-        )
-        stops = (
-            f"Push {the_tongue} on until its hollow end stops against the core: it lies on the core's ledge. Look down "
-            f"into the bore: no gap between its end and the core, none under it on the ledge.{mark * marked}"
-        )
+        mark = f" Mark {'it' if one else 'each'} with a pen at the cup's wall." if marked else ""
+        stops = f"Push {the_tongue} on until it stops on the core's ledge: no gap at its end, none under it.{mark}"
     else:
         stops = (
-            f"Push {the_tongue} on until it stops: its hollow end lies on the core's ledge again, under Layer 1. The "
-            "mark from pour 1 must be at the cup's wall; farther out, it caught on the slot's edge: draw it back and "
-            "try again."
+            f"Push {the_tongue} on until it stops on the ledge under Layer 1, the pen mark at the cup's wall. If it "
+            "stays out, it caught on the slot's edge: try again."
         )
     bears = ""
     if prop := tongue_prop(moulds):
         pads = "a pad" if len(prop.pads) == 1 else "a pad on each side"
         bears = (
-            f" Its {grip} hangs free: put {pads} of stacked card {number(prop.thickness_mm, 3)} mm thick under "
-            f"{'it' if one else f'the {grip}s'} ({number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm; "
-            f"{number(prop.tolerance_mm, 2)} mm more or less "
-            "does no harm: computed, the window's clearance), on the plate, against the cup. It must neither lift the "
-            "tongue nor leave air under it. Nothing may lean on its outer end."
+            f" Under {'its' if one else 'their'} free {grip}{'' if one else 's'}, against the cup, put {pads} of "
+            f"stacked card {number(prop.thickness_mm, 3)} mm thick ({number(prop.width_mm, 2)} x "
+            f"{number(prop.length_mm, 2)} mm)."
         )
     return BenchStep(
         "Tongue home",
-        f"{stops} Wipe off what grease came into the bore, with a dry cotton bud.{bears}",
+        f"{stops} Wipe grease out of the bore with a cotton bud.{bears}",
         picture,
         minutes=1.5 * len(moulds.plan.layout.cells),
         needs=("pen", "cotton buds") if marked else ("cotton buds",),
@@ -364,25 +343,22 @@ def _tongue_home(moulds: MouldSet, pour: int, the_tongue: str, picture: str) -> 
 
 def mixed(batch: Batch) -> Iterator[BenchStep]:
     """Describe the way from the bottles to a mix without air."""
-    mix, cells, larger = batch.mix, len(batch.step.layer), ""
+    mix, larger = batch.mix, ""
     if mix.mix_error_pct > MOST_ERROR_PCT:
         enough = number(mix.mix_g * mix.mix_error_pct / MOST_ERROR_PCT, 3)
-        larger = f": too much; mix at least {enough} g (casting.minimum_mix_g) or use a finer scale"
+        error = number(mix.mix_error_pct, 2)
+        larger = f" Your scale makes {error} % of error in so little: mix {enough} g (casting.minimum_mix_g)."
     yield BenchStep(
         "Weigh",
-        f"Weigh {shown(mix.part_a_g)} g of {batch.silicone.name} part A and {shown(mix.part_b_g)} g of part B "
-        f"({shown(mix.net_g)} g go into {cells} cavit{'y' if cells == 1 else 'ies'}; so small a batch would be "
-        f"{number(mix.net_error_pct, 2)} % wrong in the ratio, this one "
-        f"{number(mix.mix_error_pct, 2)} %{larger}). Stir each bottle first. Weigh part B into the cup "
-        "that part A is in; note what the scale shows.",
+        f"Weigh {shown(mix.part_a_g)} g of {batch.silicone.name} part A and {shown(mix.part_b_g)} g of part B. Stir "
+        f"both bottles first, weigh B into the cup with A, and note both.{larger}",
         kind="weigh",
         minutes=WEIGH_MIN,
     )
     yield BenchStep(
         "Mix",
-        f"Mix for {number(MIXING_MIN, 3)} min (assumed), scraping walls and bottom, until no streak is left; the "
-        "pot life runs from now. Keep the mixing cup: if what is left in it never cures, the mix was wrong; if it does "
-        "and the mould's does not, a surface inhibits it.",
+        f"Mix for {number(MIXING_MIN, 3)} min, scraping walls and bottom, until no streak is left. The pot life of "
+        f"{number(batch.pot_min, 2)} min runs from now. Keep the mixing cup.",
         kind="mix",
         minutes=MIXING_MIN,
     )
@@ -396,10 +372,9 @@ def injected(batch: Batch, picture: str) -> Iterator[BenchStep]:
     refilled = " Fill it again while the mix flows." if mix.syringe_size_ml < mix.millilitres else ""
     yield BenchStep(
         "Draw up",
-        f"Draw all of it into a syringe of {number(mix.syringe_size_ml, 3)} ml: {number(mix.syringe_ml, 3)} ml fill "
-        f"the cavities and what tip and plunger hold back, some {number(HELD_BACK_ML, 2)} ml (assumed). The rest "
-        f"of the {number(mix.millilitres, 3)} ml is for the beads at the vents, for leaks, and for what stays in the "
-        f"mixing cup.{refilled} Point it up and push until silicone, no air, stands at the tip.",
+        f"Draw all of the {number(mix.millilitres, 3)} ml into a syringe of {number(mix.syringe_size_ml, 3)} ml; "
+        f"{number(mix.syringe_ml, 3)} ml fill cavities, tip and plunger.{refilled} Point it up and push until "
+        "silicone, no air, stands at the tip.",
         minutes=STRIKE_MIN,
     )
     if not batch.vacuum:
@@ -436,7 +411,7 @@ def struck(
     yield BenchStep("Strike off", strike, picture("strike"), minutes=STRIKE_MIN, needs=needs)
     yield BenchStep(
         "Wait, strike again",
-        f"Wipe it. Top up and strike again after {number(STRIKE_AGAIN_MIN, 3)} min (assumed).{film}",
+        f"Wipe the blade. After {number(STRIKE_AGAIN_MIN, 3)} min top up and strike again.{film}",
         picture("strike"),
         kind="rest",
         minutes=STRIKE_MIN,
@@ -448,8 +423,7 @@ def cure(batch: Batch, touched: str, cast: str, picture: str) -> BenchStep:
     """Say how long a pour cures, and how to tell that it is done."""
     return BenchStep(
         "Cure",
-        f"Let it cure, level, for {number(batch.cure_h, 2)} h. Touch {touched}, not the {cast}, to see whether it is "
-        f"done: {TACK}.",
+        f"Cure for {number(batch.cure_h, 2)} h, level. Then touch {touched}, not the {cast}: {TACK}.",
         picture,
         kind="cure",
         wait_min=60 * batch.cure_h,
@@ -459,10 +433,7 @@ def cure(batch: Batch, touched: str, cast: str, picture: str) -> BenchStep:
 def never_pushed(spec: Spec, inner: Material) -> str:
     """Say what pulling a filament does, and what pushing it would: `inner` is Layer 1's silicone."""
     tear = float(inner.tensile_mpa) * math.pi * (spec.moulds.filament_mm / 2) ** 2
-    return (
-        f"it lets air in under the unit. Never push it through: {number(tear, 2)} N on its end tear {inner.name} "
-        f"(computed: tensile strength, {inner.tensile_mpa.status}, x its area)."
-    )
+    return f"it lets air in under the unit. Never push it through: {number(tear, 2)} N tear {inner.name} (computed)."
 
 
 def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
@@ -473,42 +444,39 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
         each = "the" if cells == 1 else "each"
         yield BenchStep(
             "Filament out",
-            f"Lift the mould off the bench first: {each} bent end lies under its plate. Pull {each} filament out "
-            f"downwards, by its bent end: {never_pushed(moulds.spec, first)}",
+            f"Lift the mould off the bench. Pull {each} filament out downwards, by its bent end: "
+            f"{never_pushed(moulds.spec, first)}",
             picture_path("filament-out"),
             minutes=PULL_MIN * cells,
         )
     if any(base.name in removed for base in plan.standing(last, "base")):
         split = next((split for split in plan.splits if split.tool == "base"), None)
-        held = f"Hold the mould off the bench by {cup}"
         levered = (
-            f"{held}, put a screwdriver in each of the two pry slots, and lever the base off downwards, on both sides "
-            "at once and a little at a time, until it comes free of the silicone. It must come straight."
+            f"Hold the mould off the bench by {cup}. With a screwdriver in each pry slot lever the base off downwards, "
+            "on both sides at once and a little at a time, until it is free of the silicone. It must come straight."
         )
         if split:
             levered = (
-                "Leave the tape over the seams of the underside on: it ties the pieces together. Dovetails slide up "
-                f"and down, so a piece that nothing levers stays on its cores. {held}. Lever the base off downwards "
-                "with a screwdriver in every pry slot; at a piece that has none, push a blunt spatula in between it "
-                "and the cup, at its outer edge, and turn it. Go round and round, a little at each place, so that no "
-                "piece runs ahead of the next one and all come free of the silicone together. The base must come "
-                "straight."
+                f"Leave the tape on the underside: it ties the pieces together. Hold the mould off the bench by {cup}. "
+                "Lever the base off downwards with a screwdriver in every pry slot; at a piece that has none, turn a "
+                "blunt spatula between it and the cup, at its outer edge. Go round and round, a little at each place, "
+                "so that no piece runs ahead of the next. The base must come straight."
             )
         if split and inner(split):
             levered += (
-                " A piece without an outer edge hangs by the tape alone: before you lever, stick more tape across it "
-                "from neighbour to neighbour, both ways, but not over the holes of the filaments, which let air in. "
-                "Let its neighbours get a millimetre ahead at most, and pull at the tape under it."
+                " A piece without an outer edge hangs by the tape alone. Before you lever, stick more tape across it, "
+                "both ways, clear of the filaments' holes. Let its neighbours get a millimetre ahead at most, and pull "
+                "at the tape under it."
             )
         yield BenchStep(
             "Base off, downwards",
-            f"Take off what held the cup down. Leave {cup} on: it can't be lifted past the silicone that lies over it. "
-            f"{levered} The {moulds.makes} stays in {cup}.",
+            f"Take off what held the cup down. Leave {cup} on: silicone lies over it. {levered} The {moulds.makes} "
+            f"stays in {cup}.",
             picture_path("base-off"),
             minutes=LIFT_MIN * 2,
             needs=("blunt spatula",) if split else (),
         )
-    film = ", and the film that the blade left along the edge," if moulds.spec.moulds.pour == "open" else ""
+    film = " and the blade's film" if moulds.spec.moulds.pour == "open" else ""
     title, what, out, path = (
         "Peel off",
         "unit's edge",
@@ -520,7 +488,7 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
         out = f". Push it up out of {cup} from below with the thumbs, first at the edge, then unit by unit"
     yield BenchStep(
         title,
-        f"Loosen the {what} all round with a blunt spatula{out}. Trim the flash{film} with small scissors.",
+        f"Loosen the {what} all round with a blunt spatula{out}. Trim flash{film} with small scissors.",
         picture_path(path),
         minutes=PEEL_MIN * cells,
         needs=("small scissors", "blunt spatula"),
@@ -537,23 +505,23 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         path = picture_path("motor-home" if i or fed_through(moulds) else "motor-in")
         minutes = LAY_IN_MIN * len(moulds.plan.layout.cells)
         yield BenchStep(title, fitting.text, path, minutes=minutes, needs=fitting.needs)
-    named = {fitting.silicone for fitting in fittings if fitting.silicone}
-    ring = any(fitting.mixed == "ring" for fitting in fittings)
-    cures = {
-        each.name: at_room(float(each.cure_h), casting.room_c) for each in _by_layer(silicones, named) or silicones
-    }
-    hours = ", ".join(f"{name} {number(hour, 2)} h" for name, hour in cures.items())
     mouth, motor = ("cavity's mouth", "motor") if moulds.makes == "unit" else ("cavities' mouths", "motors")
-    least = f"mixed like any batch ({number(casting.minimum_mix_g, 3)} g at least)"
-    smeared = f"A smear of silicone is {least} and spread as thin as butter."
-    mixed = f"The silicone of a ring is {least}." if ring else smeared
+    ring = next((fitting for fitting in fittings if fitting.mixed), None)
+    if ring:
+        (silicone,) = _by_layer(silicones, [ring.silicone])
+        hours = at_room(float(silicone.cure_h), casting.room_c)
+        what, said = ring.mixed, f"{silicone.name} is mixed as for a pour and cures {number(hours, 2)} h."
+    elif any(ADHESIVE in fitting.needs for fitting in fittings):
+        what, hours = "adhesive", ADHESIVE_CURE_H
+        said = f"{number(hours, 2)} h, or as its tube says."
+    else:
+        return
     yield BenchStep(
-        "Let the ring cure" if ring else "Let the smear cure",
-        f"{mixed} It needs its whole cure ({hours}): lay the {moulds.makes} down with the {mouth} up, level, and don't "
-        f"run the {motor} before.{'' if ring else ' Without a smear there is nothing to wait for.'}",
+        f"Let the {what} cure",
+        f"{said} Lay the {moulds.makes} level, the {mouth} up; don't run the {motor} before.",
         picture_path("motor-home"),
         kind="cure",
-        wait_min=60 * max(cures.values()),
+        wait_min=60 * hours,
     )
 
 
@@ -591,16 +559,11 @@ def assembly(moulds: MouldSet) -> tuple[Fitting, ...]:
         return (*found, Fitting("Lay everything that is not silicone where the drawing of this pour shows it."))
     ahead = ", the pad ahead," if spec.fpcb and design.opens == "below" else ""
     way = f", and lay the {leaves} in the notch" if leaves else ""
-    side = "the skin" if design.opens == "below" else "above"
+    side, what = "the skin" if design.opens == "below" else "above", "the pad" if spec.fpcb else "the motor's back"
     return (
         *found,
         Fitting(f"Push the motor{ahead} into the cavity from {side}{way}."),
-        Fitting(
-            "A smear of Layer 1's silicone holds it (assumed: silicone bonds poorly to bare metal and polyimide). The "
-            "design's file says nothing more of the assembly; a Design with an assembly of its own can.",
-            silicone=1,
-            mixed="smear",
-        ),
+        Fitting(f"{bond(what, 'Layer 1')} The design's file says no more of the assembly.", (ADHESIVE,)),
     )
 
 
@@ -611,14 +574,14 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
     where it is the drawn one.
     """
     spec, dims, off, exit = moulds.spec, moulds.plan.dimensions, eccentricity(moulds), moulds.plan.dimensions.exit
-    yield f"Height over all: {shown(dims.heights[-1], 2)} mm. A cup that did not seat shows here."
+    yield f"Height over all: {shown(dims.heights[-1], 2)} mm."
     if moulds.plan.concentric:
         yield f"Diameter at the skin: {shown(2 * dims.outer_radius, 2)} mm, in two directions."
         pushed = "" if off.ribs else " unless both cups were pushed the same way"
         further = f", each further layer by {number(2 * off.at_worst_mm, 2)} mm{pushed}"
         yield (
-            "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
-            f"{number(off.at_worst_mm, 2)} mm either way{further if len(masses_g) > 1 else ''}."
+            f"Walls at the skin, at four places: Layer 1 may vary by {number(off.at_worst_mm, 2)} mm either way"
+            f"{further if len(masses_g) > 1 else ''}."
         )
     else:
         yield moulds.across

@@ -31,10 +31,12 @@ from unitcad.casting.pouring import (
     pour_steps,
     release,
 )
-from unitcad.casting.preparation import preparation, printing, tunnels
+from unitcad.casting.preparation import Printing, preparation, printing, tunnels
 from unitcad.casting.steps import BenchStep, Phase, phases
+from unitcad.casting.troubles import Trouble, troubles
 from unitcad.casting.views import views
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.validation import warnings
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class Procedure:
     """A whole casting: numbered steps run on from `preparation` through the pours to `assembly`.
 
     `earliest_finish_min`: from the first step, the pieces just printed, until the units are out of the mould, of which
-    `bench_min` with a person at the bench; `time_line` goes on until the motor is in. `printing` says what to print.
+    `bench_min` with a person at the bench; `time_line` goes on until the motor is in.
 
     `makes`: what comes out; `last`: what `assembly` does.
     `bonds` are the tools' faces that must never get release agent.
@@ -85,7 +87,7 @@ class Procedure:
     earliest_finish_min: float
     bench_min: float
     time_line: tuple[Phase, ...]
-    printing: tuple[str, ...]
+    printing: Printing
     preparation: tuple[BenchStep, ...]
     off_grid: tuple[OffGrid, ...]
     unit_heights: tuple[UnitHeight, ...]
@@ -98,6 +100,8 @@ class Procedure:
     without_ribs: Eccentricity | None
     walls: tuple[Figure, ...]
     bill: tuple[Item, ...]
+    warnings: tuple[str, ...] = ()
+    troubles: tuple[Trouble, ...] = ()
     makes: str = "unit"
     last: str = "Motor in"
 
@@ -162,6 +166,8 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         eccentricity=eccentricity(moulds),
         without_ribs=eccentricity(moulds, with_ribs=False),
         walls=walls(moulds) if plan.concentric else (),
+        warnings=tuple(warnings(spec)),
+        troubles=troubles(moulds),
         makes=moulds.makes,
         bill=bill(moulds, batches, every, after_pours(moulds, silicones)),
     )

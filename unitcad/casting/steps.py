@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from unitcad.text import listed, number
@@ -21,6 +22,7 @@ class BenchStep:
     minutes   a person's time at the bench
     wait_min  what passes after it before the next step
     needs     tools and consumables that it takes, by their names in `NEEDS`
+    short     the text where an earlier pour had the step too: its number and what differs; filled in by `shortened`
     """
 
     title: str
@@ -30,33 +32,60 @@ class BenchStep:
     minutes: float = 0.0
     wait_min: float = 0.0
     needs: tuple[str, ...] = ()
+    short: str = ""
+
+
+_SENTENCES = re.compile(r"(?<=[.!?]) (?=[A-Z])")
+_COUNTED = re.compile(r"\b(cup|lid|layer|pour) \d+", re.IGNORECASE)
+_MOST_NEW = 0.8
+"""A step refers to an earlier one if its own words are a smaller share of its text."""
+
+
+def shortened(steps: Iterable[BenchStep]) -> list[BenchStep]:
+    """Return the steps of a whole procedure, numbered from 1; what an earlier step says has a short text."""
+    found: list[BenchStep] = []
+    earlier: dict[str, list[tuple[int, set[str]]]] = {}
+
+    def alike(text: str) -> str:
+        return _COUNTED.sub(r"\1", text)
+
+    for i, step in enumerate(steps, 1):
+        sentences = _SENTENCES.split(step.text)
+        before = earlier.setdefault(alike(step.title), [])
+        rests = [(" ".join(each for each in sentences if alike(each) not in said), number) for number, said in before]
+        own, first = min(rests, key=lambda rest: len(rest[0]), default=(step.text, 0))
+        short = f"As step {first}{f', but: {own}' if own else '.'}" if len(own) < _MOST_NEW * len(step.text) else ""
+        found.append(replace(step, short=short))
+        before.append((i, {alike(each) for each in sentences}))
+    return found
 
 
 NEEDS = {
-    "sharp knife": ("piece", "tool", "for flash, sprues and filament"),
-    "small scissors": ("piece", "tool", "to trim"),
-    "pin": ("piece", "tool", "for bubbles"),
-    "blunt spatula": ("piece", "tool", "loosens what sticks, from its edge"),
-    "level": ("piece", "tool", "a phone shows it too"),
-    "paper": ("sheet", "bought", "under corners, and to feel slits with"),
-    "vice and two boards": ("set", "tool", "where the hand can't press a cup on"),
-    "pen": ("piece", "tool", "marks the tongue"),
-    "cotton buds": ("set", "bought", "dry, for grease in the bore"),
-    "small brush": ("piece", "tool", "for the first coat of silicone"),
-    "hand brush": ("piece", "tool", "for strings and loose bits"),
+    "sharp knife": ("piece", "tool", ""),
+    "small scissors": ("piece", "tool", ""),
+    "pin": ("piece", "tool", ""),
+    "blunt spatula": ("piece", "tool", ""),
+    "level": ("piece", "tool", "or a phone"),
+    "paper": ("sheet", "tool", ""),
+    "vice and two boards": ("set", "tool", ""),
+    "pen": ("piece", "tool", ""),
+    "cotton buds": ("set", "bought", ""),
+    "small brush": ("piece", "tool", "for silicone"),
+    "hand brush": ("piece", "tool", ""),
     "stiff card or plastic": ("strip", "cut", "strikes off where the blade can't pass"),
-    "flat pliers": ("piece", "tool", "to pull cut tongues"),
-    "narrow pliers": ("piece", "tool", "to pull filament out of its pocket"),
-    "soldering iron and solder": ("set", "tool", "joins motors, circuits and wires"),
-    "release agent": ("dab", "bought", "inside the last cup alone; may be left out"),
+    "flat pliers": ("piece", "tool", "for cut tongues"),
+    "narrow pliers": ("piece", "tool", "for filament in its pocket"),
+    "soldering iron and solder": ("set", "tool", ""),
+    "silicone adhesive": ("tube", "bought", "neutral-curing; or a primer and a smear of silicone"),
+    "release agent": ("dab", "bought", "may be left out"),
     "wide adhesive tape": ("roll", "bought", "under the seams of split tools"),
-    "petroleum jelly": ("dab", "bought", "only where a step says so"),
-    "isopropanol and lint-free wipes": ("set", "bought", "cleans cured layers and printed resin"),
-    "rinsing syringe": ("piece", "tool", "for the windows; not used for silicone"),
+    "petroleum jelly": ("dab", "bought", ""),
+    "isopropanol and lint-free wipes": ("set", "bought", ""),
+    "rinsing syringe": ("piece", "tool", "for the windows; not for silicone"),
     "oven": ("piece", "tool", "holds 60 degC; not one for food"),
     "curing lamp": ("piece", "tool", "as the resin's maker says"),
-    "acrylic varnish": ("bottle", "bought", "only where the cure test is tacky"),
-    "caliper": ("piece", "tool", "to measure with"),
+    "acrylic varnish": ("bottle", "bought", "only if the cure test is tacky"),
+    "caliper": ("piece", "tool", ""),
 }
 """Unit, how it is made, and a note, of each thing that steps need one of, in the bill's order; the last one always."""
 
@@ -112,8 +141,11 @@ def in_short(procedure: Mapping[str, Any]) -> Iterator[str]:
     total, bench = duration(procedure["earliest_finish_min"]), duration(procedure["bench_min"])
     pours = procedure["pours"]
     count = f"{len(pours)} pour{'s' if len(pours) > 1 else ''}"
-    yield f"{count}, ready {total} after the print, of which {bench} at the bench"
-    yield "to mix: " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams.items())
+    printing = procedure["printing"]
+    time, volume = duration(printing["minutes"]), number(printing["cm3"], 2)
+    yield f"print {listed(printing['plates'])}: about {time}, at most {volume} cm3 of {printing['of']}"
+    yield "mix " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams.items())
+    yield f"ready {total} after the print: {count}, {bench} at the bench"
     yield from (f"warning: {line}" for line in pour_warnings(pours))
 
 

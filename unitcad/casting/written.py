@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import msgspec
 
-from unitcad.casting.bill import in_words, to_csv
+from unitcad.casting.bill import Item, grouped, in_words, to_csv
 from unitcad.casting.drawings import cast_colour
-from unitcad.casting.figures import Figure
+from unitcad.casting.preparation import MEASURED_MM
 from unitcad.casting.procedure import Procedure
-from unitcad.casting.steps import BenchStep, duration
+from unitcad.casting.steps import BenchStep, Phase, duration, shortened
+from unitcad.casting.troubles import TROUBLES, troubles_markdown
 from unitcad.export import svg
 from unitcad.json_text import all_finite
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.body import Body
-from unitcad.text import markdown, number, spaced
+from unitcad.text import listed, markdown, number, spaced
 
 
 def _nine_digits(text: str) -> float:
@@ -27,17 +29,41 @@ def _nine_digits(text: str) -> float:
 
 
 _NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=_nine_digits)
-UNPRINTED = "Nothing of this tooling has been printed yet: every clearance is a choice with a check behind it."
+UNPRINTED = "Nothing of this tooling has been printed yet."
 
 
 def files(procedure: Procedure) -> dict[str, str]:
-    """Return casting.md, casting.json and bom.csv."""
-    procedure = replace(procedure, bill=in_words(procedure.bill))
+    """Return casting.md, casting.json, bom.csv and troubleshooting.md."""
+    procedure = _shortened(replace(procedure, bill=in_words(procedure.bill)))
     return {
         "casting.md": to_markdown(procedure),
         "casting.json": to_json(procedure),
         "bom.csv": to_csv(procedure.bill),
+        "troubleshooting.md": troubles_markdown(procedure.troubles),
     }
+
+
+def _shortened(procedure: Procedure) -> Procedure:
+    """Return the procedure with the short texts of its steps."""
+    left = iter(shortened(_steps(procedure)))
+
+    def next_of(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
+        return tuple(islice(left, len(steps)))
+
+    return replace(
+        procedure,
+        preparation=next_of(procedure.preparation),
+        pours=tuple(replace(pour, steps=next_of(pour.steps)) for pour in procedure.pours),
+        release=next_of(procedure.release),
+        assembly=next_of(procedure.assembly),
+    )
+
+
+def _steps(procedure: Procedure) -> Iterator[BenchStep]:
+    yield from procedure.preparation
+    for pour in procedure.pours:
+        yield from pour.steps
+    yield from (*procedure.release, *procedure.assembly)
 
 
 def to_json(procedure: Procedure) -> str:
@@ -50,39 +76,45 @@ def to_json(procedure: Procedure) -> str:
 
 
 def to_markdown(procedure: Procedure) -> str:
-    """Write the procedure for the bench: times, what is needed and printed, numbered steps, figures in an appendix."""
-    made, cells, written = procedure.makes, procedure.cells, 0
+    """Write the procedure for the bench: what to measure, print and have, numbered steps, figures behind a fold."""
+    made, cells, printing, written = procedure.makes, procedure.cells, procedure.printing, 0
     cavities = f"{cells} cavit{'y' if cells == 1 else 'ies'}"
     if cells > 1 and made != "unit":
         cavities = f"{cells} units in one {made}"
     lines = [f"# Casting {markdown(procedure.name)}", "", f"Mould set {procedure.label}, {cavities}. {UNPRINTED}", ""]
+    lines += [f"> **Warning:** {markdown(text)}.\n" for text in procedure.warnings]
 
     def section(title: str, body: Iterable[str], level: str = "##") -> None:
         lines.extend((f"{level} {title}", "", *body, ""))
 
     def steps(title: str, these: Iterable[BenchStep]) -> None:
         nonlocal written
-        body = []
+        body, shown = list[str](), ""
         for step in these:
             written += 1
-            body.append(f"{written}. **{markdown(step.title)}.** {markdown(step.text)}")
-            body += ["", f"   ![{markdown(step.title)}]({step.picture})", ""] if step.picture else []
+            name, text = markdown(step.title), markdown(step.short or step.text)
+            begun = text.startswith(f"{name} ")
+            body.append(
+                f"{written}. **{name}**{text.removeprefix(name)}" if begun else f"{written}. **{name}.** {text}"
+            )
+            body += ["", f"   ![{written}]({step.picture})", ""] if step.picture not in ("", shown) else []
+            shown = step.picture
         section(title, body)
 
     total, bench = duration(procedure.earliest_finish_min), duration(procedure.bench_min)
-    out = "units and sheet out of their moulds" if made == "sheet" else f"{made} out of the mould"
-    times = [f"**{total}** from the printed pieces to the {out}, of which {bench} at the bench."]
+    out = "units and sheet are out of their moulds" if made == "sheet" else f"{made} is out of the mould"
+    lines.append(f"The {out} **{total}** after the print, with {bench} at the bench (assumed).")
+    lines.append(f"What went wrong? {TROUBLES}.\n")
     if procedure.assembly:
         more = procedure.time_line[-1].end_min - procedure.earliest_finish_min
-        waits = sum(step.wait_min for step in procedure.assembly)
-        smear = f", of which {duration(waits)} a smear's cure" if waits else ""
-        times.append(f"{procedure.last}: {duration(more)} more at most{smear}. Printing comes before.")
-    line = [(p.name, *map(duration, (p.start_min, p.bench_min, p.wait_min))) for p in procedure.time_line]
-    assumed = "Times at the bench are assumed; cures are the silicones' own, at the room's temperature."
-    section("Time", [*times, "", *_table("what", "begins after", "at the bench", "then wait", rows=line), "", assumed])
-    bill = [(markdown(i.item), f"{number(i.quantity, 3)} {i.unit}", i.made, markdown(i.note)) for i in procedure.bill]
-    section("Needed", _table("item", "quantity", "made", "note", rows=bill))
-    section("Print", (f"- {markdown(text)}" for text in procedure.printing))
+        lines[-1:-1] = [f"{procedure.last}: {duration(more)} more."]
+    lines += [*_stretches(procedure.time_line), ""]
+    section("0. Measure first", _measuring(procedure))
+    section("Print", (f"- {markdown(text)}" for text in printing.how))
+    for group, items in grouped(procedure.bill).items():
+        if group == "print":
+            continue  # the plate's line names the pieces
+        section(group.capitalize(), _listed_items(items))
     steps("Before the first pour", procedure.preparation)
     titles = [f"{pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}" for pour in procedure.pours]
     for title, pour in zip(titles, procedure.pours, strict=True):
@@ -91,24 +123,91 @@ def to_markdown(procedure: Procedure) -> str:
     if procedure.assembly:
         steps(procedure.last, procedure.assembly)
     section("Measure on the first part", (f"- {markdown(text)}" for text in procedure.measure))
-    saves = "bench.html (unitcad report) takes down what was weighed and measured, and saves it as a cast record."
-    lines += [saves, "", "## Appendix: figures and sources", ""]
-    for title, pour in zip(titles, procedure.pours, strict=True):
-        drawing = f"![pour {pour.index} in section]({pour.drawing})"
-        section(f"Figures of pour {title}", [drawing, "", *_figures(pour.figures)], "###")
-    if procedure.walls:
-        worst = "How far the cups stand off the core's axis is the largest error of all:"
-        section("Walls", [worst, "", *_figures(procedure.walls, decimals=2)], "###")
-    if procedure.off_grid:
-        moves = "These edges fall between two of the printer's layers; the slicer moves them to the nearest."
-        edges = [(spaced(o.piece), o.edge, number(o.height_mm, 3), number(o.moved_mm, 2)) for o in procedure.off_grid]
-        table = _table("piece", "edge", "height as printed, mm", "moved by, mm", rows=edges)
-        section("Edges between two layers", [moves, "", *table], "###")
-    if procedure.unit_heights:
-        heights = [(each.what, number(each.asked_mm, 3), number(each.printed_mm, 3)) for each in procedure.unit_heights]
-        table = _table("height", "asked for, mm", "in whole layers, mm", rows=heights)
-        section("Heights of the unit", ["They are drawn as asked for; whole layers make them:", "", *table], "###")
+    lines += ["bench.html saves what was weighed and measured as a cast record.", "", *_appendix(procedure)]
     return "\n".join(lines) + "\n"
+
+
+def _measuring(procedure: Procedure) -> Iterator[str]:
+    """Yield what to measure before printing, and how to build again with other sizes."""
+    printing = procedure.printing
+    yield from (
+        f"- {size.what}: {number(size.value_mm, 3)} mm{f' (assumed; {size.assumed})' if size.assumed else ''}"
+        for size in printing.sizes
+    )
+    again = f"put your figures into {printing.source} and build it again"
+    if procedure.makes == "unit":
+        again = "build again here with your figures"
+    yield f"\nIf calipers differ by more than {number(MEASURED_MM, 2)} mm, {again} before you print."
+    if procedure.makes == "unit":
+        sets = " ".join(f"--set {size.key}={number(size.value_mm, 3)}" for size in printing.sizes)
+        yield f"\n```sh\nunitcad build {printing.source} {sets}\n```"
+
+
+def _listed_items(items: Iterable[Item]) -> Iterator[str]:
+    """Yield a line for each item with its note, silicones with both parts in one; one line for all without a note."""
+    plain, parts = list[str](), dict[str, list[str]]()
+    for item in items:
+        name, much = markdown(item.item), number(item.quantity, 3)
+        silicone, part, letter = name.partition(" part ")
+        if part:
+            parts.setdefault(silicone, []).append(f"{much} g of part {letter}")
+            continue
+        unit = f" {item.unit} of" if item.unit.startswith(("strip", "pair")) else ""
+        counted = f"{much}{unit} {name}" if unit or item.quantity != 1 else name
+        if item.note:
+            yield f"- {counted}: {markdown(item.note)}"
+        else:
+            plain.append(counted)
+    for silicone, each in parts.items():
+        equal = len(each) == 2 and each[0][:-1] == each[1][:-1]
+        yield f"- {silicone}: {f'{each[0]} and as much of B' if equal else listed(each)}"
+    if plain:
+        yield f"- {listed(plain)}"
+
+
+def _stretches(line: Sequence[Phase]) -> Iterator[str]:
+    """Yield a line for each stretch at the bench: when it begins, how long it takes, the wait after it, its phases."""
+    names, begins, bench = list[str](), 0.0, 0.0
+    for i, phase in enumerate(line, 1):
+        begins = begins if names else phase.start_min
+        names, bench = [*names, phase.name], bench + phase.bench_min
+        if phase.wait_min or i == len(line):
+            wait = f", then wait {duration(phase.wait_min)}" if phase.wait_min else ""
+            yield f"- after {duration(begins)}: {', '.join(names)}, {duration(bench)}{wait}"
+            names, bench = [], 0.0
+
+
+_SAID = frozenset(
+    (
+        *("volume of one layer", "volume of this pour", "to mix", "part A", "part B", "mixing", "degassing", "vacuum"),
+        *("pouring and striking off", "degassing container, at least", "depth of this pour", "in the cavities, net"),
+        *("scale's error on a part, net", "scale's error on a part, mixed"),
+    )
+)
+"""Figures that steps and bill have, or that follow from others; casting.json has all."""
+
+
+def _appendix(procedure: Procedure) -> Iterator[str]:
+    """Yield figures by their source, with the values of all pours, behind a fold."""
+    sources: dict[str, dict[tuple[str, str], list[str]]] = {}
+    walls = [figure for figure in procedure.walls if figure.name.startswith("cups")][-1:]
+    of_pours = ((figure, number(figure.value, 3)) for pour in procedure.pours for figure in pour.figures)
+    for figure, value in (*of_pours, *((figure, f"{figure.value:.2f}") for figure in walls)):
+        if figure.name not in _SAID and not figure.name.startswith(("rise", "weep")):
+            sources.setdefault(figure.source, {}).setdefault((figure.name, figure.unit), []).append(value)
+    yield from ("<details>", "<summary>Figures and sources</summary>", "")
+    sections = (f"![pour {pour.index} in section]({pour.drawing})" for pour in procedure.pours)
+    yield from (" ".join(sections), "")
+    for source, named in sources.items():
+        figures = (f"{markdown(name)} {listed(dict.fromkeys(each))} {unit}" for (name, unit), each in named.items())
+        yield f"- {'; '.join(figures)} ({markdown(source)})"
+    for o in procedure.off_grid:
+        height, by = number(o.height_mm, 3), number(o.moved_mm, 2)
+        yield f"- {spaced(o.piece)}, {o.edge}: {height} mm, which whole layers move by {by} mm"
+    heights = (f"{h.what} {number(h.printed_mm, 3)} for {number(h.asked_mm, 3)}" for h in procedure.unit_heights)
+    if procedure.unit_heights:
+        yield f"- in whole layers, mm: {', '.join(heights)}"
+    yield from ("", "All figures: casting.json.", "", "</details>")
 
 
 def step_section(moulds: MouldSet, step: Step) -> str:
@@ -124,20 +223,3 @@ def step_section(moulds: MouldSet, step: Step) -> str:
         loops = regions[region.name].loops if region.name in regions else ()
         regions[region.name] = replace(region, name=spaced(region.name), loops=(*loops, *region.loops))
     return svg.section([*regions.values()], title=f"Pour {step.index}: {spaced(step.name)}", ground="seat")
-
-
-def _figures(figures: Iterable[Figure], decimals: int | None = None) -> list[str]:
-    """Write figures as a table, to three digits each, or to so many `decimals` where they are compared."""
-    rows = [
-        (
-            markdown(f.name),
-            f"{number(f.value, 3) if decimals is None else f'{f.value:.{decimals}f}'} {f.unit}",
-            markdown(f.source),
-        )
-        for f in figures
-    ]
-    return _table("figure", "value", "source", rows=rows)
-
-
-def _table(*head: str, rows: Iterable[Sequence[str]]) -> list[str]:
-    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows)]

@@ -1,8 +1,8 @@
 """Materials, motors, printers, tissue and the paper's measurements: every value with its source and status.
 
-The data are TOML files beside this module, read on first use; what each key takes is in `entries`. A value that nobody
-has measured for us is "assumed" and carries a range. A spec may bring entries of its own (`own`): the same tables,
-where a plain number counts as status "spec".
+The data are TOML files next to this module, read on first use; `entries` has the kinds of their values. A value that
+nobody has measured for us is "assumed" and carries a range. A spec may bring entries of its own (`own`): the same
+tables, in which a plain number has the status "spec".
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def _tissue(name: str, own: Mapping[str, Mapping[str, TissueEntry]]) -> tuple[Ti
 
 
 def moduli_by_source() -> dict[str, dict[str, float]]:
-    """Return Young's modulus (kPa) of the shipped silicones by source, then by name; who has none is left out.
+    """Return Young's modulus (kPa) of the shipped silicones by source, then by name; silicones without one are skipped.
 
     "paper": small strain at the operating frequency. "data sheet": static, at 100 %. "tensile, METHOD": slow pulls by
     others, worked out by each method that could be defended (tensile.toml).
@@ -178,7 +178,7 @@ def _plain(table: Any) -> dict[str, Any]:
 
 
 def _sourced(kind: type[Struct], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of a table, each as a table that says where it comes from."""
+    """Return the values of a table, each with status and source."""
     default = {key: table[key] for key in ("status", "source") if key in table}
     return {
         key: {**default, **(raw if isinstance(raw, dict) else {"value": raw})}
@@ -188,7 +188,7 @@ def _sourced(kind: type[Struct], table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _entry(kind: type[Struct], name: str, table: Mapping[str, Any], path: str) -> Any:
-    """Return an entry from its table. Raises `Refusal` for values left out, or that lie outside their own range."""
+    """Return an entry from its table. Raises `Refusal` for missing values, or values outside their own range."""
     missing = [key for key in required_of(kind) if key not in ("name", *table)]
     if missing:
         others = f" with {', '.join(missing[1:])}" if missing[1:] else ""

@@ -1,6 +1,6 @@
-"""What an entry of the catalogue holds: for each key its type, its range and a sentence.
+"""Entries of the catalogue: for each key its type, its range and a description.
 
-`Material`, `Motor`, `Printer` and `Tissue` are whole entries; the `...Entry` of each is what a spec may give of one.
+`Material`, `Motor`, `Printer` and `Tissue` are whole entries; a spec gives the keys of the `...Entry` of each.
 """
 
 from __future__ import annotations
@@ -15,79 +15,87 @@ from msgspec import Meta, Struct
 T = TypeVar("T")
 Status = Literal["datasheet", "paper", "secondary", "assumed", "measured", "spec"]
 FREQUENCIES_HZ = (1.0, 5000.0)
-"""What an estimate may be asked for: vibration motors, with room on both sides; above it waves are too short."""
+"""Frequencies of an estimate: those of vibration motors, with room on both sides; above them waves are too short."""
 LONGEST_MM = 1000.0
 """Beyond a metre nothing here is printed or cast."""
 
 Source = Annotated[str, Meta(min_length=1, max_length=500)]
-Shore = Annotated[str, Meta(min_length=1, max_length=20, description="hardness as the data sheet has it")]
+Shore = Annotated[str, Meta(min_length=1, max_length=20, description="hardness on the data sheet")]
 Drive = Annotated[
     Literal["flat", "axial"],
-    Meta(description="how the motor's force acts: turning in the can's plane (ERM) or along its axis (coin LRA)"),
+    Meta(description="direction of the force: flat, in the can's plane (ERM), or axial, along its axis (coin LRA)"),
 ]
-Support = Annotated[Literal["printed", "none"], Meta(description="printed under overhangs, or none: an overhang fails")]
-Technology = Annotated[Literal["fdm", "sla"], Meta(description="molten filament, or cured resin")]
-Density = Annotated[float, Meta(ge=0.1, le=25, description="of the cured silicone")]
-Viscosity = Annotated[float, Meta(ge=1, le=1e8, description="of both parts mixed")]
-PotLife = Annotated[float, Meta(ge=0.1, le=1e5, description="from mixing until it no longer flows")]
-Cure = Annotated[float, Meta(ge=0.01, le=1e4, description="from pouring until it may be demoulded")]
-StaticModulus = Annotated[float, Meta(ge=0.1, le=1e6, description="static, at 100 % strain")]
-Tensile = Annotated[float, Meta(ge=0.001, le=1000, description="strength in tension")]
-Elongation = Annotated[float, Meta(ge=1, le=5000, description="at break")]
-CastingFloor = Annotated[float, Meta(ge=0.01, le=100, description="least wall that pours and demoulds")]
+Support = Annotated[Literal["printed", "none"], Meta(description="printed: under overhangs; none: an overhang fails")]
+Technology = Annotated[Literal["fdm", "sla"], Meta(description="fdm: molten filament; sla: cured resin")]
+Density = Annotated[float, Meta(ge=0.1, le=25, description="density of the cured silicone")]
+Viscosity = Annotated[float, Meta(ge=1, le=1e8, description="viscosity of both parts mixed")]
+PotLife = Annotated[float, Meta(ge=0.1, le=1e5, description="time from mixing until the mix no longer flows")]
+Cure = Annotated[float, Meta(ge=0.01, le=1e4, description="time from pouring until demoulding")]
+StaticModulus = Annotated[float, Meta(ge=0.1, le=1e6, description="stress at 100 % strain, slowly pulled")]
+Tensile = Annotated[float, Meta(ge=0.001, le=1000, description="tensile strength")]
+Elongation = Annotated[float, Meta(ge=1, le=5000, description="elongation at break")]
+CastingFloor = Annotated[float, Meta(ge=0.01, le=100, description="thinnest wall that pours and demoulds")]
 Poisson = Annotated[float, Meta(ge=0, le=0.5, description="Poisson's ratio; 0.5: incompressible")]
 LossFactor = Annotated[float, Meta(ge=0, le=10, description="tan delta at the motor's frequency")]
 MixRatio = Annotated[float, Meta(ge=0.001, le=1000, description="parts A to one part B")]
 Young = Annotated[float, Meta(ge=0.01, le=1e8, description="Young's modulus at small strain and the motor's frequency")]
-QuasistaticYoung = Annotated[float, Meta(ge=0.01, le=1e8, description="Young's modulus, pulled slowly")]
+QuasistaticYoung = Annotated[float, Meta(ge=0.01, le=1e8, description="Young's modulus of a slow pull")]
 FractionalModulus = Annotated[float, Meta(ge=0.01, le=1e8, description="static shear modulus of a fractional law")]
 FractionalTime = Annotated[float, Meta(ge=0, le=1e9, description="time constant of a fractional law")]
 FractionalOrder = Annotated[float, Meta(ge=0, le=1, description="order of a fractional law")]
 
-MotorDiameter = Annotated[float, Meta(ge=1, le=LONGEST_MM, description="of the motor's can")]
-MotorThickness = Annotated[float, Meta(ge=0.5, le=100, description="of the motor's can, along its axis")]
-MotorMass = Annotated[float, Meta(ge=0.001, le=1e4, description="of the motor")]
-Frequency = Annotated[float, Meta(ge=FREQUENCIES_HZ[0], le=FREQUENCIES_HZ[1], description="of the drive")]
-Amplitude = Annotated[float, Meta(ge=0.001, le=1e5, description="of the motor's vibration")]
-Speed = Annotated[float, Meta(ge=60 * FREQUENCIES_HZ[0], le=60 * FREQUENCIES_HZ[1], description="at the rated voltage")]
-Voltage = Annotated[float, Meta(ge=0.01, le=1000, description="rated")]
-Current = Annotated[float, Meta(ge=0.01, le=1e5, description="at the rated voltage")]
-Acceleration = Annotated[float, Meta(ge=0.001, le=1000, description="of the maker's test mass")]
-
-Bed = Annotated[float, Meta(ge=20, le=LONGEST_MM, description="side of the space that the printer fills")]
-LayerHeight = Annotated[float, Meta(ge=0.005, le=2, description="height of a printed layer")]
-Play = Annotated[float, Meta(ge=0, le=2, description="how far the machine's axes miss, per side")]
-PlinthClearance = Annotated[float, Meta(ge=0.01, le=2, description="between a cup and its plinth, per side")]
-RibInterference = Annotated[
-    float, Meta(ge=0, le=2, description="by which a cup's ribs reach into its plinth, per side; 0: no ribs")
+MotorDiameter = Annotated[float, Meta(ge=1, le=LONGEST_MM, description="diameter of the motor's can")]
+MotorThickness = Annotated[float, Meta(ge=0.5, le=100, description="thickness of the motor's can")]
+MotorMass = Annotated[float, Meta(ge=0.001, le=1e4, description="mass of the motor")]
+Frequency = Annotated[float, Meta(ge=FREQUENCIES_HZ[0], le=FREQUENCIES_HZ[1], description="frequency of the drive")]
+Amplitude = Annotated[float, Meta(ge=0.001, le=1e5, description="amplitude of the motor")]
+Speed = Annotated[
+    float, Meta(ge=60 * FREQUENCIES_HZ[0], le=60 * FREQUENCIES_HZ[1], description="speed at the rated voltage")
 ]
-SeatRelief = Annotated[float, Meta(ge=0.01, le=20, description="how far a cup's foot stays above the plate")]
-SlotHeight = Annotated[float, Meta(ge=0.05, le=20, description="of the slot that a tail or wires leave through")]
-SlotClearance = Annotated[float, Meta(ge=0.01, le=20, description="what the slot is wider than the tail or the wires")]
-WindowClearance = Annotated[float, Meta(ge=0.01, le=5, description="between the tongue and a cup's window, per side")]
-Wall = Annotated[float, Meta(ge=0.05, le=50, description="least wall that comes out whole")]
-FlatWall = Annotated[float, Meta(ge=0.05, le=50, description="least wall that lies flat on the bed")]
-Feature = Annotated[float, Meta(ge=0.05, le=20, description="least width of a rib, a groove or a stroke")]
-Skirt = Annotated[float, Meta(ge=0.05, le=50, description="wall of a cup round its plinth")]
-Land = Annotated[float, Meta(ge=0.05, le=50, description="width of the rim that a cavity is struck off along")]
-GrooveWidth = Annotated[float, Meta(ge=0.05, le=50, description="of the groove that takes what overflows")]
-GrooveDepth = Annotated[float, Meta(ge=0.05, le=50, description="of the groove that takes what overflows")]
-FilamentHole = Annotated[float, Meta(ge=0.1, le=20, description="of the hole in the core that takes the filament")]
-EngravingDepth = Annotated[float, Meta(ge=0.01, le=10, description="of the lettering")]
-EngravingStroke = Annotated[float, Meta(ge=0.05, le=10, description="width of the lettering's strokes")]
-Overhang = Annotated[float, Meta(ge=0, le=90, description="most lean from the vertical without support")]
-Bridge = Annotated[float, Meta(ge=0, le=LONGEST_MM, description="longest bridge without support")]
+Voltage = Annotated[float, Meta(ge=0.01, le=1000, description="rated voltage")]
+Current = Annotated[float, Meta(ge=0.01, le=1e5, description="current at the rated voltage")]
+Acceleration = Annotated[float, Meta(ge=0.001, le=1000, description="acceleration of the maker's test mass")]
 
-TissueDensity = Annotated[float, Meta(ge=1, le=25000, description="of the tissue")]
-TissueThickness = Annotated[float, Meta(ge=0.001, le=1e4, description="of a layer; the last one has none")]
-TissueModulus = Annotated[float, Meta(ge=0.001, le=1e9, description="at small strain; the shear modulus goes first")]
-TissueViscosity = Annotated[float, Meta(ge=0, le=1e6, description="of shear; it goes before the loss factor")]
+Bed = Annotated[float, Meta(ge=20, le=LONGEST_MM, description="side of the printer's build volume")]
+LayerHeight = Annotated[float, Meta(ge=0.005, le=2, description="height of a printed layer")]
+Play = Annotated[float, Meta(ge=0, le=2, description="position error of the printer's axes, per side")]
+PlinthClearance = Annotated[float, Meta(ge=0.01, le=2, description="gap between a cup and its plinth, per side")]
+RibInterference = Annotated[
+    float, Meta(ge=0, le=2, description="interference of a cup's ribs with its plinth, per side; 0: no ribs")
+]
+SeatRelief = Annotated[float, Meta(ge=0.01, le=20, description="gap between a cup's foot and the plate")]
+SlotHeight = Annotated[float, Meta(ge=0.05, le=20, description="height of the slot for a tail or wires")]
+SlotClearance = Annotated[float, Meta(ge=0.01, le=20, description="extra width of the slot, over tail or wires")]
+WindowClearance = Annotated[
+    float, Meta(ge=0.01, le=5, description="gap between the tongue and a cup's window, per side")
+]
+Wall = Annotated[float, Meta(ge=0.05, le=50, description="thinnest wall that prints whole")]
+FlatWall = Annotated[float, Meta(ge=0.05, le=50, description="thinnest wall that prints flat on the bed")]
+Feature = Annotated[float, Meta(ge=0.05, le=20, description="smallest width of a rib, a groove or a stroke")]
+Skirt = Annotated[float, Meta(ge=0.05, le=50, description="wall of a cup around its plinth")]
+Land = Annotated[float, Meta(ge=0.05, le=50, description="width of the rim around a cavity")]
+GrooveWidth = Annotated[float, Meta(ge=0.05, le=50, description="width of the overflow groove")]
+GrooveDepth = Annotated[float, Meta(ge=0.05, le=50, description="depth of the overflow groove")]
+FilamentHole = Annotated[float, Meta(ge=0.1, le=20, description="diameter of the core's hole for the filament")]
+EngravingDepth = Annotated[float, Meta(ge=0.01, le=10, description="depth of the lettering")]
+EngravingStroke = Annotated[float, Meta(ge=0.05, le=10, description="width of the lettering's strokes")]
+Overhang = Annotated[float, Meta(ge=0, le=90, description="largest lean from the vertical that prints without support")]
+Bridge = Annotated[float, Meta(ge=0, le=LONGEST_MM, description="longest bridge that prints without support")]
+
+TissueDensity = Annotated[float, Meta(ge=1, le=25000, description="density of the tissue")]
+TissueThickness = Annotated[
+    float, Meta(ge=0.001, le=1e4, description="thickness of the layer; the last layer has none")
+]
+TissueModulus = Annotated[
+    float, Meta(ge=0.001, le=1e9, description="modulus at small strain; a shear modulus overrides Young's modulus")
+]
+TissueViscosity = Annotated[float, Meta(ge=0, le=1e6, description="viscosity in shear; it overrides the loss factor")]
 
 
 class Value(Struct, Generic[T], frozen=True, omit_defaults=True, repr_omit_defaults=True, forbid_unknown_fields=True):
-    """A number or a word with where it comes from; `low` and `high` bound it where a range is known.
+    """A number or a word with its status and source; `low` and `high` bound it if a range is known.
 
-    `method`: how a measured value was worked out, where several methods differ.
+    `method`: the method of a measured value, if methods differ.
     """
 
     value: T
@@ -102,7 +110,7 @@ class Value(Struct, Generic[T], frozen=True, omit_defaults=True, repr_omit_defau
 
 
 class Material(Struct, frozen=True, kw_only=True):
-    """A castable silicone. Times at 23 degC; `youngs_modulus_kpa`: small strain, the motor's frequency."""
+    """A castable silicone. Times are at 23 °C."""
 
     name: str
     density_g_cm3: Value[Density]
@@ -202,8 +210,8 @@ def kinds_of(entry: type[Struct]) -> tuple[tuple[str, Any], ...]:
 
 
 def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
-    """Return what a spec may give of an entry: a value, or a value with its source; the rest is as in `like`."""
-    scope = "where values stand without it"
+    """Return the class of an entry in a spec: values, or values with their source; missing ones come from `like`."""
+    scope = "default for values without their own"
     fields: list[tuple[str, Any, Any]] = [
         *([("like", Annotated[str | None, Meta(description="the shipped entry to start from")], None)] if like else []),
         ("status", Annotated[Status | None, Meta(description=scope)], None),

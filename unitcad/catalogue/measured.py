@@ -29,7 +29,7 @@ Length = Annotated[float, Meta(gt=0)]
 
 
 class MeasuredUnit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the measured units share: motor, diameter, wall of each of two layers, circuit, frequency, body."""
+    """Common properties of the measured units: motor, diameter, wall of each layer, circuit, frequency, body."""
 
     motor: str
     diameter_mm: Length

@@ -28,7 +28,7 @@ from unitcad.cli.shared_options import (
     overrides,
     with_fit,
 )
-from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.errors import UnitcadError, WrongArgument, install_command
 from unitcad.pipeline import step_helper
 from unitcad.pipeline.make import Subject
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest
@@ -149,10 +149,10 @@ def _print_faults(manifest: Manifest) -> None:
 
     for warning in manifest["warnings"]:
         warn(f"warning: {warning}")
-    for entry in manifest["left_out"]:
-        if entry["why"] == NO_KERNEL:
-            typer.echo(f"note: STEP left out: {entry['why']}", err=True)
-    checks = manifest["laws"]
+    for entry in manifest["skipped"]:
+        if entry["reason"] == NO_KERNEL:
+            warn(f"note: STEP left out: {entry['reason']}; {install_command('step')}")
+    checks = manifest["mould_checks"]
     for check in checks:
         if not check["ok"]:
             measured = f"{check['value']:.3g} {check['unit']}, limit {check['limit']:.3g}"

@@ -10,8 +10,8 @@ from unitcad.casting.steps import in_short
 from unitcad.designs import widths
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import PartRecord, row
-from unitcad.pipeline.write import PAGE, Built
-from unitcad.spec import Spec, assumed_lengths
+from unitcad.pipeline.write import BENCH, PAGE, Built
+from unitcad.spec import Spec, assumed_lengths, said_of
 from unitcad.text import listed, number
 
 
@@ -28,18 +28,20 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         each = f"{cells} units, each " if cells > 1 else ""
         yield f"{each}{_across(spec, manifest['parts'])} mm across, {number(height, 3)} mm high{silicone}"
     if assumed := assumed_lengths(spec):
-        yield f"assumed: {listed(assumed)}; measure the motor before you print"
+        lengths = (f"{said_of(spec, key)} ({how})" for key, how in assumed.items())
+        yield f"measure first; assumed: {listed(lengths)}"
     if manifest["casting"]:
         yield from in_short(json.loads((built.folder / "casting.json").read_bytes()))
-    checks, check = manifest["laws"], manifest["check"]
+    checks, check = manifest["mould_checks"], manifest["check"]
     if checks:
         passed = sum(entry["ok"] for entry in checks)
         files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
     if level := manifest["estimate"]:
         yield from level["lines"]
-    if (built.folder / PAGE).is_file():
-        yield f"open {shlex.quote(str(built.folder / PAGE))}"
+    for name, use in ((BENCH, " to cast"), (PAGE, "")):
+        if (built.folder / name).is_file():
+            yield f"open {shlex.quote(str(built.folder / name))}{use}"
 
 
 def _across(spec: Spec, parts: list[PartRecord]) -> str:

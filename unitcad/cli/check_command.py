@@ -62,6 +62,10 @@ def check(
         str | None,
         typer.Option(help="Folder for pictures: each finding near and on the whole part, and coloured 3MF files."),
     ] = None,
+    diff: Annotated[
+        tuple[str, str] | None,
+        typer.Option(metavar="OLD NEW", help="Compare two versions of a file or a folder; only new findings fail."),
+    ] = None,
     config: Annotated[
         str | None, typer.Option(help="Settings: a TOML file with a table [check]; else from the nearest such file.")
     ] = None,

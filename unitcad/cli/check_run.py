@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ from unitcad.cli import check_settings
 from unitcad.cli.check_settings import Configuration
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.export import finding_pictures
-from unitcad.meshcheck import FileReport, Limits, Options, file_checks, output
+from unitcad.meshcheck import Limits, Options, file_checks, output
 from unitcad.meshcheck import baseline as baselines
 from unitcad.meshcheck import manifest as listing
 from unitcad.meshcheck.findings import MOST, SHOWN
@@ -51,6 +51,7 @@ class Asked:
     baseline: str | None = None
     write_baseline: bool = False
     show: str | None = None
+    diff: tuple[str, str] | None = None
     config: str | None = None
     no_config: bool = False
     statistics: bool = False
@@ -101,6 +102,14 @@ def run(asked: Asked) -> int:
         locations=MOST if asked.all_locations or base is not None or asked.show is not None else SHOWN,
         draw=asked.show is not None,
     )
+    if asked.diff is not None:
+        if asked.files or asked.manifest is not None or base is not None:
+            raise UnitcadError("--diff compares its two names alone: leave out other files, --manifest and --baseline")
+        from unitcad.cli import check_diff  # with trimesh and SciPy, which no other check needs
+
+        said, code = check_diff.run(*asked.diff, options, fail_on, output_format, asked.show)
+        _write(said, plain=output_format == "text")
+        return code
     if not asked.files and asked.manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
     for pattern, codes in (configuration.value("per_file_ignores") or {}).items():
@@ -112,7 +121,14 @@ def run(asked: Asked) -> int:
     check_all = partial(file_checks.check_files, jobs=asked.jobs, memory_mb=memory, then=draw)
     left_out = configuration.left_out(asked.exclude or [])
     files, unread = file_checks.expand(asked.files or [], left_out)
-    reports = unread + _reports(files, configuration, options, asked.manifest, check_all)
+    of_path = partial(_options_of, configuration, options)
+    if asked.manifest is None:
+        reports = unread + list(check_all([(path, of_path(path)) for path in files]))
+    else:
+        listed = listing.read(asked.manifest)
+        work = listing.work(listed, files, of_path, None if options.printer is not None else printers())
+        compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
+        reports = unread + compared + listing.unchecked(listed, [path for path, _ in work], of_path)
     shown = MOST if asked.all_locations else SHOWN
     if base is not None:
         known = baselines.write(base, known, reports) if asked.write_baseline else known
@@ -164,26 +180,9 @@ def _write(text: str, *, plain: bool) -> None:
     raw.flush()
 
 
-def _reports(
-    paths: list[str],
-    configuration: Configuration,
-    options: Options,
-    manifest: str | None,
-    check_all: Callable[[list[tuple[str, Options]]], Iterator[FileReport]],
-) -> list[FileReport]:
-    """Return the reports of all files, compared with a manifest if there is one."""
-
-    def of_path(path: str) -> Options:
-        """Return the options of a file: without what the settings ignore for it."""
-        return replace(options, unwanted=tuple(code.strip().upper() for code in configuration.ignored(path)))
-
-    if manifest is None:
-        return list(check_all([(path, of_path(path)) for path in paths]))
-
-    listed = listing.read(manifest)
-    work = listing.work(listed, paths, of_path, None if options.printer is not None else printers())
-    compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
-    return compared + listing.unchecked(listed, [path for path, _ in work], of_path)
+def _options_of(configuration: Configuration, options: Options, path: str) -> Options:
+    """Return the options of a file: without the codes that the settings ignore for it."""
+    return replace(options, unwanted=tuple(code.strip().upper() for code in configuration.ignored(path)))
 
 
 def _printer(field: str, name: str | None) -> Printer | None:

@@ -64,13 +64,16 @@ def say_error(error: UnitcadError, form: Form) -> None:
     else:
         lines = [str(error)]
     for line in lines:
-        sys.stderr.write(f"error: {printable(line)}\n")
+        more = f"... ({len(line) - _LONGEST} more characters)" if len(line) > _LONGEST else ""
+        sys.stderr.write(f"error: {printable(line[:_LONGEST])}{more}\n")
     if form == "object":
         print_json({"error": error.as_dict()})
     elif form == "lines":
         print_json_line({"event": "error", "error": error.as_dict()})
 
 
+_LONGEST = 2000
+"""Characters of an error that are printed."""
 _ARGUMENTS = {
     "spec": "SPEC", "sweep": "SWEEP", "phantom": "PHANTOM", "target": "TARGET", "hash": "HASH", "tables": "--table",
 }  # fmt: skip

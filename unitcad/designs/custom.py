@@ -18,6 +18,7 @@ from unitcad.shape import ProfileError, Shape, cut
 from unitcad.spec import Spec
 from unitcad.spec.body_file import bodies_in
 from unitcad.spec.custom_code import is_allowed, is_body_file, name_in_file
+from unitcad.text import some
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 
@@ -70,7 +71,7 @@ def _held(name: str, source: str) -> Any:
     if wanted in known:
         return known[wanted]
     own = [key for key, value in known.items() if isinstance(value, types.FunctionType | Design)]
-    there = ", ".join(sorted(own)) or "none"
+    there = some(sorted(own)) or "none"
     raise UnitcadError(f"design {name}: the file has no such function or Design; it has {there}")
 
 

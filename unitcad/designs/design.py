@@ -39,14 +39,14 @@ class Fitting:
     needs       tools and consumables, as casting.steps.NEEDS names them
     silicone    the layer whose silicone it asks for: from 1, -1 the last; 0 for none
     mixed       what that silicone makes, if it is mixed after the pours
-    volume_mm3  the volume of it in one unit; 0 for a smear, for which the least mix is enough
+    volume_mm3  the volume of it in one unit
     mix         whether it uses the mix of the pour that it is laid into
     """
 
     text: str
     needs: tuple[str, ...] = ()
     silicone: int = 0
-    mixed: Literal["", "smear", "ring"] = ""
+    mixed: Literal["", "ring"] = ""
     volume_mm3: float = 0.0
     mix: bool = False
 

@@ -13,7 +13,7 @@ from unitcad import catalogue
 from unitcad.designs import limits
 from unitcad.designs.design import Design, Fitting, Reason
 from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
-from unitcad.designs.parts import motor_hold, slots
+from unitcad.designs.parts import ADHESIVE, bond, motor_hold, slots
 from unitcad.errors import Refusal
 from unitcad.shape import Shape, cut, ring
 from unitcad.spec import Spec
@@ -95,11 +95,10 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
     hold = f" {motor_hold(spec, dims)}" if spec.motor.fill or spec.fpcb else ""
     if spec.fpcb and not spec.wires:
         text = (
-            "Solder the motor to the circuit's pad. Set the motor into the ring, the pad on top of all layers, and "
-            "bond the pad with a thin smear of the last layer's silicone (assumed); it is that bond which holds the "
-            f"motor.{hold}"
+            f"Solder the motor to the circuit's pad and try it. {bond('the pad', 'the layers')} Set the motor into the "
+            f"ring, the pad on top of all layers.{hold}"
         )
-        return [Fitting(text, ("soldering iron and solder",), silicone=-1, mixed="smear")]
+        return [Fitting(text, ("soldering iron and solder", ADHESIVE))]
     text = "Push the motor in from the skin's side."
     if spec.wires:
         text = "Push the motor into the ring from above, the wires lying in the notch."
@@ -108,8 +107,8 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
         return steps
     ring = (
         f"Nothing else holds it: lay the body on a greased flat, centre the motor, and fill the ring of "
-        f"{number(dims.air_ring, 3)} mm round it with Layer 1's silicone or a silicone adhesive (assumed). "
-        "motor.fill = true draws Layer 1 up to the motor instead."
+        f"{number(dims.air_ring, 3)} mm round it with Layer 1's silicone. motor.fill = true draws Layer 1 up to the "
+        "motor instead."
     )
     volume = math.pi * (dims.cavity_radius**2 - dims.motor_radius**2) * dims.motor_height
     return [*steps, Fitting(ring, ("petroleum jelly",), silicone=1, mixed="ring", volume_mm3=volume)]

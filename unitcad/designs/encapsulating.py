@@ -14,7 +14,7 @@ from unitcad import catalogue
 from unitcad.designs import limits
 from unitcad.designs.design import Design, Fitting
 from unitcad.designs.dimensions import MOTOR_CLEARANCE, Dimensions, Exit, concentric, slot_exit, wire_exit
-from unitcad.designs.parts import motor_hold, slots
+from unitcad.designs.parts import ADHESIVE, bond, motor_hold, slots
 from unitcad.designs.stretch import allowed_strain, pad_strain, tail_strain, widest_tail_end
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
@@ -124,31 +124,30 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
     """Write how motor and circuit, or wires, go into the cavity."""
     solder = ("soldering iron and solder",)
     if spec.wires:
-        steps = [Fitting("Feed the wires out through the slot from inside; leave the motor before the cavity's mouth.")]
+        steps = [Fitting("Feed the wires out through the slot from inside. Leave the motor before the cavity's mouth.")]
     elif spec.fpcb and dims.exit:
         steps = [
             Fitting(
-                "Solder the motor to the circuit's pad. Feed the tail out through the slot from inside; leave pad and "
-                "motor before the cavity's mouth.",
+                "Solder the motor to the circuit's pad and try it. Feed the tail out through the slot from inside, but "
+                "leave pad and motor before the cavity's mouth.",
                 solder,
             )
         ]
         strain = pad_strain(spec.fpcb, dims.exit)
         if spec.fpcb.tail == "both" and strain:
             chain = (
-                f"In a chain the next pad does not go through the slot: that would stretch it by {strain:.0%}. "
-                f"Solder the next unit on after this one is in its body."
+                f"A chain's next pad does not pass the slot: that would stretch it by {strain:.0%}. Solder the next "
+                "unit on after this one is in its body."
             )
             steps.append(Fitting(chain, solder))
     else:
         steps = [Fitting("Lay the unit down with the cavity's mouth up, and the motor beside it, its back up.")]
     back, moved_in = ("the pad", "pad and motor") if spec.fpcb else ("the motor's back", "the motor")
-    smear = (
-        f"Put a smear of Layer 1's silicone on {back}, where the cap of Layer 1 will touch it: it holds the motor "
-        "(assumed: silicone bonds poorly to bare metal and polyimide; a primer or a silicone adhesive holds better). "
-        f"Push {moved_in} in from the skin's side until {back} lies against that cap. {motor_hold(spec, dims)}"
+    fixed = (
+        f"{bond(back, 'the cap of Layer 1')} Push {moved_in} in from the skin's side until {back} lies against that "
+        f"cap. {motor_hold(spec, dims)}"
     )
-    return [*steps, Fitting(smear, silicone=1, mixed="smear")]
+    return [*steps, Fitting(fixed, (ADHESIVE,))]
 
 
 DESIGN = Design(

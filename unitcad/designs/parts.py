@@ -23,11 +23,22 @@ def motor(dims: Dimensions) -> Shape:
     return cylinder(dims.motor_radius, 0, dims.motor_height)
 
 
+ADHESIVE = "silicone adhesive"
+
+
 def motor_hold(spec: Spec, dims: Dimensions) -> str:
-    """Write what is round the motor once it is in, where something holds it."""
+    """Write what is round the motor once it is in."""
     if spec.motor.fill:
         return "Layer 1 holds the motor all round."
-    return f"A ring of air of {number(dims.air_ring, 3)} mm stays round the motor: what it is fixed to holds it."
+    return f"A ring of air of {number(dims.air_ring, 3)} mm stays round the motor (motor.fill = true closes it)."
+
+
+def bond(what: str, where: str) -> str:
+    """Write what fixes the motor: the same words in every design."""
+    return (
+        f"Coat {what} thinly with {ADHESIVE} where it touches {where}: cast silicone bonds poorly to metal and "
+        "polyimide."
+    )
 
 
 def circuit(fpcb: Circuit, pad: Pad, dims: Dimensions) -> Shape:

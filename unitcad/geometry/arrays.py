@@ -19,7 +19,7 @@ _BLOCK = 1 << 15  # numbers that stay in the processor's cache
 def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDArray[np.uint64], Ints]:
     """Sort `key` (its low `bits` bits); return it and the order that sorts it.
 
-    Where key and position fit into 64 bits together, one sort of plain integers does it, four times faster.
+    If key and position fit into 64 bits together, unitcad sorts plain integers, four times faster.
     """
     room = max(len(key) - 1, 1).bit_length()
     if bits + room > 64:
@@ -41,14 +41,14 @@ def order_of_packed(key: NDArray[np.uint64], room: int) -> Ints:
 
 
 def distinct(ordered: Ints) -> Bools:
-    """Return where in sorted numbers another one begins."""
+    """Return the indices at which a new value begins in sorted numbers."""
     fresh = np.ones(len(ordered), bool)
     np.not_equal(ordered[1:], ordered[:-1], out=fresh[1:])
     return fresh
 
 
 def by_appearance(first: Ints, n: int) -> tuple[Ints, Ints]:
-    """Return the places among `first`, of `n`, in their order, and where in it each of `first` stands."""
+    """Return the places among `first`, of `n`, in their order, and the index of each of `first` in it."""
     appears = np.zeros(n, bool)
     appears[first] = True
     return np.flatnonzero(appears), np.cumsum(appears, dtype=np.int32).take(first) - np.int32(1)
@@ -71,7 +71,7 @@ def extent(points: Floats) -> tuple[Floats, Floats]:
 
 
 def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
-    """Return low and high corners (n, 3) of the boxes round each label's points; inf and -inf where it has none.
+    """Return low and high corners (n, 3) of the boxes round each label's points; inf and -inf if it has none.
 
     By columns, which is six times faster than by points.
     """
@@ -84,7 +84,7 @@ def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
 
 
 def grouped(label: Ints, n: int) -> tuple[Ints, Ints, Ints]:
-    """Return the places of labels 0 to n - 1, one label's behind the other's, where each begins and how many it has."""
+    """Return the places of labels 0 to n - 1, grouped by label, with the start and the count of each group."""
     count = np.bincount(label, minlength=n)
     return np.argsort(label, kind="stable").astype(np.int32), np.cumsum(count) - count, count
 

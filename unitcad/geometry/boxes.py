@@ -59,7 +59,7 @@ def frame_of(points: Floats) -> Frame:
 def ranks_of(steps: list[Ints], points: Floats, most: int) -> list[Ints] | None:
     """Return the ranks of the coordinates of (n, 3) points along each axis, uint16 from 0 to `most`.
 
-    None where there are more, or where two of many points' coordinates have one step.
+    None if there are more, or if two coordinates of many points share a step.
     """
     ranks = []
     for axis, step in enumerate(steps):
@@ -129,7 +129,7 @@ def boxes_of(steps: list[Ints], *corners: Ints) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Slabs:
-    """The steps along each diagonal of space between which faces lie: words of four low ones, of four high ones."""
+    """The range of steps of each face along each diagonal of space: words of four low ones, of four high ones."""
 
     low: Ints
     high: Ints
@@ -299,7 +299,7 @@ def _walk(
 ) -> Iterator[tuple[Ints, Ints]]:
     """Yield children of the node pairs whose boxes meet.
 
-    Of a node with itself the pairs of children (p, q) for which `skip(p, q)` are left out.
+    A node with itself skips the pairs of children (p, q) with `skip(p, q)`.
     """
     left_out = [pair for pair in np.ndindex(_FAN, _FAN) if skip is not None and skip(*pair)]
     empty = np.empty(0, np.intp)

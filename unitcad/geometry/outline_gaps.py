@@ -11,7 +11,7 @@ from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, morton_o
 
 
 def between_outlines(one: Sequence[Floats], other: Sequence[Floats], most: float) -> float:
-    """Return the least distance of any corner of either from any side of the other, mm, and `most` where none is less.
+    """Return the least distance of any corner of either from any side of the other, mm, and `most` if none is less.
 
     Each loop is (n, 2). Between outlines that do not cross, a corner is an end of every shortest way.
     """

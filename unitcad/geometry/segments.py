@@ -18,7 +18,7 @@ def to_segment(at: Point, start: Point, end: Point) -> float:
 
 
 def between_segments(a: Point, b: Point, c: Point, d: Point) -> float:
-    """Return the distance of the segments a b and c d; 0 where they cross."""
+    """Return the distance of the segments a b and c d; 0 if they cross."""
 
     def side(p: Point, q: Point, r: Point) -> float:
         return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
@@ -29,7 +29,7 @@ def between_segments(a: Point, b: Point, c: Point, d: Point) -> float:
 
 
 def to_box(start: Point, end: Point, box: tuple[float, float, float, float]) -> float:
-    """Return the distance of a segment from a box (x0, y0, x1, y1); 0 where it ends in it or crosses it."""
+    """Return the distance of a segment from a box (x0, y0, x1, y1); 0 if it ends in it or crosses it."""
     x0, y0, x1, y1 = box
     if x0 <= end[0] <= x1 and y0 <= end[1] <= y1:
         return 0.0
@@ -38,7 +38,7 @@ def to_box(start: Point, end: Point, box: tuple[float, float, float, float]) -> 
 
 
 def between_convex(one: Sequence[Point], other: Sequence[Point]) -> float:
-    """Return the distance of two convex polygons, which may be points or segments; 0 where they meet."""
+    """Return the distance of two convex polygons, which may be points or segments; 0 if they meet."""
     if _inside(one[0], other) or _inside(other[0], one):
         return 0.0
     return min(between_segments(*edge, *beside) for edge in _edges(one) for beside in _edges(other))
@@ -51,13 +51,13 @@ def _edges(corners: Sequence[Point]) -> list[tuple[Point, Point]]:
 
 
 def _inside(at: Point, corners: Sequence[Point]) -> bool:
-    """Tell whether a point lies in a convex polygon of three corners or more."""
+    """Tell whether a point is in a convex polygon of three corners or more."""
     sides = [(q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0]) for p, q in _edges(corners)]
     return len(corners) > 2 and (min(sides) >= 0 or max(sides) <= 0)
 
 
 def nearer(a: Sequence[Point], b: Sequence[Point], than: float) -> bool:
-    """Tell whether two convex polygons are nearer to each other than a distance; quick where their boxes are not."""
+    """Tell whether two convex polygons are nearer to each other than a distance; quick if their boxes are not."""
     for axis in (0, 1):
         ones, others = [p[axis] for p in a], [p[axis] for p in b]
         if min(ones) - max(others) >= than or min(others) - max(ones) >= than:

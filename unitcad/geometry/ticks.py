@@ -9,7 +9,7 @@ Tick = Callable[[], object]
 
 
 class Interrupted(Exception):
-    """A computation that a tick has ended; what it has computed may still be of use."""
+    """A computation that a tick has ended; its results so far may still be of use."""
 
 
 class TooMany(Interrupted):

@@ -7,11 +7,11 @@ With n segments a turn, a = sqrt(x / sin x), x = 2 pi / n (see `mesh.area_true`)
 - extruded: an arc of radius R is inscribed: d = R (1 - cos(pi / n)); straight sides are exact: d = 0.
 
 Volume: |V_mesh - V| <= sum over the leaves of d S, S the area of the leaf's curved faces. It holds through every
-boolean, since what two sums, differences or intersections disagree on lies where their operands disagree.
-Under `Below` a leaf's curved faces also bound what lies under them: their area counts by how much taller it becomes,
+boolean, since two sums, differences or intersections differ only at points at which their operands differ.
+Under `Below` a leaf's curved faces also bound the volume below them: their area counts by how much taller it becomes,
 for leaves that are moved but not turned.
-Box: a face of the box moves by at most max d where a leaf's own face reaches out farthest, and by d / sin(w) where an
-edge does at which two faces meet at an angle w: 2 max d for any w of 30 degrees or more.
+Box: a face of the box moves by at most max d if a leaf's own face is the outermost, and by d / sin(w) if an edge of two
+faces at the angle w is: 2 max d for any w of 30 degrees or more.
 `segment_count(r, t)` makes r (a - 1) <= t, and so d <= 1.5 t for every extruded R <= r.
 """
 
@@ -26,7 +26,7 @@ from unitcad.shape.profile import arc_centre, sides
 
 
 def deviation(shape: Shape, segments: int) -> float:
-    """Return the farthest (mm) that any leaf's mesh of `segments` a turn lies from the leaf's surface."""
+    """Return the farthest (mm) that any leaf's mesh of `segments` a turn deviates from the leaf's surface."""
     return max((_deviation(leaf, segments) for leaf, _ in _leaves(shape)), default=0.0)
 
 

@@ -37,7 +37,7 @@ class Library(Protocol):
 
 
 def realise(shapes: Iterable[Shape], library: Library) -> list[Any]:
-    """Return the solids of `shapes` in `library`; what they have in common is built once."""
+    """Return the solids of `shapes` in `library`; common parts are built once."""
     known: dict[Shape, Any] = {}
     return [_solid(shape, library, known) for shape in shapes]
 

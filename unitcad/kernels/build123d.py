@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Sequence
+from importlib.util import find_spec
 
+from unitcad.errors import UnitcadError, pip_install
 from unitcad.kernels import brep, occt
 from unitcad.kernels.ocp import loading
 from unitcad.shape import Shape
@@ -18,7 +21,7 @@ with loading("build123d"):
 
 
 def solid(shape: Shape) -> B3dShape:
-    """Return the Solid of `shape`, or a Compound where it has several; faces that continue each other are merged."""
+    """Return the Solid of `shape`, or a Compound if it has several; faces that continue each other are merged."""
     return _solids([shape])[0]
 
 
@@ -29,6 +32,23 @@ def compound(bodies: Sequence[Body], name: str = "unitcad") -> b3d.Compound:
         child.label = body.name
         child.color = b3d.Color(*body.colour)
     return b3d.Compound(label=name, children=children)
+
+
+def show(assembly: b3d.Compound) -> None:
+    """Show an assembly with its names and colours in ocp-vscode's viewer, or on YACV's page if only that is installed.
+
+    Raises UnitcadError without either.
+    """
+    if find_spec("ocp_vscode"):
+        import ocp_vscode
+
+        ocp_vscode.show(assembly)
+    elif find_spec("yacv_server"):
+        import yacv_server
+
+        yacv_server.show(*assembly.children, names=[child.label for child in assembly.children])
+    else:
+        raise UnitcadError(f"no viewer is installed: {shlex.join([*pip_install(), 'ocp-vscode'])} (or yacv-server)")
 
 
 def line(start: brep.Point, end: brep.Point) -> b3d.Edge:

@@ -16,7 +16,7 @@ with loading("cadquery"):
 
 
 def solid(shape: Shape) -> cq.Shape:
-    """Return the Solid of `shape`, or a Compound where it has several; faces that continue each other are merged."""
+    """Return the Solid of `shape`, or a Compound if it has several; faces that continue each other are merged."""
     return _solids([shape])[0]
 
 

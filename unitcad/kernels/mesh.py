@@ -23,7 +23,7 @@ FINEST, COARSEST = 4096, 24
 def segment_count(radius: float, tolerance: float) -> int:
     """Return the sides of an area-true polygon within `tolerance` of a circle of `radius` (both mm).
 
-    Its corners stand r (a - 1) outside, a = sqrt(x / sin x) with x = 2 pi / n; the middles of its sides half as far
+    Its corners are r (a - 1) outside, a = sqrt(x / sin x) with x = 2 pi / n; the middles of its sides half as far
     inside. A multiple of 8, so that the axes and diagonals are vertices.
     """
     n = COARSEST
@@ -41,7 +41,7 @@ def area_true(segments: int) -> float:
 def realise(shape: Shape, segments: int, swell: float | None = None) -> Manifold:
     """Return the solid of `shape`, every full turn in `segments` sides.
 
-    swell: factor on the radii of what is revolved. By default they are area-true, so mating ones mate; 1 puts a
+    swell: factor on the radii of revolved profiles. By default they are area-true, so mating ones mate; 1 puts a
     polygon's corners on the circle.
     """
     return _realise(shape, segments, area_true(segments) if swell is None else swell)
@@ -62,7 +62,7 @@ def _realise(shape: Shape, segments: int, swell: float) -> Manifold:
 def _made(shape: Shape, segments: int, swell: float) -> Manifold:
     match shape:
         case Revolve(profile):
-            # Scaled after revolving: CrossSection rounds to a grid that the scaled radii would not lie on.
+            # Scaled after revolving: CrossSection would round the scaled radii to its grid.
             return Manifold.revolve(CrossSection([points(profile, segments)]), segments).scale((swell, swell, 1.0))
         case Extrude(profile, z0, z1, holes, None):
             loops = [points(profile, segments), *(points(hole, segments)[::-1] for hole in holes)]
@@ -129,15 +129,15 @@ def shells(solid: Manifold) -> list[Manifold]:
 
 
 def thick_pieces(solid: Manifold, least: float = FACETS) -> list[Manifold]:
-    """Return the connected pieces of a solid that are thicker than what facets or rounding leave between two faces."""
+    """Return the connected pieces of a solid that are thicker than films of facets or rounding."""
     return [piece for piece in shells(solid) if _is_thick(piece, least)]
 
 
 def _is_thick(piece: Manifold, least: float) -> bool:
     """Tell whether a piece is thicker than `least` somewhere, mm.
 
-    A film's thickness is twice its volume over its area. What films hang on may be thicker than that: then something
-    is left between two copies of the piece, moved apart by `least`, in every direction.
+    A film's thickness is twice its volume over its area. A piece with such films may be thicker than that: then a rest
+    remains between two copies of the piece, moved apart by `least`, in every direction.
     """
     volume = float(piece.volume())
     if volume <= least**3 or 2 * volume > least * float(piece.surface_area()):
@@ -170,28 +170,28 @@ _WAYS /= np.linalg.norm(_WAYS, axis=1)[:, None]
 _FEW = 20
 """Shells up to which `decompose` is the quicker way."""
 _PROBE = 1e-4
-"""Edge of the cube that tells which piece holds a point, mm."""
+"""Edge of the cube that finds the piece at a point, mm."""
 _SAME_LINE = 1e-9
-"""Distance in plan up to which two vertices lie on one vertical line, mm."""
+"""Distance in plan up to which two vertices count as on one vertical line, mm."""
 
 _CRACK = 0.01
 """Area up to which a crack between two prisms is left, mm2."""
 _UPRIGHT = 1e-6
-"""Slope against the vertical up to which a face is upright: what rounding tilts."""
+"""Slope against the vertical up to which a face counts as upright, since rounding tilts it."""
 
 
 def component(solid: Manifold, at: tuple[float, float, float]) -> Manifold:
-    """Return the connected piece of `solid` that holds the point `at` (mm). Raises UnitcadError if none does."""
+    """Return the connected piece of `solid` around the point `at` (mm). Raises UnitcadError if none does."""
     probe = Manifold.cube((_PROBE, _PROBE, _PROBE), True).translate(at)
     pieces = [(float((piece ^ probe).volume()), i, piece) for i, piece in enumerate(solid.decompose())]
     shared, _, held = max(pieces, default=(0.0, 0, Manifold()))
     if shared <= 0:
-        raise UnitcadError(f"manifold3d: no solid holds the point {at}")
+        raise UnitcadError(f"manifold3d: no solid is at the point {at}")
     return held
 
 
 def _below(solid: Manifold, bottom: float) -> Manifold:
-    """Return what lies under the upward faces of `solid`, down to `bottom`: a prism a patch of faces that join."""
+    """Return the volume under the upward faces of `solid`, down to `bottom`: a prism a patch of faces that join."""
     vertices, faces = arrays(solid)
     vertices = _plumb(vertices)
     corners = vertices[faces]
@@ -201,7 +201,7 @@ def _below(solid: Manifold, bottom: float) -> Manifold:
     patches, corners = _patches(faces), vertices[np.unique(faces), :2]
     plain = [_prism(vertices, patch, bottom) for patch in patches]
     split = [_prism(*_split_at_lines(vertices, patch, corners), bottom) for patch in patches]
-    # Only a crack makes so much surface: without one, the fewer triangles are kept. What is measured is not returned,
+    # Only a crack makes so much surface: without one, the fewer triangles are used. The measured solid is not returned,
     # since a boolean of many that is worked out in parts comes out in other triangles.
     cracked = _joined(plain).surface_area() > _joined(split).surface_area() + _CRACK
     return _joined(split if cracked else plain)
@@ -212,9 +212,9 @@ def _joined(prisms: list[Manifold]) -> Manifold:
 
 
 def _plumb(vertices: np.ndarray) -> np.ndarray:
-    """Return vertices of which those on one vertical line, but for a boolean's rounding, lie on it exactly.
+    """Return vertices, those within a boolean's rounding of one vertical line moved onto it.
 
-    Else two prisms that should share a wall keep a crack between them.
+    Otherwise two prisms that should share a wall have a crack between them.
     """
     from scipy.spatial import KDTree
 

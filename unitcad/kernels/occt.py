@@ -1,6 +1,6 @@
 """Shape to boundary representation with OCCT directly, for STEP files.
 
-The extra step brings OCP alone, build123d and cadquery bring it too. OCP loads in a third of the time that build123d
+The extra step installs only OCP; build123d and cadquery install it too. OCP loads in a third of the time that build123d
 takes, half of cadquery's.
 """
 
@@ -53,7 +53,7 @@ with loading("OCP"):
 _SEWN = 1e-6
 """Distance up to which edges of neighbouring faces are one, mm."""
 _FLAT = 1e-9
-"""Distance from a line or a plane up to which points lie on it, mm."""
+"""Distance from a line or a plane up to which points count as on it, mm."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def solids(shapes: Iterable[Shape]) -> list[TopoDS_Shape]:
 
 
 def _unplaced(shape: Shape) -> tuple[Shape, list[Place]]:
-    """Return what a shape is a placed copy of, and its places, the outermost first."""
+    """Return the original of a placed shape, and its places, the outermost first."""
     places = []
     while isinstance(shape, Place):
         places.append(shape)
@@ -175,7 +175,7 @@ def _with_planes(ruled: TopoDS_Shape) -> TopoDS_Shape:
 
 
 def _flat_corners(side: TopoDS_Face) -> list[gp_Pnt]:
-    """Return the corners of a face whose edges are straight and lie in one plane; none of another face."""
+    """Return the corners of a face whose edges are straight and in one plane; of another face none."""
     explorer, corners = BRepTools_WireExplorer(BRepTools.OuterWire_s(side)), []
     while explorer.More():
         corner, curve = BRep_Tool.Pnt_s(explorer.CurrentVertex()), BRepAdaptor_Curve(explorer.Current())
@@ -234,7 +234,7 @@ def component(solid: TopoDS_Shape, at: brep.Point) -> TopoDS_Shape:
     for piece in solids_in(solid):
         if BRepClass3d_SolidClassifier(piece, gp_Pnt(*at), 1e-7).State() == TopAbs_IN:
             return piece
-    raise UnitcadError(f"OCCT: no solid holds the point {at}")
+    raise UnitcadError(f"OCCT: no solid is at the point {at}")
 
 
 def below(solid: TopoDS_Shape, bottom: float) -> TopoDS_Shape:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
+import shlex
 from collections.abc import Iterator
 
-from unitcad.errors import Missing, install_command
+from unitcad.errors import Missing, install_command, pip_install
 
 WHEEL_VERSION = "7.9.3.1.1"
 WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")
@@ -19,7 +20,7 @@ WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")
 
 @contextlib.contextmanager
 def loading(library: str) -> Iterator[None]:
-    """Run the imports of `library` (OCP, build123d or cadquery). Raises Missing where they fail."""
+    """Run the imports of `library` (OCP, build123d or cadquery). Raises Missing if they fail."""
     try:
         yield
     except (ImportError, AttributeError) as error:
@@ -36,7 +37,7 @@ def installed_wheels() -> dict[str, str]:
 
 
 def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
-    """Say what to do when an import of `library` fails with `error`, given the installed OCP wheels."""
+    """Return the advice for an import of `library` that failed with `error`, given the installed OCP wheels."""
     missing = isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == library
     extra = "step" if library == "OCP" else library
     if missing and (not wheels or library != "OCP"):
@@ -49,7 +50,8 @@ def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
     if library == "cadquery" and "cadquery-ocp" not in wanted:
         wanted = ["cadquery-ocp", *wanted]
     # cadquery needs the wheel with VTK, which serves build123d as well: it is unpacked last.
-    fix = "; ".join(f"pip install --force-reinstall --no-deps {name}=={WHEEL_VERSION}" for name in reversed(wanted))
+    install = shlex.join([*pip_install(), "--force-reinstall", "--no-deps"])
+    fix = "; ".join(f"{install} {name}=={WHEEL_VERSION}" for name in reversed(wanted))
     return (
         f"{library} does not load ({type(error).__name__}: {error}). The folder OCP is broken or of another version:"
         f" found {have}. Fix it with: {fix}"

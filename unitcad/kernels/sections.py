@@ -27,18 +27,18 @@ def widest(section: CrossSection) -> tuple[float, tuple[float, float]]:
             high = middle
         else:
             low, kept = middle, inner
-    # Any corner of the last offset lies that deep; the mean of its corners would not, were it a ring.
+    # Any corner of the last offset is that deep; the mean of its corners would not, were it a ring.
     corner = min(tuple(map(float, point)) for loop in kept.to_polygons() for point in loop)
     return 2 * low, (corner[0], corner[1])
 
 
 def thick_parts(section: CrossSection, least: float = FACETS) -> list[CrossSection]:
-    """Return the connected parts of a section that are wider than what facets or rounding leave between two faces."""
+    """Return the connected parts of a section that are wider than the films of facets or rounding between two faces."""
     return [part for part in section.decompose() if not part.offset(-least / 2, JoinType.Miter).is_empty()]
 
 
 def gap(one: CrossSection, other: CrossSection, most: float) -> float:
-    """Return the least distance between two sections, neither empty, mm: 0 where they overlap, `most` at most."""
+    """Return the least distance between two sections, neither empty, mm: 0 if they overlap, `most` at most."""
     if not (one ^ other).is_empty():
         return 0.0
     return between_outlines(one.to_polygons(), other.to_polygons(), most)

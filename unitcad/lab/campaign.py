@@ -1,4 +1,4 @@
-"""What `[recording]` is for one record: a campaign's own values for some of its files."""
+"""A campaign: its file, and the settings of [recording] for each record."""
 
 from __future__ import annotations
 
@@ -36,68 +36,73 @@ SkippedLines = Annotated[int, Meta(ge=0, le=100000)]
 
 
 class SensorTable(Table, frozen=True, kw_only=True):
-    """Quantity and unit of the samples after `scale`, which is that unit per `per`, the unit in the file."""
+    """The sensor, and how its samples become the quantity."""
 
-    quantity: Quantity
-    unit: Name
-    scale: Positive = 1.0
-    per: Annotated[
-        Name | None, Meta(description="unit in the files that scale is per; V, or none given, if left out")
+    quantity: Annotated[Quantity, Meta(description="quantity that the sensor measures")]
+    unit: Annotated[Name, Meta(description="unit of the samples after scale, such as mm/s")]
+    scale: Annotated[Positive, Meta(description="unit per volt, or per the unit in per")] = 1.0
+    per: Annotated[Name | None, Meta(description="unit of the numbers in the files; default: V, or no unit")] = None
+    full_scale: Annotated[
+        Positive | None,
+        Meta(
+            description="largest value that the sensor gives, in unit; default: unitcad finds clipping in the samples"
+        ),
     ] = None
-    full_scale: Annotated[Positive | None, Meta(description="largest value that the sensor gives, in unit")] = None
 
 
-class OwnRecordingTable(Table, frozen=True, kw_only=True):
-    """How some of the records are read: names, or patterns such as "motor-*.mat", and what is their own."""
+class RecordingOverride(Table, frozen=True, kw_only=True):
+    """Settings of some records; they override [recording]."""
 
-    records: Records
-    rate_hz: Rate | None = None
-    channel: Column | None = None
-    motor_channel: Column | None = None
-    time_column: Column | None = None
-    time_unit: TimeUnit | None = None
-    delimiter: Delimiter | None = None
-    decimal: DecimalSign | None = None
-    skip_lines: SkippedLines | None = None
+    records: Annotated[Records, Meta(description="names of records, or patterns such as motor-*.mat")]
+    rate_hz: Annotated[Rate | None, Meta(description="samples per second")] = None
+    channel: Annotated[Column | None, Meta(description="the unit's channel: a name, or a number from 1")] = None
+    motor_channel: Annotated[Column | None, Meta(description="the motor's channel")] = None
+    time_column: Annotated[Column | None, Meta(description="column of the time")] = None
+    time_unit: Annotated[TimeUnit | None, Meta(description="unit of the time column")] = None
+    delimiter: Annotated[Delimiter | None, Meta(description="sign between two columns")] = None
+    decimal: Annotated[DecimalSign | None, Meta(description="decimal sign")] = None
+    skip_lines: Annotated[SkippedLines | None, Meta(description="lines to skip at the beginning")] = None
 
 
 class RecordingTable(Table, frozen=True, kw_only=True):
-    """How the files are read, where they don't say it themselves; `own` has other values for some of them."""
+    """Settings of all records, for what their files do not state."""
 
-    rate_hz: Rate | None = None
-    channel: Column | None = None
-    motor_channel: Annotated[Column | None, Meta(description="the motor, recorded at the same time")] = None
-    time_column: Column | None = None
-    time_unit: TimeUnit | None = None
-    delimiter: Delimiter = ""
-    decimal: DecimalSign = ""
-    skip_lines: SkippedLines = 0
-    own: Annotated[tuple[OwnRecordingTable, ...], Meta(max_length=100)] = ()
+    rate_hz: Annotated[Rate | None, Meta(description="samples per second, if the files do not state it")] = None
+    channel: Annotated[Column | None, Meta(description="the unit's channel: a name, or a number from 1")] = None
+    motor_channel: Annotated[Column | None, Meta(description="the motor's channel, recorded at the same time")] = None
+    time_column: Annotated[Column | None, Meta(description="column of the time")] = None
+    time_unit: Annotated[TimeUnit | None, Meta(description="unit of the time column")] = None
+    delimiter: Annotated[Delimiter, Meta(description="sign between two columns; default: found in the file")] = ""
+    decimal: Annotated[DecimalSign, Meta(description="decimal sign; default: found in the file")] = ""
+    skip_lines: Annotated[SkippedLines, Meta(description="lines to skip at the beginning of each file")] = 0
+    override: Annotated[tuple[RecordingOverride, ...], Meta(max_length=100)] = ()
 
 
 class BlankTable(Table, frozen=True, kw_only=True):
-    """Records with the motor off: they tell the mains. Where they have a motor's channel, they tell its mains too."""
+    """Records with the motor off. They show the mains of the sensor."""
 
-    records: Records
-    motor_records: Annotated[Records, Meta(description="motor off, by the motor_sensor where it records alone")] = ()
+    records: Annotated[Records, Meta(description="records with the motor off")]
+    motor_records: Annotated[
+        Records, Meta(description="records with the motor off by motor_sensor, if that sensor records alone")
+    ] = ()
 
 
 class PointTable(Table, frozen=True, kw_only=True):
     """Records at a distance from the unit's edge along the skin."""
 
-    distance_mm: Annotated[float, Meta(ge=0.01, le=1000)]
-    records: Records
+    distance_mm: Annotated[float, Meta(ge=0.01, le=1000, description="distance from the unit's edge along the skin")]
+    records: Annotated[Records, Meta(description="records at this point")]
 
 
 class UnitTable(Table, frozen=True, kw_only=True):
     """One unit: its spec or the record of its casting, and its records."""
 
-    name: Name
-    spec: Name | None = None
-    cast: Name | None = None
-    cavity: Cavity | None = None
-    reference: Annotated[Records, Meta(description="the motor alone, where no channel has it")] = ()
-    edge: Records = ()
+    name: Annotated[Name, Meta(description="a name of the unit")]
+    spec: Annotated[Name | None, Meta(description="spec file or template of the unit")] = None
+    cast: Annotated[Name | None, Meta(description="cast record of the unit, in place of spec")] = None
+    cavity: Annotated[Cavity | None, Meta(description="cavity of the cast record")] = None
+    reference: Annotated[Records, Meta(description="records of the motor alone, without motor_channel")] = ()
+    edge: Annotated[Records, Meta(description="records at the unit's edge")] = ()
     lines: Annotated[int, Meta(ge=1, description="only 1: one motor runs at a time")] = 1
     point: tuple[PointTable, ...] = ()
 
@@ -105,8 +110,8 @@ class UnitTable(Table, frozen=True, kw_only=True):
 class Campaign(Table, frozen=True, kw_only=True):
     """A campaign: one sensor, units with their records."""
 
-    name: Name
-    note: Annotated[str, Meta(max_length=1000)] = ""
+    name: Annotated[Name, Meta(description="a name of the campaign")]
+    note: Annotated[str, Meta(max_length=1000, description="a remark for the results")] = ""
     sensor: SensorTable
     recording: RecordingTable = RecordingTable()
     motor_sensor: SensorTable | None = None
@@ -125,14 +130,14 @@ def read_campaign(path: Path) -> Campaign:
     for key, sensor in (("sensor", campaign.sensor), ("motor_sensor", campaign.motor_sensor)):
         if sensor is not None:
             to_si(sensor.unit, sensor.quantity, f"{key}.unit")
-    beside = "stands beside recording.motor_channel"
+    excess = "is not allowed together with recording.motor_channel"
     if campaign.blank is not None and campaign.blank.motor_records:
         records = list(campaign.blank.motor_records)
         if motor_channel is not None:
-            limit = f"{beside}: the channel of blank.records tells the motor's mains"
+            limit = f"{excess}: the channel of blank.records shows the motor's mains"
             raise Refusal("blank.motor_records", records, limit)
         if campaign.motor_sensor is None:
-            limit = "stands without [motor_sensor]: blank.records tells the mains of the one sensor"
+            limit = "needs [motor_sensor]: blank.records shows the mains of the one sensor"
             raise Refusal("blank.motor_records", records, limit)
     names = [unit.name for unit in campaign.unit]
     for i, unit in enumerate(campaign.unit):
@@ -148,7 +153,7 @@ def read_campaign(path: Path) -> Campaign:
             raise Refusal(f"{field}.point", distances, "has a distance twice; put its records together")
         if bool(unit.reference) == (motor_channel is not None):
             given = list(unit.reference)
-            limit = beside if given else "is required, or recording.motor_channel"
+            limit = excess if given else "is required, or recording.motor_channel"
             raise Refusal(f"{field}.reference", given or None, limit)
     return campaign
 
@@ -162,10 +167,10 @@ def blank_files(campaign: Campaign) -> Iterator[tuple[str, str]]:
 
 
 def check_files(campaign: Campaign, folder: Path) -> None:
-    """Check every name of a campaign whose files lie in or below `folder`, and read no record for it.
+    """Check every name of a campaign with files in or below `folder`, without reading a record.
 
     Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice in
-    one unit by its path or its bytes, a [[recording.own]] of no record.
+    one unit by its path or its bytes, a [[recording.override]] of no record.
     """
     names = []
     for field, name in blank_files(campaign):
@@ -194,46 +199,46 @@ def check_files(campaign: Campaign, folder: Path) -> None:
 
 
 _TIME_KEYS = ("rate_hz", "time_column", "time_unit")
-"""Keys that say the same of a record: one of them in `[[recording.own]]` sets aside those of `[recording]`."""
+"""Keys that say the same of a record: one of them in `[[recording.override]]` sets aside those of `[recording]`."""
 
 
 def recording_of(table: RecordingTable, name: str) -> RecordingTable:
-    """Return how the record of that name is read: `table` with the values of the [[recording.own]] that names it."""
-    given = next((_given(one) for one in table.own if _matching(one, [name])), {})
+    """Return the settings of a record: `table` with the values of the [[recording.override]] that names it."""
+    given = next((_given(one) for one in table.override if _matching(one, [name])), {})
     if "rate_hz" in given or "time_column" in given:
         given = dict.fromkeys(_TIME_KEYS) | given
-    return msgspec.structs.replace(table, own=(), **given) if given else table
+    return msgspec.structs.replace(table, override=(), **given) if given else table
 
 
 @contextmanager
 def own_keys(table: RecordingTable, name: str) -> Iterator[None]:
-    """Let a refusal of a key of `[recording]` name the [[recording.own]] that set it for the record, or that could."""
+    """Let a refusal of a key of `[recording]` name the [[recording.override]] of the record, or the one to add."""
     try:
         yield
     except Refusal as refusal:
         key = refusal.field.removeprefix("recording.")
         if refusal.field == key:
             raise
-        field, limit = refusal.field, f"{refusal.limit}; [[recording.own]] sets it for some records alone"
-        for i, own in enumerate(table.own):
+        field, limit = refusal.field, f"{refusal.limit}; [[recording.override]] sets it for some records only"
+        for i, own in enumerate(table.override):
             if _matching(own, [name]) and key in _given(own):
-                field, limit = f"recording.own.{i}.{key}", refusal.limit
+                field, limit = f"recording.override.{i}.{key}", refusal.limit
         raise type(refusal)(field, refusal.value, limit, refusal.nearest) from None
 
 
 def _check_own(table: RecordingTable, names: list[str]) -> None:
-    """Refuse a [[recording.own]] that sets nothing, that names no record of the campaign, or one of another's."""
+    """Refuse a [[recording.override]] that sets nothing, that names no record of the campaign, or one of another's."""
     taken: dict[str, int] = {}
-    for i, own in enumerate(table.own):
-        field = f"recording.own.{i}"
+    for i, own in enumerate(table.override):
+        field = f"recording.override.{i}"
         if not own.records:
             raise Refusal(f"{field}.records", [], "names no record")
         given = _given(own)
         if not given:
             keys = ", ".join(key for key in msgspec.structs.asdict(own) if key != "records")
-            raise Refusal(field, None, f"sets nothing beside records: {keys}")
+            raise Refusal(field, None, f"sets nothing for its records: {keys}")
         if "motor_channel" in given and table.motor_channel is None:
-            raise Refusal(f"{field}.motor_channel", given["motor_channel"], "stands without recording.motor_channel")
+            raise Refusal(f"{field}.motor_channel", given["motor_channel"], "needs recording.motor_channel")
         for k, pattern in enumerate(own.records):
             found = _matching(own, names, pattern)
             if not found:
@@ -242,16 +247,16 @@ def _check_own(table: RecordingTable, names: list[str]) -> None:
                 raise Refusal(f"{field}.records.{k}", pattern, limit, close[0] if close else None)
             for name in found:
                 if taken.setdefault(name, i) != i:
-                    limit = f"names {name}, which recording.own.{taken[name]} does too"
+                    limit = f"names {name}, which recording.override.{taken[name]} does too"
                     raise Refusal(f"{field}.records.{k}", pattern, limit)
 
 
-def _given(own: OwnRecordingTable) -> dict[str, Any]:
-    """Return the keys that a table sets, beside the records."""
+def _given(own: RecordingOverride) -> dict[str, Any]:
+    """Return the keys that a table sets, without the records."""
     return {key: value for key, value in msgspec.structs.asdict(own).items() if key != "records" and value is not None}
 
 
-def _matching(own: OwnRecordingTable, names: list[str], *patterns: str) -> list[str]:
+def _matching(own: RecordingOverride, names: list[str], *patterns: str) -> list[str]:
     """Return the names that a table's records name, or some of its patterns do."""
     patterns = patterns or own.records
     return [name for name in names if any(one == name or fnmatchcase(name, one) for one in patterns)]

@@ -31,7 +31,7 @@ def measured(path: bytes) -> bytes:
 def refused(file: Path, why: str) -> str:
     """Return the page that says why a campaign file can't be measured, as HTML."""
     folder, named = escape(str(file.parent)), escape(file.name)
-    lead = f"<p>The file is {named} in {folder}, where its recordings are looked for. Change it, then {_AGAIN}.</p>"
+    lead = f"<p>The file is {named} in {folder}, with its recordings. Change it, then {_AGAIN}.</p>"
     return fault_page(file.name, why, lead)
 
 

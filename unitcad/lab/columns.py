@@ -1,4 +1,4 @@
-"""Columns of a mechanical test: which one holds which quantity, in which unit, by name or as declared.
+"""Columns of a mechanical test: the quantity and unit of each, by name or as declared.
 
 Nothing is guessed: a column without a unit, or two columns for one quantity, are refused until they are declared as
 QUANTITY=COLUMN:UNIT, COLUMN being a name or a number from 1.
@@ -31,14 +31,14 @@ _COLUMN_NAMES = {
     "loss": r"loss(?: modulus)?|[eg](?:''|\"|″)",
     "tan_delta": r"tan ?\(?(?:delta|δ)\)?|loss factor",
 }
-"""What an instrument calls a quantity, without its unit."""
+"""Names of a quantity in instruments' files, without its unit."""
 _BARE = ("tan_delta",)
-"""Quantities that may stand without a unit; a strain may not, since a percentage looks like a ratio."""
+"""Quantities that may lack a unit; a strain may not, since a percentage looks like a ratio."""
 
 
 @dataclass(frozen=True)
 class Declared:
-    """What a person said of one quantity: its column (a name, or a number from 1) and its unit, "" for the file's."""
+    """A declared quantity: its column (a name, or a number from 1) and its unit, "" for the file's."""
 
     column: str | int
     unit: str = ""
@@ -63,9 +63,9 @@ def declared(texts: Iterable[str], field: str = "--column") -> dict[str, Declare
 
 
 def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]) -> tuple[int, float] | None:
-    """Return the index of a quantity's column and the factor to SI; None where the file has none.
+    """Return the index of a quantity's column and the factor to SI; None if the file has none.
 
-    Raises Refusal where several columns fit, and for a unit that is missing or of another quantity.
+    Raises Refusal if several columns fit, and for a unit that is missing or of another quantity.
     """
     channels = recording.channels
     if quantity in given:
@@ -77,7 +77,7 @@ def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]
         if not fitting:
             return None
         if len(fitting) > 1:
-            names = ", ".join(f"{i + 1} {channels[i].name!r}" for i in fitting)
+            names = recording.numbered(fitting)
             limit = f"{recording.path.name} has several columns for {quantity}: {names}; declare {quantity}=COLUMN:UNIT"
             raise Refusal("--column", None, limit)
         at = fitting[0]
@@ -109,6 +109,6 @@ def _unit(text: str, quantity: str) -> float | None:
     known, written = COLUMN_UNITS[quantity], plain(text)
     if (factor := known.get(text.strip(), known.get(written))) is not None:
         return factor
-    # Case alone may differ where it can't be a prefix's: mN and MN, mm and Mm are two units.
+    # Only the case may differ, unless it tells prefixes apart: mN and MN, mm and Mm are two units.
     alike = [unit for unit in known if unit.lower() == written.lower()]
     return known[alike[0]] if len(alike) == 1 and alike[0] in _ANY_CASE else None

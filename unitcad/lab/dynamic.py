@@ -37,7 +37,7 @@ HELD_OUT = 0.5
 class DynamicCurve:
     """Storage and loss (Pa, (n,)) over frequency (Hz, rising), of Young's modulus ("tension") or of shear.
 
-    `lost`: rows left out since a number was missing.
+    `lost`: rows without a number, which are skipped.
     """
 
     name: str
@@ -51,11 +51,11 @@ class DynamicCurve:
 
 @dataclass(frozen=True)
 class DynamicResult:
-    """The law (Young's modulus at rest in Pa, tau in s, n) and what it says at the motor's frequency.
+    """The law (Young's modulus at rest in Pa, tau in s, n) and its values at the motor's frequency.
 
     `storage`, `loss_factor`: at `frequency_hz`, Pa and tan delta. `error`, `loss_error`: half-widths (95 %) of their
-    logarithms: the fit's (`fit_error` is that alone, of the storage), the specimen's geometry, and outside the measured
-    span what was off when the upper half was predicted by the lower, or `FLOOR_PER_DECADE` where that is more.
+    logarithms: the fit's (`fit_error`: only that, of the storage), the specimen's geometry, and outside the measured
+    span the error of predicting the upper half from the lower, at least `FLOOR_PER_DECADE`.
     """
 
     static: float
@@ -79,7 +79,7 @@ def read_dynamic(
 ) -> DynamicCurve:
     """Return a file's storage and loss over frequency.
 
-    Raises Refusal for columns and units that are missing, and where the file does not say shear or tension.
+    Raises Refusal for columns and units that are missing, and if the file does not say shear or tension.
     """
     recording = open_recording(path, layout)
     wanted = {q: found for q in ("frequency", "storage", "loss") if (found := column_of(recording, q, given))}
@@ -111,7 +111,7 @@ def read_dynamic(
 def evaluate_dynamic(curve: DynamicCurve, frequency_hz: float, poisson_ratio: float = 0.5) -> DynamicResult:
     """Fit the law and evaluate it at a frequency, in terms of Young's modulus: 2 (1 + nu) times that of shear.
 
-    Raises Refusal where the law does not describe the data at all.
+    Raises Refusal if the law does not describe the data at all.
     """
     factor = 2.0 * (1.0 + poisson_ratio) if curve.deformation == "shear" else 1.0
     omega, storage, loss = 2.0 * np.pi * curve.frequency, factor * curve.storage, factor * curve.loss
@@ -152,7 +152,7 @@ def evaluate_dynamic(curve: DynamicCurve, frequency_hz: float, poisson_ratio: fl
             "the loss is above the storage modulus, which a cured silicone's is not; are the columns swapped?"
         )
     if curve.lost:
-        said["gaps"] = f"{curve.lost} rows lack a number and are left out"
+        said["gaps"] = f"{curve.lost} rows lack a number and are skipped"
     static, tau, n = _constants(constants)
     return DynamicResult(
         static, tau, n, residual, frequency_hz, float(storage_at), float(loss_at / storage_at), error, loss_error,

@@ -26,8 +26,8 @@ def fit(
 ) -> None:
     """Judge the edge-level models with a lab's units, and fit them.
 
-    Each unit is predicted without it, next to a baseline of four class means. The constants are shrunk towards the
-    stored ones by how many units there are. `estimate --fit` and `build --fit` take lab-fit.toml.
+    Each unit is predicted from all others, by every model and by a baseline of four class means. The fewer units, the
+    more the constants shrink towards the stored ones. `estimate --fit` and `build --fit` take lab-fit.toml.
     """
 
     loaded = load_fit_lab(lab)
@@ -50,7 +50,7 @@ def _print(result: Fitted) -> None:
     screen.print(f"{settings.name}: {result.fit.units} units of its own, {settings.moduli} moduli", soft_wrap=True)
     if settings.note:
         screen.print(f"  {settings.note}", soft_wrap=True)
-    table = Table("model", "unit left out", "own: stored -> fitted", "against the baseline", "80 %")
+    table = Table("model", "leave-one-out", "own: stored -> fitted", "against the baseline", "80 %")
     for name in chosen.order:
         one = result.fit.model[name]
         own = "-" if one.own_left_out is None else f"x {one.own_left_out:.2f}"
@@ -65,7 +65,7 @@ def _print(result: Fitted) -> None:
         screen.print(f"  {name}: {fit_files.constants_text(result.fit.model[name])}", soft_wrap=True)
     for one in fit_files.warnings(result):
         screen.print(f"  warning: {one}", soft_wrap=True)
-    by_source = Table("moduli", *chosen.judged, title="unit left out, by where the moduli come from")
+    by_source = Table("moduli", *chosen.judged, title="leave-one-out error, by source of the moduli")
     for source, compared in result.by_source.items():
         by_source.add_row(
             source, *[f"{compared.judged[n].score:.2f}" if compared.judged else "-" for n in chosen.judged]

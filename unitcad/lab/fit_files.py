@@ -1,4 +1,4 @@
-"""What `unitcad fit` writes: lab-fit.toml, fit.json, fit.md and fit.svg. The same input, the same bytes."""
+"""The files of `unitcad fit`: lab-fit.toml, fit.json, fit.md and fit.svg. The same input, the same bytes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from unitcad.spec.toml import text_of, without_none
 
 FIT = "lab-fit.toml"
 DIFFERING = (
-    "Level by each model, unit left out, and the factor between the highest and the lowest. "
+    "Level by each model, fitted without the unit, and the factor between the highest and the lowest. "
     "A second cast of these units decides most"
 )
 _MOST_DIFFERING = 5
@@ -64,7 +64,7 @@ def as_data(result: Fitted) -> dict[str, Any]:
 
 
 def unit_rows(result: Fitted) -> list[dict[str, Any]]:
-    """Return each unit's measured level and, by the model that leads, what was predicted without it."""
+    """Return each unit's measured level and the leading model's prediction without it."""
     chosen = result.chosen
     assert chosen.campaigns is not None
     name = chosen.leads
@@ -79,7 +79,7 @@ def unit_rows(result: Fitted) -> list[dict[str, Any]]:
 
 
 def differing_units(result: Fitted) -> list[dict[str, Any]]:
-    """Return the lab's own units with the level by each model, unit left out, and the factor between the extremes.
+    """Return the lab's own units with the level by each model, fitted without the unit, and the extremes' factor.
 
     The unit on which the models differ most comes first.
     """
@@ -103,12 +103,12 @@ def differing_table(result: Fitted) -> list[list[str]]:
 
 
 def prior_text(result: Fitted) -> str:
-    """Say what the stored constants weigh."""
+    """State the weight of the stored constants."""
     settings, chosen = result.lab.settings, result.chosen
     assert chosen.campaigns is not None
     count = int(np.sum(~chosen.campaigns.own))
     if not count:
-        return "The lab's own units alone: nothing is shrunk."
+        return "Only the lab's own units count: nothing is shrunk."
     weight = count / (count * settings.between_labs**2 + 1)
     return (
         f"The stored constants, of {count} units, weigh as much as {weight:.2g} of the lab's own "
@@ -163,10 +163,10 @@ def page(result: Fitted) -> str:
     lines += [settings.note, ""] if settings.note else []
     lines += [
         f"{own} units of the lab's own"
-        + (" beside the paper's nine" if settings.with_paper else "")
+        + (" in addition to the paper's nine" if settings.with_paper else "")
         + f", {settings.moduli} moduli. {prior_text(result)} {leads_text(result)}",
         "",
-        "| model | unit left out | own units | own, stored constants | against the baseline | in 80 % | constants |",
+        "| model | leave-one-out | own units | own, stored constants | against the baseline | in 80 % | constants |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name in chosen.order:
@@ -232,5 +232,5 @@ def _chart(result: Fitted) -> str:
             series.append(Series(f"{label}, with {PERCENT[0]} to {PERCENT[1]} %", measured, predicted, True, bars=bars))
     ends = [min(row["measured"] for row in rows), max(row["measured"] for row in rows)]
     series.append(Series("predicted = measured", ends, ends, dashed=True))
-    title = f"{result.fit.name}: {result.fit.leads}, each unit left out"
+    title = f"{result.fit.name}: {result.fit.leads}, leave-one-out"
     return chart(series, title, "measured level", "predicted level", log_x=True, log_y=True)

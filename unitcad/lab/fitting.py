@@ -1,4 +1,4 @@
-"""A lab's units beside the paper's: models with a unit left out, by each source of moduli, and the fit."""
+"""A lab's units together with the paper's: leave-one-out errors by each source of moduli, and the fit."""
 
 from __future__ import annotations
 
@@ -51,32 +51,41 @@ class LevelTable(Table, frozen=True, kw_only=True):
     """A level and its 95 % interval."""
 
     value: LevelValue
-    low: LevelValue | None = None
-    high: LevelValue | None = None
+    low: Annotated[LevelValue | None, Meta(description="lower end of the 95 % interval")] = None
+    high: Annotated[LevelValue | None, Meta(description="upper end of the 95 % interval")] = None
 
 
 class FitUnitTable(Table, frozen=True, kw_only=True):
-    """A measured unit: its spec with changes, or the record of its casting; its level, or the file that has it."""
+    """One measured unit: its spec or cast record, and its level or the file with the level."""
 
-    name: Name
-    spec: str | None = None
-    cast: str | None = None
-    cavity: Cavity | None = None
-    set: dict[str, Any] = field(default_factory=dict)
-    frequency_hz: Frequency | None = None
+    name: Annotated[Name, Meta(description="a name of the unit")]
+    spec: Annotated[str | None, Meta(description="spec file or template of the unit")] = None
+    cast: Annotated[str | None, Meta(description="cast record of the unit, in place of spec")] = None
+    cavity: Annotated[Cavity | None, Meta(description="cavity of the cast record")] = None
+    set: Annotated[dict[str, Any], Meta(description="values of the spec to change, by path")] = field(
+        default_factory=dict
+    )
+    frequency_hz: Annotated[Frequency | None, Meta(description="frequency of the measurement; default: the spec's")] = (
+        None
+    )
     level: LevelTable | None = None
-    measured: str | None = None
+    measured: Annotated[str | None, Meta(description="measured.toml of unitcad measure, in place of level")] = None
 
 
 class FitLabFile(Table, frozen=True, kw_only=True):
-    """A lab's measured units as typed."""
+    """A lab's measured units."""
 
-    name: Name
-    note: Annotated[str, Meta(max_length=1000)] = ""
-    moduli: Literal["small-strain", "quasi-static"] = "small-strain"
-    with_paper: Annotated[bool, Meta(description="the paper's nine units beside the lab's own")] = True
+    name: Annotated[Name, Meta(description="a name of the lab")]
+    note: Annotated[str, Meta(max_length=1000, description="a remark for the results")] = ""
+    moduli: Annotated[
+        Literal["small-strain", "quasi-static"],
+        Meta(description="moduli of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa"),
+    ] = "small-strain"
+    with_paper: Annotated[
+        bool, Meta(description="whether the paper's nine units count in addition to the lab's own")
+    ] = True
     between_labs: Annotated[
-        float, Meta(ge=0, le=100, description="scatter of a constant between labs over that between units")
+        float, Meta(ge=0, le=100, description="scatter of a constant between labs, over that between units")
     ] = BETWEEN_LABS
     materials: dict[str, MaterialEntry] = field(default_factory=dict)
     unit: Annotated[tuple[FitUnitTable, ...], Meta(min_length=1, max_length=1000)]
@@ -95,7 +104,7 @@ class OwnUnit:
 
     @property
     def error(self) -> float:
-        """The standard error of ln level; 0 where no interval is given: it is then part of the discrepancy."""
+        """The standard error of ln level; 0 if no interval is given: it is then part of the discrepancy."""
         if self.level.low is None or self.level.high is None:
             return 0.0
         return float(np.log(self.level.high / self.level.low)) / (2 * _TWO_SIDED)
@@ -152,9 +161,10 @@ def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, A
         hertz, said = hertz or measured_hz, f"{table.measured}, chain {chain}"
     assert level is not None
     if (level.low is None) != (level.high is None):
-        raise Refusal(f"{field}.{'low' if level.low is None else 'high'}", None, "is required beside the other end")
+        missing = "low" if level.low is None else "high"
+        raise Refusal(f"{field}.{missing}", None, "is required together with the other end")
     if level.low is not None and level.high is not None and not level.low <= level.value <= level.high:
-        raise Refusal(f"{field}.value", level.value, f"must lie from low {level.low:g} to high {level.high:g}")
+        raise Refusal(f"{field}.value", level.value, f"must be from low {level.low:g} to high {level.high:g}")
     walls = measured_walls(asked, built)
     return OwnUnit(table.name, asked, built, hertz, level, f"{said}, {walls}" if walls else said)
 
@@ -162,8 +172,8 @@ def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, A
 def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | None) -> tuple[LevelTable, float, str]:
     """Return level, frequency and chain of a unit's edge in a file of `unitcad measure`, by the file's first chain.
 
-    Raises Refusal for a level that was measured of another template, spec file, cast record or cavity. A campaign may
-    name a spec where the fit names the record of its casting; then nothing is compared.
+    Raises Refusal for a level that was measured of another template, spec file, cast record or cavity. If a campaign
+    names a spec and the fit a cast record, nothing is compared.
     """
     data = read_toml(path)
     chain, rows = data.get("chain"), data.get("level")
@@ -192,7 +202,7 @@ def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | 
 
 SOURCES: tuple[Moduli, ...] = get_args(Moduli)
 LEAST_ALONE = 6
-"""Units of a lab without the paper's: one is left out, four class means are fitted, one degree of freedom is left."""
+"""Units of a lab without the paper's: with one left out and four class means fitted, one degree of freedom remains."""
 _WIDEST = 10.0
 """Largest half-width of a range of ln constant that is written: beyond it the units say nothing of the constant."""
 _SIDES = 0.95
@@ -241,7 +251,7 @@ class Compared:
 
 @dataclass(frozen=True)
 class Fitted:
-    """The study of a lab: the chosen source of moduli, the others beside it, and what an estimate takes."""
+    """The study of a lab: the chosen source of moduli, the other sources, and the fit for an estimate."""
 
     lab: FitLab
     by_source: dict[str, Compared]
@@ -301,7 +311,7 @@ def _compared(lab: FitLab, moduli: Moduli) -> Compared:
 
 
 def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Campaigns:
-    """Return the paper's units, where they are wanted, and the lab's own after them."""
+    """Return the paper's units, if they are wanted, and the lab's own after them."""
     paper = measured_table(moduli)
     known = np.array([bool(np.all(np.isfinite(units.youngs_modulus))) for units in paper.inputs])
     kept = np.flatnonzero(known) if lab.settings.with_paper else []

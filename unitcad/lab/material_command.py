@@ -36,9 +36,9 @@ def material(
         list[str] | None, typer.Option(metavar="QUANTITY=COLUMN[:UNIT]", help="A column by name or number, its unit.")
     ] = None,
     delimiter: Annotated[
-        str, typer.Option(help="Of the files' columns, where it is not plain: , ; tab or space.")
+        str, typer.Option(help="Delimiter of the columns: , ; tab or space. Default: found in the file.")
     ] = "",
-    decimal: Annotated[str, typer.Option(help="The files' decimal sign, where it is not plain: . or a comma.")] = "",
+    decimal: Annotated[str, typer.Option(help="Decimal sign: . or a comma. Default: found in the file.")] = "",
     skip_lines: Annotated[
         int, typer.Option(min=0, max=100_000, help="Lines of each file to skip, such as a table of results.")
     ] = 0,
@@ -54,15 +54,15 @@ def material(
     amplitude_um: Annotated[float, typer.Option(min=0.001, max=1e5, callback=finite, help="Of the motor.")] = 300.0,
     wall_mm: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Walls that the motor strains.")] = "1.25:2.5",
     frequency_hz: Annotated[float, typer.Option(min=1, max=5000, callback=finite, help="Of the motor.")] = 125.0,
-    deformation: Annotated[str, typer.Option(help="Of --dma, where the file does not say: shear or tension.")] = "",
+    deformation: Annotated[str, typer.Option(help="Deformation of --dma, if not in the file: shear or tension.")] = "",
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for material.toml, .json and charts.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Turn tensile curves into a silicone's table.
 
-    The table is for a spec, [materials.NAME]; every usual method stands beside the default, with a range. --dma takes a
-    dynamic test. A tensile test gives a quasi-static modulus, which the estimate takes where the spec says
-    moduli = "quasi-static" under [estimate].
+    The table is for a spec, [materials.NAME]; it has every usual method in addition to the default, with a range. --dma
+    takes a dynamic test. A tensile test gives a quasi-static modulus, which the estimate uses if the spec says moduli =
+    "quasi-static" under [estimate].
     """
 
     if not curves and dma is None:
@@ -128,13 +128,11 @@ def material(
 def _comments(entry: dict[str, Any], base: Material) -> tuple[str, ...]:
     lines = ["For a spec: paste it there and name the silicone in [[layers]]."]
     if "quasistatic_modulus_kpa" in entry:
-        lines.append(
-            'A tensile test is quasi-static: the estimate takes it where the spec says moduli = "quasi-static"'
-        )
+        lines.append('A tensile test is quasi-static: the estimate uses it if the spec says moduli = "quasi-static"')
         lines.append("under [estimate]; it is no modulus at the motor's frequency.")
         if base.youngs_modulus_kpa and "youngs_modulus_kpa" not in entry:
             lines.append(
-                f"Without that the estimate takes what {base.name} has: {base.youngs_modulus_kpa.value:g} kPa."
+                f"Without that the estimate uses the modulus of {base.name}: {base.youngs_modulus_kpa.value:g} kPa."
             )
     return tuple(lines)
 

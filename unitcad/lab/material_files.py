@@ -1,4 +1,4 @@
-"""What `unitcad material` writes: the table for a spec, everything as JSON, a chart of curves and fits."""
+"""The files of `unitcad material`: the table for a spec, everything as JSON, a chart of curves and fits."""
 
 from __future__ import annotations
 
@@ -15,10 +15,8 @@ from unitcad.export.chart import Series, chart
 from unitcad.lab.dynamic import DynamicResult
 from unitcad.lab.tensile import TensileResult, quasistatic
 from unitcad.spec import convert
-from unitcad.text import toml, toml_key
+from unitcad.text import some, toml, toml_key
 
-_NAMED = 3
-"""Files that a source names; of further ones it gives the count."""
 _SHOWN_TO = 1.2
 """Strain up to which the chart shows a curve."""
 
@@ -27,7 +25,7 @@ def table(tensile: TensileResult | None, dynamic: DynamicResult | None, like: st
     """Return the entry [materials.NAME] of a spec; `hertz` is the motor's frequency."""
     entry: dict[str, Any] = {"like": like}
     if tensile:
-        source = f"{_named([curve.name for curve in tensile.curves])}; {quasistatic(tensile, hertz)}"
+        source = f"{some((curve.name for curve in tensile.curves), 3)}; {quasistatic(tensile, hertz)}"
         entry["quasistatic_modulus_kpa"] = _value(
             tensile.value / 1e3, tensile.low / 1e3, tensile.high / 1e3, tensile.method, source
         )
@@ -159,8 +157,3 @@ def _dynamic(result: DynamicResult) -> dict[str, Any]:
 def _value(value: float, low: float, high: float, method: str, source: str) -> dict[str, Any]:
     ends = rounded({"value": value, "low": low, "high": high}, 4)
     return {**ends, "status": "measured", "method": method, "source": source[:500]}
-
-
-def _named(names: list[str]) -> str:
-    more = len(names) - _NAMED
-    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")

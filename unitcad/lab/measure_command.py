@@ -25,9 +25,9 @@ def measure(
 ) -> None:
     """Measure units from recordings in a lab.
 
-    Of a vibrometer, a displacement sensor or an accelerometer. Gives the level at the edge and along the skin,
+    Reads a vibrometer, a displacement sensor or an accelerometer. Gives the level at the edge and along the skin,
     normalised by the motor, with an interval of 95 % from the repeats.
-    Exit 1 when a finding says that a record or a level is in doubt. The last line printed is the folder.
+    Exit 1 if a finding puts a record or a level in doubt. The last line printed is the folder.
     """
 
     asked = read_campaign(campaign)

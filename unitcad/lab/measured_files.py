@@ -1,4 +1,4 @@
-"""What `unitcad measure` writes: measured.toml, measure.json, charts and a page. The same input, the same bytes."""
+"""The files of `unitcad measure`: measured.toml, measure.json, charts and a page. The same input, the same bytes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from unitcad.spec.toml import text_of
 
 MEASURED = "measured.toml"
 OURS = re.compile(r"measured\.toml|measure\.(json|html)|record-\d+-(time|periods|spectrum)\.svg|decay-\d+\.svg")
-"""Names of the files that a run writes, and removes where a former run left more of them."""
+"""Names of the files that a run writes, and removes if a former run left more of them."""
 
 
 def write(result: Measured, folder: Path) -> None:
@@ -134,7 +134,7 @@ figure{overflow-x:auto}svg{max-width:none;width:31rem}}"""
 
 
 def page(result: Measured, charts: dict[str, str], lead: str = "") -> str:
-    """Return the page as HTML; `charts` are SVG documents by file name, `lead` is HTML that stands first."""
+    """Return the page as HTML; `charts` are SVG documents by file name, `lead` is HTML that comes first."""
     found = "".join(
         f'<li class="{one.severity}"><b>{one.code}</b> {escape(one.where)}: {escape(one.message)}. '
         f"{escape(one.as_dict()['fix'])}</li>"
@@ -183,7 +183,7 @@ def page(result: Measured, charts: dict[str, str], lead: str = "") -> str:
 
 
 def fault_page(name: str, fault: str, lead: str = "") -> str:
-    """Return the page of a campaign that can't be measured, as HTML: why; `lead` is HTML that stands after it."""
+    """Return the page of a campaign that can't be measured, as HTML: the reason, then the HTML `lead`."""
     return _document(name, f'<h2>Not measured</h2><p class="error">{escape(fault)}</p>{lead}')
 
 
@@ -210,11 +210,11 @@ SHOWN_S = 0.1
 STRETCHES = 100
 """Parts of a record of which its chart shows the least and the largest value."""
 BESIDE_HZ = 30.0
-"""To either side of the lines, what a spectrum shows: one multiple of 50 Hz at least."""
+"""Width of a spectrum to either side of the lines: one multiple of 50 Hz at least."""
 APART = 0.008
 """Part of the axis by which the levels of two chains are drawn apart, so that no bar covers another."""
 LEAST_WIDE_MM = 10.0
-"""What the axis of distances shows at least: beside it APART is no distance."""
+"""Smallest span of the axis of distances, against which APART is no distance."""
 
 
 def charts_of(result: Measured) -> dict[str, str]:

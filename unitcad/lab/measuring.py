@@ -124,14 +124,14 @@ class Measured:
 
     @property
     def assumed(self) -> dict[str, Any]:
-        """The parameters of the chains that their sources do not state; none where no such chain was used."""
+        """The parameters of the chains that their sources do not state; none if no such chain was used."""
         return {name: value for chain in self.chains for name, value in chain.assumed.items()}
 
 
 def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambda name: None) -> Measured:
-    """Measure a campaign whose files lie in or below `folder`; `say` is told each record.
+    """Measure a campaign with files in or below `folder`; `say` gets each record.
 
-    Raises Refusal for what can't be read.
+    Raises Refusal for a file that can't be read.
     """
     check_files(campaign, folder)
     stated: dict[SensorTable, tuple[str, str]] = {}
@@ -195,7 +195,7 @@ def _mains_of_blanks(
 
 
 def _has_motor(path: Path, table: RecordingTable) -> bool:
-    """Tell whether a motor-off record has the motor's channel; one of the unit's sensor alone need not."""
+    """Tell whether a motor-off record has the motor's channel; a record of only the unit's sensor need not."""
     channel = table.motor_channel
     channels = open_recording(path, Layout(table.delimiter, table.decimal, table.skip_lines)).channels
     return channel <= len(channels) if isinstance(channel, int) else channel in [one.name for one in channels]

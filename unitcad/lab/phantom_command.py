@@ -19,7 +19,7 @@ def phantom(
     source: Annotated[
         str, typer.Argument(metavar="PHANTOM", help="A shipped phantom's name, or a TOML file (unitcad list phantoms).")
     ] = "skin",
-    out: Annotated[Path, typer.Option("-o", "--out", help="Where the phantom's folder goes.")] = Path("out"),
+    out: Annotated[Path, typer.Option("-o", "--out", help="Parent folder of the phantom's folder.")] = Path("out"),
     png: Annotated[bool, typer.Option("--png", help="Also box.png: the box taken apart.")] = False,
     as_json: AsJson = False,
 ) -> None:

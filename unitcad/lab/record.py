@@ -32,11 +32,11 @@ RULES = {
             Fewer than four samples a period: the sensor's filter and aliases change the amplitude.
             Example: 400 Hz for a motor of 125 Hz. Fix: Sample at 1 kHz or faster.""",
             """L103 error: uneven time axis
-            A time lies off an even grid by more than 0.3 of a step: samples are missing or the clock
+            A time is off an even grid by more than 0.3 of a step: samples are missing or the clock
             varies. Example: A logger over USB that loses a packet. Fix: Record with a hardware clock.""",
             """L104 error: several lines
-            A second line lies near the strongest one, so no amplitude is given: it would be none of
-            theirs. Example: Two motors of an array at once. Fix: Run one motor at a time.""",
+            A second line is near the strongest one, so no amplitude is given: it would belong to neither. Example: Two
+            motors of an array at once. Fix: Run one motor at a time.""",
             """L105 warning: line on the mains
             The record can't tell the line from a multiple of the mains' frequency. Example: A motor at
             100.2 Hz over 2 s. Fix: Record longer, or change the drive's voltage until the line is off the
@@ -49,39 +49,39 @@ RULES = {
             of the record is steady. Example: A battery that runs down. Fix: Use a regulated supply and
             let the motor warm up, or cut the record.""",
             """L108 warning: fewer than 20 periods
-            The steady part is too short for the noise beside the line to be known. Example: 0.1 s at
+            The steady part is too short to know the noise next to the line. Example: 0.1 s at
             125 Hz. Fix: Record 2 s.""",
             """L109 warning: repeats disagree
             The repeats' logarithms scatter by more than 0.15. Example: A unit that was not taped down
             again as before. Fix: Repeat, five times or more.""",
             """L110 error: drop-outs
-            More than a tenth of the samples were left out: more than a robust fit bears. Example: A
+            More than a tenth of the samples were excluded: more than a robust fit bears. Example: A
             vibrometer on bare skin. Fix: Put retroreflective tape on the point.""",
             """L111 error: no line
-            The band holds no line above five times its uncertainty. Example: The motor did not run.
+            The band has no line above five times its uncertainty. Example: The motor did not run.
             Fix: Repeat.""",
             """L112 error: too few repeats
             Fewer than three usable records are left: no level is given. Example: One of three is
             clipped. Fix: Repeat.""",
             """L114 warning: not fit for a chain
             The chain gives no amplitude of a record with drop-outs, missing samples or too few samples.
-            Example: The chain paper and a spike. Fix: Use the chain line.""",
+            Example: The chain bandpass and a spike. Fix: Use the chain line.""",
             """L115 warning: chains disagree
             The intervals of two chains do not overlap. Example: Hum that one chain does not remove.
             Fix: Look at the spectra of the records.""",
             """L116 error: motor and unit at different frequencies
-            No line of the unit lies within a tenth of the motor's frequency: no level is given.
+            No line of the unit is within a tenth of the motor's frequency: no level is given.
             Example: The reference of another motor. Fix: Record the motor at the same voltage.""",
             """L117 error: stronger line outside the band
             A line outside chain.band_hz is stronger than the one in it, which may be its harmonic.
             Example: A motor at 45 Hz and a band from 60 Hz. Fix: Widen chain.band_hz.""",
             """L118 warning: low signal to noise
-            The amplitude is less than ten times the standard deviation of what the fit leaves; where
-            twice its uncertainty exceeds it, it is an error. Example: A point far from the unit. Fix:
+            The amplitude is less than ten times the standard deviation of the residual; if twice its uncertainty
+            exceeds it, it is an error. Example: A point far from the unit. Fix:
             Record longer, average more, or a sensor of a smaller range.""",
             """L119 warning: missing samples
-            Samples are no numbers: empty, or NaN. They are left out; beyond a tenth of them it is an
-            error. Example: A logger that writes NaN where the laser lost the surface. Fix: Put
+            Samples are no numbers: empty, or NaN. They are skipped; beyond a tenth of them it is an error. Example: A
+            logger that writes NaN while the laser has lost the surface. Fix: Put
             retroreflective tape on the point.""",
         ),
     )
@@ -90,7 +90,7 @@ RULES = {
 
 @dataclass(frozen=True)
 class LabFinding:
-    """One finding: code, severity, the record or level it is about, and what was measured."""
+    """One finding: code, severity, its record or level, and the measured figure."""
 
     code: str
     severity: str
@@ -98,7 +98,7 @@ class LabFinding:
     message: str
 
     def as_dict(self) -> dict[str, str]:
-        """Return JSON-ready data, with what to do."""
+        """Return JSON-ready data, with title and fix."""
         return {**asdict(self), "title": RULES[self.code].title, "fix": RULES[self.code].fix}
 
 
@@ -110,7 +110,7 @@ def found(code: str, where: str, message: str, severity: str | None = None) -> L
 LONGEST_S = 60.0
 """Seconds of a record that is measured: the line of a longer one has too many parameters to be fitted at once."""
 IRREGULAR = 0.3
-"""Steps by which a time may lie off an even grid."""
+"""Largest distance of a time from an even grid, in steps."""
 ON_GRID = 0.1
 """The same for times among which some are lost."""
 SAME_RATE = 1e-3
@@ -123,8 +123,8 @@ HIGHEST_RATE = 5_000.0
 class Signal:
     """A record's samples (n, channels) at `rate` in Hz: means of `averaged` neighbours of the file's at `raw_rate`.
 
-    `count` and `missing`: samples of the file, and of each channel those that are no numbers; `off_grid`: by how many
-    steps a time lies off an even grid; `units`: of each channel in the file, "" if the file gives none.
+    `count` and `missing`: samples of the file, and of each channel those that are no numbers; `off_grid`: the largest
+    distance of a time from an even grid, in steps; `units`: of each channel in the file, "" if the file gives none.
     """
 
     samples: Floats
@@ -147,9 +147,9 @@ class Signal:
 
 
 def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, ...], shown: str) -> Signal:
-    """Return the signal of a record: the channel, and the motor's where the campaign declares one.
+    """Return the signal of a record: the channel, and the motor's if the campaign declares one.
 
-    Raises Refusal, naming the key to add, for what neither the file nor the campaign says.
+    Raises Refusal, naming the key to add, for a value that neither the file nor the campaign states.
     """
     recording = open_recording(path, Layout(table.delimiter, table.decimal, table.skip_lines))
     channels = recording.channels
@@ -196,13 +196,13 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
 
 
 def _off_grid(stamps: Floats, rate: float) -> float:
-    """Return by how many steps a time lies off an even grid."""
+    """Return the largest distance of a time from an even grid, in steps."""
     off = np.abs((stamps - stamps[0]) * rate - np.arange(len(stamps)))
     return float(off.max()) if np.isfinite(off).all() else np.inf
 
 
 def _places(stamps: Floats) -> Ints | None:
-    """Return the times' places on an even grid of at most twice as many; None if a time lies off it."""
+    """Return the times' places on an even grid of at most twice as many; None if a time is off it."""
     steps = np.diff(stamps)
     if not (np.isfinite(stamps).all() and (steps > 0).all()):
         return None
@@ -262,9 +262,9 @@ def expect_one_unit(
 def _rate(
     recording: Recording, table: RecordingTable, time: int | None, column: int, shown: str
 ) -> tuple[float, Floats | None]:
-    """Return the rate in Hz, and the times in s where they tell it.
+    """Return the rate in Hz, and the times in s if they determine it.
 
-    Raises Refusal where the file says another rate than the campaign does.
+    Raises Refusal if the file says another rate than the campaign does.
     """
     if table.rate_hz is None:
         return _own_rate(recording, table, time, column, shown)
@@ -282,7 +282,7 @@ def _rate(
 def _own_rate(
     recording: Recording, table: RecordingTable, time: int | None, column: int, shown: str
 ) -> tuple[float, Floats | None]:
-    """Return what the file says of its rate in Hz, and its times in s."""
+    """Return the rate in Hz that the file states, and its times in s."""
     if time is None:
         step = recording.channels[column].step_s
         if step is None:
@@ -299,7 +299,7 @@ def _own_rate(
 
 LEAST_GAIN = 0.9
 HIGHEST_HZ = 500.0
-"""Where a record's spectrum ends, in Hz."""
+"""If a record's spectrum ends, in Hz."""
 SAME_LINE_HZ = 0.5
 MOST_SCATTER = MOST_DRIFT = 0.05
 LEAST_PERIODS, NO_PERIODS = 20, 5
@@ -322,8 +322,9 @@ class RecordResult:
     """A record's figures; amplitudes (peak) and standard uncertainties in um. `ratio` is to the motor's own channel.
 
     `usable`: it counts for levels. `by_chain` has each chain's amplitude over which a level is taken, without the
-    chains that the record is not fit for; `gains` what a chain's filters pass of the line; `lines` the frequencies of a
-    record that has several lines, which has no amplitude; `picture` the samples and the spectrum, in the sensor's unit;
+    chains that the record is not fit for; `gains` the gain of a chain's filters at the line; `lines` the frequencies of
+    a record that has several lines, which has no amplitude; `picture` the samples and the spectrum, in the sensor's
+    unit;
     `units` the units of the channels in the file.
     """
 
@@ -382,7 +383,7 @@ def measure_record(
 ) -> RecordResult:
     """Return a record's figures by every chain of the campaign; `mains` and `sensors` are the unit's, then the motor's.
 
-    `band` is where its line is looked for, in Hz. Raises Refusal for a record that can't be read.
+    `band` is the band in which its line is searched, in Hz. Raises Refusal for a record that can't be read.
     """
     with own_keys(campaign.recording, shown):
         signal = open_signal(path, recording_of(campaign.recording, shown), sensors, shown)
@@ -397,7 +398,7 @@ def measure_record(
     hint = f"; the strongest line outside that is at about {hertz:.0f} Hz" if hertz else ""
     findings: list[LabFinding] = []
     if signal.off_grid > IRREGULAR:
-        findings.append(found("L103", shown, f"a time lies {signal.off_grid:.2g} steps off an even grid"))
+        findings.append(found("L103", shown, f"a time is {signal.off_grid:.2g} steps off an even grid"))
     fits = _fits(samples, rate, band, mains, sensors)
     for fit, channel, gaps, where in zip(fits, samples.T, signal.missing, names, strict=True):
         level = fit.clipped if fit else _clipped(channel)
@@ -434,11 +435,11 @@ def measure_record(
         findings.append(found("L107", shown, message))
     outside = _outside(frequency, size, campaign.chain.band_hz, mains_hz, fit.frequency_hz)
     if outside is not None:
-        findings.append(found("L117", shown, f"a stronger line lies at about {outside:.0f} Hz, outside chain.band_hz"))
+        findings.append(found("L117", shown, f"a stronger line is at about {outside:.0f} Hz, outside chain.band_hz"))
     hertz = fit.frequency_hz
     factor = displacement(sensors[0], hertz) / signal.gain(hertz)
     ratio, lag = None, None
-    if motor is not None:  # displacement over the motor's, and its phase, behind the motor's where negative
+    if motor is not None:  # displacement over the motor's, and its phase, behind the motor's if negative
         turn = [displacement(sensor, hertz) / 1j ** _ORDER[sensor.quantity] for sensor in sensors]
         value = fit.value / motor.value * turn[0] / turn[1]
         ratio, lag = abs(value), float(np.degrees(np.angle(value)))
@@ -519,7 +520,7 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
 
     hertz = fit.frequency_hz
     if fit.masked > MOST_MASKED:
-        say("L110", f"{fit.masked:.0%} of the samples were left out")
+        say("L110", f"{fit.masked:.0%} of the samples were excluded")
     own = float(np.sqrt(max(fit.u**2 - fit.u_mains**2, 0.0))) if fit.snr < 1 else fit.u_noise
     if fit.amplitude < LEAST_OVER_U * own:  # nothing else can be said of a line that is not there
         say("L111", f"the strongest has {fit.amplitude / own:.1f} times its uncertainty")
@@ -528,7 +529,7 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
         say("L102", f"{raw_rate:g} Hz for a line at {hertz:.1f} Hz")
     if fit.mains_hz:
         known = "its part is in the uncertainty" if mains.blank else "without a [blank] its part is not known"
-        say("L105", f"{hertz:.2f} Hz beside {fit.mains_hz:g} Hz: {known}")
+        say("L105", f"{hertz:.2f} Hz next to {fit.mains_hz:g} Hz: {known}")
     periods = (fit.end_s - fit.start_s) * hertz
     if periods < LEAST_PERIODS:
         severity = "error" if periods < NO_PERIODS else "warning"

@@ -22,6 +22,7 @@ from unitcad.catalogue import Material
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.lab.columns import Declared, column_of, columns, columns_of
 from unitcad.lab.readers import AS_FOUND, Layout, open_recording
+from unitcad.text import some
 
 LEAST_POINTS = 5
 _HEADER_LINES = 200
@@ -30,7 +31,7 @@ _FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
 
 @dataclass(frozen=True)
 class Specimen:
-    """A specimen and its machine: lengths mm, the cell's full scale N, the speed mm/min; None where not known.
+    """A specimen and its machine: lengths mm, the cell's full scale N, the speed mm/min; None if not known.
 
     `crosshead`: the strain is the crosshead's travel over the gauge length, not the specimen's own.
     """
@@ -60,8 +61,8 @@ class Specimen:
 class TensileCurve:
     """One specimen's curve up to its largest stress: engineering strain rises, engineering stress in Pa; both (n,).
 
-    `rate`: strain per second at the start, None without a time. `skipped`: points left out since the strain had been
-    passed before; `lost`: rows left out since a number was missing. `sha256`: of the file; `path`: where it was read.
+    `rate`: strain per second at the start, None without a time. `skipped`: points whose strain had been passed before;
+    `lost`: rows without a number. `sha256`: of the file; `path`: of the file.
     """
 
     name: str
@@ -78,9 +79,9 @@ class TensileCurve:
 def read_curve(
     path: Path, given: Mapping[str, Declared], specimen: Specimen, layout: Layout = AS_FOUND
 ) -> TensileCurve:
-    """Return a file's curve. What `specimen` gives goes before the file's header.
+    """Return a file's curve. Values of `specimen` override the file's header.
 
-    Raises Refusal where a column or a unit is missing or ambiguous, or where the points are no pull; UnitcadError for
+    Raises Refusal if a column or a unit is missing or ambiguous, or if the points are no pull; UnitcadError for
     a file that can't be read.
     """
     recording = open_recording(path, layout)
@@ -102,14 +103,14 @@ def read_curve(
         strain = np.expm1(data["true_strain"])
     elif strain is None:
         if specimen.gauge_mm is None:
-            raise Refusal("--gauge-mm", None, f"{path.name} gives the travel alone: the gauge length is required")
+            raise Refusal("--gauge-mm", None, f"{path.name} gives only the travel: the gauge length is required")
         strain = (data["travel"] - data["travel"][0]) * 1e3 / specimen.gauge_mm
         specimen = replace(specimen, crosshead=specimen.crosshead is not False)
     if "true_stress" in data:
         stress = data["true_stress"] / (1.0 + strain)
     elif stress is None:
         if specimen.area is None:
-            raise Refusal("--width-mm", None, f"{path.name} gives the force alone: width and thickness are required")
+            raise Refusal("--width-mm", None, f"{path.name} gives only the force: width and thickness are required")
         stress = data["force"] / specimen.area
     # Up to the largest stress, without points whose strain had been passed before.
     if len(stress) == 0:
@@ -131,7 +132,7 @@ def read_curve(
 
 
 def header_of(path: Path) -> Specimen:
-    """Return what the lines "name;value" before the numbers say of specimen and machine."""
+    """Return specimen and machine from the lines "name;value" before the numbers."""
     found: dict[str, float | bool] = {}
     for name, value in _pairs(path):
         number = _NUMBER.match(value)
@@ -150,7 +151,7 @@ def header_of(path: Path) -> Specimen:
                 found["crosshead"] = True
             elif re.search("extensometer|video|dic", value, re.IGNORECASE):
                 found["crosshead"] = False
-    if length := found.pop("length_mm", None):  # a bare "Length" is the gauge length where no other line gives one
+    if length := found.pop("length_mm", None):  # a bare "Length" is the gauge length if no other line gives one
         found.setdefault("gauge_mm", length)
     return Specimen(**found)  # type: ignore[arg-type]
 
@@ -262,7 +263,7 @@ def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None
 
 
 def secant(strain: np.ndarray, stress: np.ndarray, at: float) -> float | None:
-    """Return stress over strain at a strain, Pa, interpolated; None where no points of the curve are near it."""
+    """Return stress over strain at a strain, Pa, interpolated; None if no points of the curve are near it."""
     if not strain[0] <= at <= strain[-1]:
         return None
     after = int(np.searchsorted(strain, at))
@@ -321,7 +322,7 @@ LEAST_OF_CELL, LATEST_START, MOST_BREAK, MOST_TOE = 1e-3, 0.02, 1.25, 0.02
 
 @dataclass(frozen=True)
 class MethodRow:
-    """One method over all specimens: the mean of logarithms (Pa) and each specimen's value; None where not usable."""
+    """One method over all specimens: the mean of logarithms (Pa) and each specimen's value; None if not usable."""
 
     method: str
     value: float | None
@@ -343,7 +344,7 @@ class TensileResult:
     """The modulus (Pa) at the strain of use, its range, every method, and the parts of the uncertainty.
 
     `scatter`, `geometry`: half-widths of the logarithm; scatter is None for one specimen. `spread`: the largest over
-    the least defensible value. `rate`: strain per second, None where not known.
+    the least defensible value. `rate`: strain per second, None if not known.
     """
 
     value: float
@@ -365,7 +366,7 @@ class TensileResult:
 def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: Material | None = None) -> TensileResult:
     """Evaluate the specimens of one material at a strain of use (low, high); `sheet` is compared with the break.
 
-    Raises Refusal where no curve spans the strain of use, where a file is given twice, and for specimens that differ so
+    Raises Refusal if no curve spans the strain of use, if a file is given twice, and for specimens that differ so
     much that they are not one silicone's.
     """
     known: dict[str, TensileCurve] = {}
@@ -385,7 +386,7 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
     ratio = max(by_specimen) / min(by_specimen)
     if ratio > OTHER_MATERIAL:
         pairs = zip(curves, by_specimen, strict=True)
-        shown = ", ".join(f"{curve.name} {one / 1e3:.3g} kPa" for curve, one in pairs)
+        shown = some(f"{curve.name} {one / 1e3:.3g} kPa" for curve, one in pairs)
         why = "these are not specimens of one silicone, or a unit is wrong"
         raise Refusal("FILES", None, f"differ by a factor of {ratio:.3g} ({shown}): {why}")
     scatter = None
@@ -423,7 +424,7 @@ def quasistatic(result: TensileResult, frequency_hz: float) -> str:
     )
     return (
         f"quasi-static: {pulled}; at {frequency_hz:g} Hz and {50 * sum(result.used):.3g} % strain the rate is "
-        f"{motor:.3g} /s, where silicone is stiffer"
+        f"{motor:.3g} /s, at which silicone is stiffer"
     )
 
 
@@ -450,7 +451,7 @@ def _area_error(specimen: Specimen) -> float:
 def _doubts(
     curve: TensileCurve, used: tuple[float, float], toe: Toe | None, sheet: Material | None
 ) -> Iterator[tuple[str, str]]:
-    """Yield what is doubtful about one curve: a word that names it, and a message."""
+    """Yield the doubts about one curve: a word that names each, and a message."""
     middle, specimen = sum(used) / 2.0, curve.specimen
     if specimen.area and specimen.cell_n:
         force = float(np.interp(middle, curve.strain, curve.stress)) * specimen.area
@@ -458,13 +459,13 @@ def _doubts(
             below = f"below a thousandth of the cell's {specimen.cell_n:g} N"
             yield "force", f"{force:.2g} N at {100 * middle:.3g} %, {below}: use a smaller cell"
     if curve.strain[0] > LATEST_START:
-        yield "start", f"the first point lies at {100 * curve.strain[0]:.3g} % strain"
+        yield "start", f"the first point is at {100 * curve.strain[0]:.3g} % strain"
     if toe and abs(toe.origin) > MOST_TOE:
         yield "toe", f"the fitted curve begins at {100 * toe.origin:.3g} % strain (slack or offset)"
     if curve.lost:
-        yield "gaps", f"{curve.lost} rows lack a number and are left out"
+        yield "gaps", f"{curve.lost} rows lack a number and are skipped"
     if curve.skipped > 0.01 * len(curve.strain):
-        yield "cycles", f"{curve.skipped} points left out: the strain goes back, as in cycles; the first pull counts"
+        yield "cycles", f"{curve.skipped} points skipped: the strain goes back, as in cycles; the first pull counts"
     if sheet:
         at, expected = 100 * curve.strain[-1], float(sheet.elongation_pct)
         if not 1 / MOST_BREAK <= at / expected <= MOST_BREAK:

@@ -1,4 +1,4 @@
-"""What a unit of a lab is: a template, a spec file, or the record of its casting; each found, checked and hashed."""
+"""The source of a lab's unit: a template, a spec file, or the record of its casting; each found, checked and hashed."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from unitcad.casting.cast_record import CastRecord, CastUnit, read_cast_record
 from unitcad.catalogue import materials
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.spec import Spec, check_plain
+from unitcad.text import some
 from unitcad.validation import custom_templates, from_data, put, read, templates
 from unitcad.validation.shipped_files import is_path
 
-Cavity = Annotated[int, Meta(ge=1, le=999, description="the unit of a cast record: the number engraved beside it")]
+Cavity = Annotated[int, Meta(ge=1, le=999, description="number of the unit in its cast record, engraved next to it")]
 
 
 class UnitNames(Protocol):
-    """A table that names what a unit is: a template or spec file, or a cast record and a cavity of it."""
+    """A table that names the source of a unit: a template or spec file, or a cast record and a cavity of it."""
 
     @property
     def spec(self) -> str | None: ...
@@ -33,7 +34,7 @@ class UnitNames(Protocol):
 
 
 def file_of(folder: Path, name: str, field: str) -> Path:
-    """Return the path of a file that a lab's file in `folder` names. Raises Refusal where there is none."""
+    """Return the path of a file that a lab's file in `folder` names. Raises Refusal if there is none."""
     path = folder / name
     if not path.is_file():
         raise Refusal(field, name, f"no such file in {files.seen_from(folder)}")
@@ -41,13 +42,13 @@ def file_of(folder: Path, name: str, field: str) -> Path:
 
 
 def source_file(unit: UnitNames, folder: Path, field: str) -> str | None:
-    """Return the name of the file that tells what a unit is; None for a template, or where nothing tells it.
+    """Return the name of the file that defines a unit; None for a template, or if there is none.
 
     Raises Refusal for a template that is not known, a file that is not there, and a cast record that is not valid or
     has no such unit.
     """
     if unit.spec is not None and unit.cast is not None:
-        raise Refusal(f"{field}.cast", unit.cast, "stands beside spec; leave one out")
+        raise Refusal(f"{field}.cast", unit.cast, "excludes spec; leave one out")
     if unit.cavity is not None and unit.cast is None:
         raise Refusal(f"{field}.cavity", unit.cavity, "is of a cast record, but there is no cast")
     if unit.cast is not None:
@@ -73,7 +74,7 @@ def specs_of(
         asked = _spec_with(field, unit.spec, changes, folder, entries)
         return asked, asked
     if changes:
-        raise Refusal(f"{field}.set", dict(changes), "stands beside cast: the record says what was cast")
+        raise Refusal(f"{field}.set", dict(changes), "excludes cast: the record has the spec that was cast")
     record, built = _cast(unit, folder, field)
     where = f"{field}.cast"
     if record.spec is None:
@@ -106,14 +107,14 @@ def _spec_with(field: str, base: str, changes: Mapping[str, Any], folder: Path, 
 
 
 def measured_walls(asked: Spec, built: Spec) -> str:
-    """Say which walls were measured, inside out; "" where none differs from what was asked."""
+    """Return the measured walls, inside out; "" if none differs from the spec."""
     if asked.layers == built.layers:
         return ""
     return "walls as measured, " + ", ".join(f"{layer.wall_mm:.3g}" for layer in built.layers) + " mm"
 
 
 def _cast(unit: UnitNames, folder: Path, field: str) -> tuple[CastRecord, CastUnit | None]:
-    """Return a cast record and the unit that is meant; None where nobody looked at any."""
+    """Return a cast record and the unit that is meant; None if nobody looked at any."""
     where, name = f"{field}.cast", str(unit.cast)
     path = file_of(folder, name, where)
     try:
@@ -122,7 +123,7 @@ def _cast(unit: UnitNames, folder: Path, field: str) -> tuple[CastRecord, CastUn
         raise Refusal(where, name, str(error)) from None
     units = {one.cavity: one for one in record.units}
     usable = [one for one in record.units if one.usable]
-    listed, field = ", ".join(map(str, units)), f"{field}.cavity"
+    listed, field = some(units), f"{field}.cavity"
     if unit.cavity is not None:
         found = units.get(unit.cavity)
         if found is None and units:

@@ -82,7 +82,16 @@ def write(path: Path, old: Baseline, reports: Sequence[FileReport]) -> Baseline:
 
 def apply(baseline: Baseline, path: Path, report: FileReport) -> FileReport:
     """Return the report with what the baseline at `path` lists marked as known."""
-    known = {entry.code: entry for entry in baseline.files.get(_key(path, report.path), [])}
+    return _marked(report, baseline.files.get(_key(path, report.path), []))
+
+
+def compare(new: FileReport, old: FileReport) -> FileReport:
+    """Return the new report with the findings that the old one has, too, marked as known."""
+    return _marked(new, [_entry(item) for item in old.findings if _may_be(item)])
+
+
+def _marked(report: FileReport, entries: Sequence[Entry]) -> FileReport:
+    known = {entry.code: entry for entry in entries}
     findings = tuple(_compared(item, known.get(item.code), report.facts) for item in report.findings)
     return replace(report, findings=findings)
 

@@ -13,6 +13,7 @@ import stat
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -54,16 +55,13 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
 def check_file(path: str | Path, options: Options | None = None) -> FileReport:
     """Check one file. Missing, unreadable and hostile files are findings of the report."""
     options = options or Options()
-    place = Path(path)
-    return _guarded(
-        str(path), options, lambda deadline: _check(_bytes_of(place, options.limits), place, options, deadline)
-    )
+    return _guarded(str(path), options, partial(_check, None, Path(path), options))
 
 
 def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileReport:
     """Check a file's content without the file; `name` says by its suffix what it is. Not for STEP."""
     options = options or Options()
-    return _guarded(name, options, lambda deadline: _check(data, Path(name), options, deadline))
+    return _guarded(name, options, partial(_check, data, Path(name), options))
 
 
 def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[Sequence[Finding], Facts]]) -> FileReport:
@@ -78,7 +76,10 @@ def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[Seque
     return FileReport(path, kept, facts, meshes=tuple(meshes or ()))
 
 
-def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tuple[Sequence[Finding], Facts]:
+def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline) -> tuple[Sequence[Finding], Facts]:
+    """Check a file by its content; without `data` it is read."""
+    if data is None:
+        data = _bytes_of(path, options.limits)
     kind = readers.kind_of(path.name)
     if not kind:
         known = ", ".join(sorted(readers.SUFFIXES))
@@ -184,7 +185,7 @@ def _step_needs() -> str:
     """Return what STEP files need and is not there, or nothing."""
     from unitcad.meshcheck.readers import read_step
 
-    return "" if read_step.installed() else read_step.NEEDS
+    return read_step.missing()
 
 
 def _walked(folder: Path) -> Iterator[str]:
@@ -233,23 +234,19 @@ def check_files(
 def guarded(path: str, options: Options, then: Then | None = None) -> FileReport:
     """Call `check_file` with an alarm behind its clock; an inner fault becomes a finding, not a crash."""
     begin = time.perf_counter()
-    report = _report(path, options)
-    report = replace(report, seconds=time.perf_counter() - begin)
-    return then(report) if then else report
-
-
-def _report(path: str, options: Options) -> FileReport:
     try:
         with _alarm(options.limits.seconds):
-            return check_file(path, options)
+            report = check_file(path, options)
     except Unreadable as stop:
-        return FileReport(path, stop.findings)
+        report = FileReport(path, stop.findings)
     except MemoryError:
-        return _stopped(path, "out of memory (--memory)")
+        report = _stopped(path, "out of memory (--memory)")
     except Exception as error:
         if os.environ.get("UNITCAD_TRACEBACK"):
             raise
-        return _stopped(path, f"the check itself failed ({type(error).__name__}: {error}); please report the file")
+        report = _stopped(path, f"the check itself failed ({type(error).__name__}: {error}); please report the file")
+    report = replace(report, seconds=time.perf_counter() - begin)
+    return then(report) if then else report
 
 
 def _stopped(path: str, why: str) -> FileReport:

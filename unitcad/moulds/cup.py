@@ -112,14 +112,15 @@ def window_section(spec: Spec, exit: Exit, rim: float) -> tuple[float, float, fl
     moulds, layer = spec.moulds, spec.moulds.layer_mm
     low, high = exit.low - moulds.window_clearance_mm, exit.high + moulds.window_clearance_mm
 
-    def printed(height: float) -> float:
-        return math.floor(height / layer + 0.5 + EPS) * layer
+    def printed(height: float) -> tuple[float, float]:
+        """Return a height in whole layers; a slicer may take one that is halfway between two for either."""
+        return math.ceil(height / layer - 0.5 - EPS) * layer, math.floor(height / layer + 0.5 + EPS) * layer
 
     seat = -plate_bottom(spec)
-    ledge = printed(exit.low + seat) - printed(seat)
-    thickness = exit.height if printer_of(spec).technology.value == "sla" else printed(exit.height)
-    rise = max(rim, printed(rim)) - (min(exit.low, ledge) - moulds.window_clearance_mm)
-    drop = min(rim, printed(rim)) - (max(exit.high, ledge + thickness) + moulds.window_clearance_mm)
+    ledge = [one - other for one, other in zip(printed(exit.low + seat), printed(seat)[::-1], strict=True)]
+    thickness = exit.height if printer_of(spec).technology.value == "sla" else printed(exit.height)[1]
+    rise = max(rim, printed(rim)[1]) - (min(exit.low, ledge[0]) - moulds.window_clearance_mm)
+    drop = min(rim, printed(rim)[0]) - (max(exit.high, ledge[1] + thickness) + moulds.window_clearance_mm)
     bottom, top = rim - math.ceil(rise / layer - EPS) * layer, rim - math.floor(drop / layer + EPS) * layer
     return (
         exit.width / 2 + moulds.window_clearance_mm,

@@ -185,6 +185,11 @@ def seen(point: Point, across: Axis) -> Point:
     return point if across == "x" else (point[1], -point[0])
 
 
+def unseen(point: Point, across: Axis) -> Point:
+    """Return a point of the frame of the seams across an axis in the frame of the tools."""
+    return point if across == "x" else (-point[1], point[0])
+
+
 def length(seam: Seam, low: float, high: float) -> float:
     """Return how long a seam's line is between two heights, between which it turns, its corners round (mm)."""
     ends = (at(seam.line, low), low), (at(seam.line, high), high)

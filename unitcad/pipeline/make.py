@@ -1,7 +1,7 @@
 """A unit's result made whole, in memory and a store: its files, and the manifest that lists them.
 
-What follows from the geometry sees a mould set whose materials, names and casting are blank (`MouldSet.blank`), so that
-nothing can read them unnoticed: it serves every variant of that geometry.
+Files that depend only on the geometry see a mould set whose materials, names and casting are blank (`MouldSet.blank`),
+so that nothing can read them unnoticed: it serves every variant of that geometry.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class Product:
 
 
 class Subject:
-    """A spec, as a result is made of it; `subjects.Compound` is the same for what is built of several units."""
+    """A spec as the source of a result; `subjects.Compound` is the same for several units."""
 
     kind, file = "spec", "spec.toml"
 
@@ -220,7 +220,7 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, prog
         "air_ring_mm": round(moulds.dimensions.air_ring, 9),
         "parts": list(parts.values()),
         "steps": _pours(moulds, store) if pours else [],
-        "laws": findings,
+        "mould_checks": findings,
         "strains": strained,
         "check": meshes,
         "files": made,
@@ -276,7 +276,7 @@ def record(moulds: MouldSet, body: Body) -> PartRecord:
 
 
 def _round(value: float, digits: int) -> float:
-    """Round to significant digits: what a summation's order leaves does not reach the file."""
+    """Round to significant digits, so that the order of a summation does not change the file."""
     return float(f"{value:.{digits}g}") + 0.0
 
 
@@ -324,18 +324,18 @@ def _mesh_checks(moulds: MouldSet, parts: dict[str, PartRecord], store: Store, p
 def mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
     """Return the geometry's mould findings, and its strains against this variant's silicones, by code."""
     if not shape["strains"]:
-        return shape["laws"]
+        return shape["mould_checks"]
     strained = strain_findings(spec, [Strain(**strain) for strain in shape["strains"]])
-    return sorted([*shape["laws"], *_dicts(strained)], key=lambda finding: finding["code"])
+    return sorted([*shape["mould_checks"], *_dicts(strained)], key=lambda finding: finding["code"])
 
 
 _ESTIMATES: dict[Hashable, tuple[dict[str, Any], bytes]] = {}
-"""Estimates that this process made last, by what they read: variants that differ only in casting share one."""
+"""Estimates that this process made last, by their inputs: variants that differ only in casting share one."""
 _MOST_ESTIMATES = 64
 
 
 def forget() -> None:
-    """Drop what this process keeps for the next result: what a measurement of times needs."""
+    """Drop the results that this process caches, for a measurement of times."""
     forget_geometry()
     _ESTIMATES.clear()
 

@@ -23,14 +23,14 @@ from unitcad.spec import Spec, spec_hash
 from unitcad.spec.asked import OUTPUTS
 from unitcad.validation import warnings
 
-CASTING = ("bom.csv", "casting.json", "casting.md")
+CASTING = ("bom.csv", "casting.json", "casting.md", "troubleshooting.md")
 UNCHECKED = "--no-check"
 NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
-NO_KERNEL = "no B-rep kernel is installed for STEP: in a clone, pip install '.[step]'"
+NO_KERNEL = "no B-rep kernel is installed for STEP"
 
 
 class BodyFile(TypedDict):
-    """A file that holds a body."""
+    """A file that contains a body."""
 
     path: str
     sha256: str
@@ -79,14 +79,14 @@ class MeshFindings(TypedDict):
 
 
 class ModelLevel(TypedDict):
-    """A model's level at the edge, None where it gives no number, and its mean error against the measured levels."""
+    """A model's level at the edge, None if it gives no number, and its mean error against the measured levels."""
 
     edge: float | None
     table_error: float | None
 
 
 class EstimateSummary(TypedDict):
-    """The estimate in short; `measured` is the paper's level of this unit, None where there is none.
+    """The summary of the estimate; `measured` is the paper's level of this unit, None if there is none.
 
     `lines` are the two that lead the estimate; `model` is the one behind the first.
     """
@@ -98,11 +98,11 @@ class EstimateSummary(TypedDict):
     frequency_hz: float | None
 
 
-class LeftOut(TypedDict):
-    """Something that a variant does without."""
+class Skipped(TypedDict):
+    """An output that a variant lacks, and why."""
 
-    what: str
-    why: str
+    output: str
+    reason: str
 
 
 class FileRecord(TypedDict):
@@ -113,7 +113,7 @@ class FileRecord(TypedDict):
 
 
 class Manifest(TypedDict):
-    """A variant's manifest; `laws` are the findings of the mould checks."""
+    """A variant's manifest; `mould_checks` are the findings of the mould checks."""
 
     name: str
     design: str
@@ -126,19 +126,19 @@ class Manifest(TypedDict):
     mesh: dict[str, Any]
     parts: list[PartRecord]
     steps: list[PourRecord]
-    laws: list[FindingRecord]
+    mould_checks: list[FindingRecord]
     estimate: EstimateSummary | None
     check: MeshFindings
     pictures: list[str]
     casting: list[str] | None
-    left_out: list[LeftOut]
+    skipped: list[Skipped]
     versions: dict[str, str]
     files: dict[str, FileRecord]
 
 
 def failed_codes(manifest: Manifest) -> list[str]:
     """Return the codes of the mould checks and mesh rules that a variant fails, each once, the mould checks first."""
-    moulds = {finding["code"] for finding in manifest["laws"] if not finding["ok"]}
+    moulds = {finding["code"] for finding in manifest["mould_checks"] if not finding["ok"]}
     meshes = {finding["code"] for finding in manifest["check"]["findings"] if finding["severity"] == "error"}
     return [*sorted(moulds), *sorted(meshes)]
 
@@ -153,7 +153,7 @@ class Geometry(TypedDict):
     air_ring_mm: float
     parts: list[PartRecord]
     steps: list[PourRecord]
-    laws: list[FindingRecord]
+    mould_checks: list[FindingRecord]
     strains: list[dict[str, Any]]
     check: list[MeshFinding]
     files: dict[str, str]
@@ -183,7 +183,7 @@ def of_unit(
             "kernel": "manifold3d",
             "tolerance_mm": spec.output.tolerance_mm,
             "segments": moulds.segments,
-            "note": "volume_mm3 and bbox_mm are the mesh's: its corners may stand out by the tolerance",
+            "note": "volume_mm3 and bbox_mm are the mesh's: its corners may exceed the surface by the tolerance",
         },
         parts=[
             {
@@ -193,19 +193,19 @@ def of_unit(
             for part in shape["parts"]
         ],
         steps=[{**step, "material": spec.layers[step["index"] - 1].material} for step in shape["steps"]],
-        laws=findings,
+        mould_checks=findings,
         estimate=EstimateSummary(**summary(estimate)) if estimate else None,
         check=counted(shape["check"]),
         pictures=pictures,
         casting=sorted(CASTING) if "casting" in only else None,
-        left_out=[LeftOut(what=what, why=why) for what, why in _left_out(spec, only, check)],
+        skipped=[Skipped(output=output, reason=reason) for output, reason in _skipped(spec, only, check)],
         versions={"unitcad": __version__, **kernel_versions(spec.output.formats)},
         files={},
     )
 
 
-def _left_out(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
-    """Name what this variant does without, and why."""
+def _skipped(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
+    """Name the outputs that this variant lacks, and why."""
     if not check or "moulds" not in only:
         yield "mould checks", NO_MOULDS if check else UNCHECKED
     if not check:
@@ -219,7 +219,7 @@ def _left_out(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
     yield from design.left_out(spec)
     for name in OUTPUTS:
         if name not in only:
-            # The page offers the command for what was not asked for (report/app/estimate.js).
+            # The page offers the command for outputs that were not asked for (report/app/estimate.js).
             yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
     if "step" not in spec.output.formats:
         yield "boundary representation", "no STEP asked for" if _has_step_kernel() else NO_KERNEL
@@ -263,9 +263,9 @@ def row(unit: Spec, manifest: Manifest) -> dict[str, Any]:
             total += mass
     if total:
         columns["silicone_mass_g"] = float(f"{total:.6g}")
-    findings, check = manifest["laws"], manifest["check"]
-    columns["laws_held"], columns["laws"] = sum(finding["ok"] for finding in findings), len(findings)
-    columns["laws_broken"] = " ".join(sorted({finding["code"] for finding in findings if not finding["ok"]}))
+    findings, check = manifest["mould_checks"], manifest["check"]
+    columns["mould_checks_passed"], columns["mould_checks"] = sum(finding["ok"] for finding in findings), len(findings)
+    columns["mould_checks_failed"] = " ".join(sorted({finding["code"] for finding in findings if not finding["ok"]}))
     columns["check_errors"], columns["check_warnings"] = check["errors"], check["warnings"]
     for model, level in (manifest["estimate"] or {"models": {}})["models"].items():
         columns[f"edge_{model}"] = level["edge"]

@@ -1,6 +1,6 @@
-"""The plan of a result: every file, what asks for it, the key of what it reads, and how it is made.
+"""The plan of a result: every file, the outputs that include it, the key of its inputs, and the function that makes it.
 
-Files that follow from the geometry are shared by all variants of it, under a key. The others belong to one variant.
+Files that depend only on the geometry are shared by all variants of it, under a key. The others belong to one variant.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
     return possible
 
 
-# What a file reads:
+# Inputs of a file:
 
 
 def build_key(spec: Spec, only: Sequence[str], check: bool) -> str:
@@ -191,11 +191,11 @@ def _version(name: str) -> str | None:
         return None
 
 
-# What a file contains:
+# Contents of a file:
 
 
 def is_printed(body: Body) -> bool:
-    """Tell whether a body has mesh files: what is cut from film or filament has none."""
+    """Tell whether a body has mesh files: pieces cut from film or filament have none."""
     return body.role == "unit" or body.made == "printed"
 
 
@@ -207,7 +207,7 @@ def file_stem(body: Body) -> str:
 def ready(moulds: MouldSet, body: Body) -> tuple[np.ndarray, np.ndarray]:
     """Return the mesh as it is written: its count of faces and both mesh formats come from one rounding.
 
-    Raises Refusal, with the body's name, for a mesh that single precision can't hold.
+    Raises Refusal, with the body's name, for a mesh that single precision can't represent.
     """
     try:
         return _ready(body.shape, moulds.segments, body.upside_down)
@@ -216,7 +216,7 @@ def ready(moulds: MouldSet, body: Body) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _refused(spec: Spec, why: str) -> Refusal:
-    """Return the refusal of a spec for a mesh that single precision can't hold."""
+    """Return the refusal of a spec for a mesh that single precision can't represent."""
     if is_custom(spec.design):
         do = "export the file again" if is_body_file(spec.design) else "draw them"
         return Refusal("design", spec.design, f"{why}; {do} so that parts overlap, or are 0.01 mm apart")
@@ -230,7 +230,7 @@ def _ready(shape: Shape, segments: int, upside_down: bool) -> tuple[np.ndarray, 
 
 
 def forget() -> None:
-    """Drop plans, meshes and their roundings that are kept for the next call: what a measurement of times needs."""
+    """Drop plans, meshes and their roundings that are cached, for a measurement of times."""
     _ready.cache_clear()
     mould_set.forget()
 
@@ -252,7 +252,7 @@ def threemf_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
 
 
 def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
-    """Return the GLB of several bodies as assembled; what is cut or bought is in it too."""
+    """Return the GLB of several bodies as assembled; cut and bought pieces are in it too."""
     return joint_glb(moulds, [glb_part(moulds, body) for body in bodies])
 
 

@@ -1,4 +1,4 @@
-"""The scenes of a variant: which parts stand together, where they go when taken apart, where they are cut."""
+"""The scenes of a variant: the parts of each, their places when taken apart, and the cutting planes."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def taken_apart(moulds: MouldSet) -> dict[str, Offset]:
 
 
 def unit_apart(moulds: MouldSet) -> dict[str, Offset]:
-    """Return the same for the unit's bodies: what goes in first stays below."""
+    """Return the same for the unit's bodies: earlier pieces stay below."""
     layers = [body for body in sorted(moulds.unit, key=lambda body: body.step or 0) if body.kind == "layer"]
     inside = [body for kind in ("motor", "circuit") for body in moulds.unit if body.kind == kind]
     inside += [body for body in moulds.unit if body not in layers and body not in inside]
@@ -105,7 +105,7 @@ def unit_apart(moulds: MouldSet) -> dict[str, Offset]:
 
 
 def _solids(moulds: MouldSet, name: str) -> list[Manifold]:
-    """Return the solids of a tool, of what is laid in, or of a cast layer in the frame of the tools (one a cell)."""
+    """Return the solids of a tool, an inserted piece or a cast layer in the frame of the tools (one a cell)."""
     for step in moulds.plan.steps:
         if step.name == name:
             return moulds.meshes(step.layer)
@@ -119,7 +119,7 @@ def _extent(moulds: MouldSet, names: Iterable[str]) -> tuple[float, float]:
 
 
 def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict[str, Callable[[], bytes]]:
-    """Return what draws each picture of a variant as PNG, by the path of its file.
+    """Return the functions that draw each picture of a variant as PNG, by the path of its file.
 
     The unit cut open, the set taken apart, each pour in section.
     """
@@ -144,7 +144,7 @@ def _name(body: Body) -> str:
 
 
 def step_in_section(moulds: MouldSet, index: int) -> bytes:
-    """Show pour `index` as it stands when struck off, cut through the first row of cells."""
+    """Show pour `index` when it is struck off, cut through the first row of cells."""
     step = moulds.plan.steps[index - 1]
     colours = _colours(moulds)
     y = min(cell.y for cell in moulds.plan.layout.cells)
@@ -173,7 +173,7 @@ def _colours(moulds: MouldSet) -> Mapping[str, Colour]:
 
 
 def _far_half(solid: Manifold, y: float = 0.0) -> Manifold:
-    """Return what lies beyond the plane y, slightly off it: a section in a parting plane shows false triangles."""
+    """Return the part beyond the plane y, slightly off it: a section in a parting plane shows false triangles."""
     return solid.trim_by_plane((0, 1, 0), y + 1 / 512)
 
 

@@ -13,12 +13,13 @@ from unitcad.export import slicer
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.write import held
 from unitcad.spec import Spec, printer_of
+from unitcad.text import some
 
 SLICED = "slicer.json"
 
 
 def check_slicing(spec: Spec, only: Sequence[str]) -> None:
-    """Raise UnitcadError, before the work, where nothing of a spec can be sliced."""
+    """Raise UnitcadError, before the work, if nothing of a spec can be sliced."""
     if slicer.program() is None:
         raise Missing("--slice: PrusaSlicer is not installed, or not on the path (prusa-slicer)")
     if "moulds" not in only:
@@ -31,9 +32,9 @@ def check_slicing(spec: Spec, only: Sequence[str]) -> None:
 
 
 def slice_tools(spec: Spec, folder: Path, manifest: Manifest, say: Callable[[str], object]) -> str:
-    """Write the slicer.json of a built folder's tools and return in a sentence what they take.
+    """Write the slicer.json of a built folder's tools and return a sentence with time and filament.
 
-    A file that the slicer refuses is named and no error, since another slicer may take it.
+    A file that the slicer refuses is named. It is no error, since another slicer may accept it.
     """
     tools = [
         folder / part["files"]["stl"]["path"]
@@ -47,7 +48,7 @@ def slice_tools(spec: Spec, folder: Path, manifest: Manifest, say: Callable[[str
             return f"not sliced: {error}"
         files.write(folder / SLICED, (json.dumps(report, indent=2) + "\n").encode())
     if repaired := [piece["file"] for piece in report["pieces"] if piece["repaired"]]:
-        return f"{report['slicer']} had to repair {', '.join(repaired)}"
+        return f"{report['slicer']} had to repair {some(repaired)}"
     hours, minutes = divmod(round(report["print_s"] / 60), 60)
     return f"prints in {hours} h {minutes:02d} min with {report['filament_cm3']:.1f} cm3 ({report['slicer']})"
 

@@ -1,4 +1,4 @@
-"""Subjects: what can be built. A unit is one; rooms define those that are built of several units.
+"""Subjects of a build. A unit is one; rooms define those of several units.
 
 A room names its `Compound` in the `FileKind` of its files. Its loaded object names it too, as the attribute `subject`.
 """
@@ -73,7 +73,7 @@ def subject(of: Any) -> Subject:
 
 
 def load_subject(source: Source | Any, changes: Changes = ()) -> Subject:
-    """Load what a template's name, a file, plain data or a loaded object means. Raises Refusal or UnitcadError."""
+    """Load a subject from a template's name, a file, plain data or a loaded object. Raises Refusal or UnitcadError."""
     kind = compound_kind(source)
     named = kind.subject if kind else getattr(source, "subject", None)
     return load(named).load(source, changes) if named else Subject(load_spec(source, changes))

@@ -43,7 +43,7 @@ class Variant(MouldSet):
     def bodies(self) -> dict[str, Body]:
         """The bodies of unit and tooling by name: "layer1", "motor", "base", "cup1" and so on.
 
-        Raises Refusal where the moulds can't be made.
+        Raises Refusal if the moulds can't be made.
         """
         return {body.name: body for body in (*self.unit, *self.plan.tools)}
 
@@ -81,6 +81,12 @@ class Variant(MouldSet):
 
         return cadquery.assembly((*self.bodies.values(),))
 
+    def show(self) -> None:
+        """Show unit and moulds, named and coloured, in ocp-vscode or YACV. Raises UnitcadError without either."""
+        from unitcad.kernels import build123d
+
+        build123d.show(self.to_build123d())
+
     def section(self) -> str:
         """Return the drawing of the unit cut along its tail, with dimensions in mm, as SVG."""
         return unit_section(self)
@@ -102,7 +108,7 @@ class Variant(MouldSet):
         return drawn + notebook.table(head, rows, self.spec.summary)
 
     def _body(self, name: str) -> Body:
-        """Return the unit's body of that name, else the tool's: the moulds are drawn for a tool alone."""
+        """Return the unit's body of that name, else the tool's: the moulds are drawn only for a tool."""
         of_unit = {body.name: body for body in self.unit}
         if name not in of_unit and name not in self.bodies:
             raise unknown_name("body", name, self.bodies)

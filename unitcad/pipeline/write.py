@@ -67,7 +67,7 @@ def build(
 ) -> Built:
     """Build a spec, or the loaded object of a room, into `out`/<slug>-<hash12>.
 
-    `only` is a choice of OUTPUTS; without `check` mould checks and mesh checks are left out. Formats and outputs that
+    `only` is a choice of OUTPUTS; without `check` mould checks and mesh checks are skipped. Formats and outputs that
     the folder has from before are made again. `say` gets the name of each stage.
     Raises Refusal or UnitcadError before anything is written; a failed check is no exception, see `Built.ok`.
     """
@@ -81,28 +81,30 @@ def build(
         there = earlier(folder, wanted)
         formats: tuple[Format, ...] = tuple(form for form in FORMATS if form in (*there.formats, *wanted.formats))
         every, checked = checked_outputs((*outputs, *there.outputs)), check or there.checked
-        with contextlib.suppress(_Changed):  # another build has put a result there: what it has is made too
-            maker = partial(wanted.with_formats(formats).make, every, checked, store)
+        with contextlib.suppress(_Changed):  # another build has put a result there: its outputs are made too
+            maker = partial(wanted.with_formats(formats).make, every, checked)
             return write(folder, maker, store, say, unchanged=lambda there=there: earlier(folder, wanted) == there)
 
 
 def write(
     folder: Path,
-    maker: Callable[[Progress], Product],
+    maker: Callable[[Store, Progress], Product],
     store: Store,
     say: Callable[[str], object] = lambda stage: None,
     *,
     unchanged: Callable[[], bool] = lambda: True,
     scratch: Path | None = None,
 ) -> Built:
-    """Put the product of `maker` into a folder, in place of what it contains; files that the new result lacks stay.
+    """Put the product of `maker` into a folder, replacing its files; files that the new result lacks stay.
 
     `scratch`: see `placing`. Raises _Changed if the folder is not `unchanged` any more.
     """
     for left in reversed(range(TRIES)):
+        if not left:
+            store = MemoryStore()  # others clear the cache all the time
         progress, before = Progress(say), Counter(store.counts)
         try:
-            product = maker(progress)
+            product = maker(store, progress)
             progress("")
             timings = {
                 "code": code_version(),
@@ -116,8 +118,7 @@ def write(
                 files.write_new(fresh / "timings.json", json_bytes(timings))
             return Built(folder, product.manifest, digest(product.own["manifest.json"]))
         except MissingContent:  # the cache is cleared meanwhile
-            if not left:
-                raise
+            continue
     raise AssertionError
 
 
@@ -141,7 +142,7 @@ def earlier_formats(folder: Path, wanted: Subject, *, ours: bool = False) -> tup
             return ()
         raise UnitcadError(f"{folder}: its {wanted.file} can't be read ({error}); move the folder away") from None
     if there.hash != wanted.hash:
-        other = f"{folder}: holds the result of another {wanted.kind} ({wanted.file} differs)"
+        other = f"{folder}: has the result of another {wanted.kind} ({wanted.file} differs)"
         raise UnitcadError(f"{other}; move it away or use -o")
     return there.formats
 
@@ -156,12 +157,12 @@ class Earlier:
 
 
 def earlier(folder: Path, wanted: Subject) -> Earlier:
-    """Return what is in a folder already. Raises UnitcadError where that is no result of this spec."""
+    """Return the manifest of an existing folder. Raises UnitcadError if it is no result of this spec."""
     formats = earlier_formats(folder, wanted)
     try:
         manifest = files.read_json(folder / "manifest.json", links=False)
         outputs = tuple(name for name in manifest["outputs"] if isinstance(name, str))
-        return Earlier(formats, outputs, all(entry["why"] != UNCHECKED for entry in manifest["left_out"]))
+        return Earlier(formats, outputs, all(entry["reason"] != UNCHECKED for entry in manifest["skipped"]))
     except (UnitcadError, KeyError, TypeError):
         return Earlier(formats)
 
@@ -188,7 +189,10 @@ def whole(folder: Path, *, hashes: bool = False) -> Manifest | None:
 
 
 def sync(results: Iterable[Path]) -> None:
-    """Bring the results' own files to the disk; what they share is there since the cache has it. Raises OSError."""
+    """Bring the results' own files to the disk; shared files are on the disk since the cache wrote them.
+
+    Raises OSError.
+    """
     _sync(path for result in results for path in _own_files(result))
 
 
@@ -218,10 +222,10 @@ def held(folder: Path) -> contextlib.AbstractContextManager[None]:
 
 @contextlib.contextmanager
 def replacing(folder: Path) -> Iterator[Path]:
-    """Yield a fresh folder that takes `folder`'s place when the block ends well; hold the place meanwhile.
+    """Yield a fresh folder that takes `folder`'s place when the block ends well; lock the place meanwhile.
 
     Files of the old result that the new one lacks are kept. An interruption at any point leaves the old result whole:
-    at its place, or in a marked scratch folder from which the next run takes it back. Raises UnitcadError where a link
+    at its place, or in a marked scratch folder from which the next run takes it back. Raises UnitcadError if a link
     or a file is in the folder's place.
     """
     expect_folder(folder)
@@ -242,7 +246,7 @@ def replacing(folder: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def placing(folder: Path, scratch: Path) -> Iterator[Path]:
-    """Yield a fresh folder that takes `folder`'s place, as `replacing`; where it can, in the caller's `scratch`.
+    """Yield a fresh folder that takes `folder`'s place, as `replacing`; if it can, in the caller's `scratch`.
 
     One scratch folder then serves many results: ext4 looks at every inode that was removed lately before it gives out a
     new one, so removing three files for each result makes the files of all others slow.
@@ -264,7 +268,7 @@ def placing(folder: Path, scratch: Path) -> Iterator[Path]:
 
 
 def _in_place(fresh: Path, folder: Path) -> bool:
-    """Rename `fresh` to `folder`, or return False where a result is there. Raises OSError."""
+    """Rename `fresh` to `folder`, or return False if a result is there. Raises OSError."""
     if folder.exists():
         return False
     try:
@@ -277,7 +281,7 @@ def _in_place(fresh: Path, folder: Path) -> bool:
 
 
 def clear_leftovers(out: Path) -> None:
-    """Remove what processes that are gone left half written in `out`, and put back what they had moved aside.
+    """Remove half-written files of ended processes from `out`, and put back folders that they had moved aside.
 
     Only scratch folders that carry our mark are touched, and empty files of the name that a result's lock has.
     """
@@ -293,7 +297,7 @@ def clear_leftovers(out: Path) -> None:
 
 
 def expect_folder(folder: Path) -> None:
-    """Raise UnitcadError where something else than a real folder is in a result's place: nothing is written through."""
+    """Raise UnitcadError if the place of a result is no real folder, so that nothing is written through a link."""
     if folder.is_symlink():
         raise UnitcadError(f"{folder}: is a link, not a folder; remove it or choose another folder with -o")
     if folder.exists() and not folder.is_dir():
@@ -307,7 +311,7 @@ def _restore(aside: Path, folder: Path) -> None:
 
 
 def _keep_others(old: Path, new: Path) -> None:
-    """Copy what the new folder lacks: files, and links as links; not what lies in a folder where it has a file."""
+    """Copy the files and links that the new folder lacks, but no folder over a file."""
     for here, below, names in os.walk(old):
         place = new / Path(here).relative_to(old)
         for name in (*below, *names):

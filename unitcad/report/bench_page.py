@@ -12,6 +12,7 @@ import msgspec
 
 from unitcad import __version__, files
 from unitcad.casting.cast_record import ENDING, FORMAT, HASH_DIGITS
+from unitcad.casting.preparation import MEASURED_MM
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.write import BENCH
@@ -34,6 +35,7 @@ class ListedStep(msgspec.Struct):
     kind: str
     minutes: float
     wait_min: float
+    short: str = ""
 
 
 class ListedFigure(msgspec.Struct):
@@ -76,6 +78,32 @@ class ListedItem(msgspec.Struct):
     note: str
 
 
+class ListedSize(msgspec.Struct):
+    """A length to measure before printing."""
+
+    what: str
+    key: str
+    value_mm: float
+    assumed: str
+
+
+class ListedPrinting(msgspec.Struct):
+    """What to measure and to print."""
+
+    sizes: list[ListedSize]
+    source: str
+    how: list[str]
+
+
+class ListedTrouble(msgspec.Struct):
+    """What goes wrong, and what to do."""
+
+    sign: str
+    cause: str
+    now: str
+    spec: str
+
+
 class CastingFile(msgspec.Struct):
     """casting.json: what the page shows of it."""
 
@@ -85,13 +113,15 @@ class CastingFile(msgspec.Struct):
     earliest_finish_min: float
     bench_min: float
     time_line: list[ListedPhase]
-    printing: list[str]
+    printing: ListedPrinting
     preparation: list[ListedStep]
     pours: list[ListedPour]
     release: list[ListedStep]
     assembly: list[ListedStep]
     measure: list[str]
     bill: list[ListedItem]
+    warnings: list[str]
+    troubles: list[ListedTrouble]
     makes: str = "unit"
     last: str = "Motor in"
 
@@ -120,6 +150,7 @@ def write_bench(folder: Path) -> Path | None:
         "scale_g": spec.casting.scale_resolution_g if spec else None,
         "asked": _asked(casting, spec),
         "record": {"format": FORMAT, "version": 1, "ending": ENDING},
+        "measured_mm": MEASURED_MM,
         "pictures": step_pictures(folder, _paths(casting)),
         "slicer": _slicer(folder),
     }

@@ -142,8 +142,8 @@ def _of_all(batch: dict[str, Any] | None, records: list[VariantRecord]) -> dict[
         table = (record.estimate or {}).get("table_error")
         if isinstance(table, dict):
             found = {name: _typical(table.get(name)) for name in table}
-            return {"typical_error": {name: one for name, one in found.items() if one}, "not_read": {}}
-    return {"typical_error": {}, "not_read": {}}
+            return {"typical_error": {name: one for name, one in found.items() if one}, "insensitive": {}}
+    return {"typical_error": {}, "insensitive": {}}
 
 
 def _typical(scores: Any) -> float | None:

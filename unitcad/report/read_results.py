@@ -229,8 +229,8 @@ def _row(record: VariantRecord) -> dict[str, Any]:
     row |= {f"{part['name']}_mm3": part["volume_mm3"] for part in manifest["parts"] if part["made"] == "cast"}
     for model, level in (manifest["estimate"] or {"models": {}})["models"].items():
         row[f"edge_{model}"] = level["edge"]
-    checks = manifest["laws"]
-    row["laws"] = ("hold" if all(check["ok"] for check in checks) else "broken") if checks else None
+    checks = manifest["mould_checks"]
+    row["mould_checks"] = ("hold" if all(check["ok"] for check in checks) else "broken") if checks else None
     row["warnings"] = len(manifest["warnings"])
     return row
 

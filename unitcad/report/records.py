@@ -29,7 +29,7 @@ class SweptLevels(Struct):
     """
 
     typical_error: dict[str, float]
-    not_read: dict[str, list[str]]
+    insensitive: dict[str, list[str]]
     not_measured: dict[str, float] = {}
 
 

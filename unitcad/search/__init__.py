@@ -1,1 +1,1 @@
-"""From a wish to designs: everything at hand is tried, judged by its probability, its limits and its moulds."""
+"""From a target to designs: everything at hand is tried, judged by its probability, its limits and its moulds."""

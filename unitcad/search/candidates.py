@@ -65,9 +65,9 @@ class Geometry:
 class Candidates:
     """Candidates as columns, one row each: `geometry` and `sequence` are indices into the two lists.
 
-    mass in g; hours from the first weighing until the unit is out of the mould; crosstalk at the pitch, or where units
-    touch if the pitch is shorter, NaN without a pitch. `probability` is that of meeting the level; `novelty`: how many
-    of lengths, motor and frequency no measured unit had. left_out: silicones without a modulus, with the reason.
+    mass in g; hours from the first weighing until the unit is out of the mould; crosstalk at the pitch, or at touching
+    units if the pitch is shorter, NaN without a pitch. `probability` is that of meeting the level; `novelty`: how many
+    of lengths, motor and frequency no measured unit had. skipped: silicones without a modulus, with the reason.
     refused: the reasons why lengths were refused, by design and field.
     """
 
@@ -85,7 +85,7 @@ class Candidates:
     height_mm: np.ndarray
     diameter_mm: np.ndarray
     crosstalk: np.ndarray
-    left_out: dict[str, str] = field(default_factory=dict)
+    skipped: dict[str, str] = field(default_factory=dict)
     refused: dict[str, list[str]] = field(default_factory=dict)
 
     @property
@@ -131,8 +131,8 @@ def candidates(target: Target, say: Say = lambda stage: None) -> Candidates:
     """Return every candidate of a target. Raises Refusal for too many, if there is none, or if none can be cast."""
     try:
         made, refused = geometries(target, say)
-        known, left_out = silicones_of(target, made[0].variant.frequency)
-        table = replace(tabulate(target, made, known, say), left_out=left_out, refused=refused)
+        known, skipped = silicones_of(target, made[0].variant.frequency)
+        table = replace(tabulate(target, made, known, say), skipped=skipped, refused=refused)
         if np.isnan(table.cure_hours).all():
             finish_hours(made[0].spec)  # which says why no moulds can be made
         return table
@@ -206,7 +206,7 @@ def _lengths(target: Target) -> Iterator[Lengths]:
 
 def _diameters(target: Target, motor: str, walls: tuple[float, ...]) -> tuple[float, ...]:
     """Return the diameters to try; default: the measured units', or the least that motor, clearance and walls fit."""
-    vary, most = target.asked.vary, target.wish.diameter_max_mm
+    vary, most = target.asked.vary, target.goals.diameter_max_mm
     if vary.diameter_mm:
         return grid(vary.diameter_mm, vary.diameter_step_mm)
     table = target.entries.get("motor", {})
@@ -225,21 +225,21 @@ def grid(ends: tuple[float, float], step: float) -> tuple[float, ...]:
 
 
 def silicones_of(target: Target, frequency: Quantity) -> tuple[dict[str, SiliconeLayer], dict[str, str]]:
-    """Return the silicones at hand as the estimate reads them, and why others are left out.
+    """Return the silicones at hand as the estimate reads them, and why others are skipped.
 
     Raises Refusal if none has a modulus.
     """
-    entries, known, left_out = catalogue.materials(target.asked.materials), {}, {}
+    entries, known, skipped = catalogue.materials(target.asked.materials), {}, {}
     for name in target.materials:
         layer = silicone_layer(entries[name], 1e-3, frequency, target.asked.estimate.moduli == "quasi-static")
         if layer.youngs_modulus.value is None:
-            left_out[name] = layer.youngs_modulus.note
+            skipped[name] = layer.youngs_modulus.note
         else:
             known[name] = layer
     if not known:
-        limit = f"no level can be estimated: {next(iter(left_out.values()))}"
+        limit = f"no level can be estimated: {next(iter(skipped.values()))}"
         raise Refusal("at_hand.materials", list(target.materials), limit)
-    return known, left_out
+    return known, skipped
 
 
 def sequences_of(materials: Sequence[str], count: int) -> list[tuple[str, ...]]:
@@ -309,9 +309,9 @@ def tabulate(
 
 def probability(target: Target, predictive: Predictive) -> np.ndarray:
     """Return the probability of meeting the level, shape (...)."""
-    wish = target.wish
-    below = predictive.at_most(wish.edge_max) if wish.edge_max is not None else np.ones(predictive.centre.shape)
-    return below - predictive.at_most(wish.edge_min) if wish.edge_min is not None else below
+    goals = target.goals
+    below = predictive.at_most(goals.edge_max) if goals.edge_max is not None else np.ones(predictive.centre.shape)
+    return below - predictive.at_most(goals.edge_min) if goals.edge_min is not None else below
 
 
 def _units(
@@ -374,8 +374,8 @@ def _bench_hours(made: Sequence[Geometry]) -> np.ndarray:
 
 
 def _crosstalk(target: Target, made: Sequence[Geometry]) -> np.ndarray:
-    """Return the ratio of each geometry at the pitch, or where units touch, without its range; NaN without a pitch."""
-    pitch, known = target.wish.pitch_mm, dict[tuple[str, float], float]()
+    """Return the ratio of each geometry at the pitch, or at touching units, without its range; NaN without a pitch."""
+    pitch, known = target.goals.pitch_mm, dict[tuple[str, float], float]()
     ratios = np.full(len(made), np.nan)
     for i, one in enumerate(made if pitch is not None else ()):
         key = one.lengths.motor, one.lengths.diameter

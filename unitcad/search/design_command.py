@@ -18,10 +18,8 @@ from unitcad.search.target_file import load_target
 
 
 def design(
-    target: Annotated[
-        str, typer.Argument(metavar="TARGET", help="A TOML file of what is wished for, or a shipped one's name.")
-    ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Where the result's folder goes.")] = Path("out"),
+    target: Annotated[str, typer.Argument(metavar="TARGET", help="A target file, or the name of a shipped one.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Parent of the result's folder.")] = Path("out"),
     explain: Annotated[
         str | None,
         typer.Option(metavar="NAME|SPEC", help="Say why a unit is not among the proposals; nothing is written."),
@@ -29,19 +27,19 @@ def design(
     no_check: Annotated[bool, typer.Option("--no-check", help="Draw no moulds: the best may not be castable.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """From a wish to designs: try everything at hand and rank it.
+    """Try all designs at hand for a target, and rank them.
 
-    Each proposal has its probability of meeting the level at the edge, with a range, and what no measurement covers.
-    The last line printed is the folder: the page design.html, ranking.csv, and specs to build.
+    Each proposal has its probability of meeting the level at the edge, with a range, and the inputs that no measurement
+    covers. The last line printed is the folder: the page design.html, ranking.csv, and specs to build.
     """
 
-    wish = load_target(target)
+    asked = load_target(target)
     if explain is None:
         design_files.check_out(out)
     with progress("design") as stage:
-        made = invert(wish, check=not no_check, say=stage)
+        made = invert(asked, check=not no_check, say=stage)
         if explain is None:
-            folder = design_files.folder_of(wish.name, out)
+            folder = design_files.folder_of(asked.name, out)
             found = design_files.contents(made, seen_from(folder), stage)
             design_files.write(folder, found)
     if explain is not None:
@@ -57,7 +55,7 @@ def design(
         print_json({"folder": str(folder), **data})
         return
     plain, bold = partial(console().print, soft_wrap=True), partial(console().print, soft_wrap=True, style="bold")
-    bold(f"{data['name']}: {design_text.wish_line(data['wish'])}")
+    bold(f"{data['name']}: {design_text.target_line(data['target'])}")
     for line in design_text.head_lines(data):
         plain(f"  {line}")
     for i, one in enumerate(data["proposals"]):
@@ -67,6 +65,6 @@ def design(
         plain(f"   {design_text.level_line(one)}")
         for line in design_text.lines(one):
             plain(f"   - {line}")
-    for line in design_text.left_out_lines(data):
+    for line in design_text.skipped_lines(data):
         plain(line)
     typer.echo(str(folder))

@@ -57,7 +57,7 @@ def check_out(out: Path) -> None:
 
 
 def contents(made: Inversion, folder: str, say: Say = lambda stage: None) -> dict[str, bytes]:
-    """Return the files by name; `folder` is their path from where the commands run."""
+    """Return the files by name; `folder` is their path from the working directory."""
     say("files")
     data = with_files(made.data, folder)
     specs = {Path(one["file"]).name: spec for one, spec in zip(data["proposals"], made.specs, strict=True)}
@@ -147,7 +147,7 @@ def front_charts(made: Inversion) -> dict[str, str]:
 
 def page(data: Mapping[str, Any], charts: Mapping[str, str]) -> str:
     """Return the result as Markdown."""
-    made = [f"# {markdown(data['name'])}: {design_text.wish_line(data['wish'])}", ""]
+    made = [f"# {markdown(data['name'])}: {design_text.target_line(data['target'])}", ""]
     made += [f"{'; '.join(design_text.head_lines(data))}.", ""]
     for i, one in enumerate(data["proposals"]):
         if design_text.is_first_other(data["proposals"], i):
@@ -156,8 +156,8 @@ def page(data: Mapping[str, Any], charts: Mapping[str, str]) -> str:
         made += [f"- {markdown(line)}" for line in design_text.lines(one)]
         made += [f"- build it: `unitcad build {shlex.quote(one['file'])}`", ""]
     made += [f"![probability of the level]({name})\n" for name in charts]
-    if left_out := design_text.left_out_lines(data):
-        made += ["## Left out", "", *(f"- {markdown(line)}" for line in left_out), ""]
+    if skipped := design_text.skipped_lines(data):
+        made += ["## Skipped", "", *(f"- {markdown(line)}" for line in skipped), ""]
     return "\n".join(made)
 
 
@@ -171,7 +171,7 @@ def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequ
     proposals = zip(data["proposals"], sections, strict=True)
     body = [
         f'<div class="top"><div><h1>{escape(data["name"])}</h1>',
-        f'<p class="line">{escape(design_text.wish_line(data["wish"]))}</p></div></div>',
+        f'<p class="line">{escape(design_text.target_line(data["target"]))}</p></div></div>',
         f"<section><h2>Proposals</h2>{_table(data['proposals'])}",
         f'<p class="note">Levels in per cent of the motor; mm: diameter x height. The {"; ".join(ranks)}. A '
         "probability is that of meeting the level.</p></section>",
@@ -185,7 +185,7 @@ def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequ
         "<section><h2>Less costs probability</h2>",
         *(drawing(svg, "probability of the level, with the front") for svg in charts.values()),
         f"</section><section><h2>Tried</h2><p>{tried}. All of them are in ranking.csv.</p>",
-        f"{_list([*design_text.left_out_lines(data), *refused])}</section>",
+        f"{_list([*design_text.skipped_lines(data), *refused])}</section>",
     ]
     return plain_page(f"{data['name']}: designs", "\n".join(body))
 

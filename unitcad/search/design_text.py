@@ -7,9 +7,9 @@ from typing import Any
 
 from unitcad.text import listed, number
 
-OTHERS = "Nearest others: measured outside the wish, or below the probability that is asked for"
+OTHERS = "Nearest others: measured outside the target, or below the probability that is asked for"
 """The heading over the candidates that are no proposals."""
-_WISHES = {
+_GOALS = {
     "edge_min": "at least {} of the motor's amplitude at the edge",
     "edge_max": "at most {} of the motor's amplitude at the edge",
     "diameter_max_mm": "diameter at most {} mm",
@@ -27,16 +27,16 @@ def percent(level: float) -> str:
     return f"{number(100 * level, 2)} %"
 
 
-def wish_line(wish: Mapping[str, Any]) -> str:
-    """Return what is asked for."""
+def target_line(goals: Mapping[str, Any]) -> str:
+    """Return the target in words."""
     texts = {
-        key: percent(value) if key in ("edge_min", "edge_max") else number(value, 4) for key, value in wish.items()
+        key: percent(value) if key in ("edge_min", "edge_max") else number(value, 4) for key, value in goals.items()
     }
-    return ", ".join(text.format(texts[key]) for key, text in _WISHES.items() if key in wish)
+    return ", ".join(text.format(texts[key]) for key, text in _GOALS.items() if key in goals)
 
 
 def head_lines(data: Mapping[str, Any]) -> list[str]:
-    """Return how much was tried, what the probabilities come from, and what the evidence ranks."""
+    """Return the number of candidates, the source of the probabilities, and the order that the evidence supports."""
     tried, leads = data["tried"], data["leads"]
     refused = sum(one["count"] for one in tried["refused"])
     not_made = f"; {refused} sets of lengths that no design accepts" if refused else ""
@@ -48,21 +48,21 @@ def head_lines(data: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def left_out_lines(data: Mapping[str, Any]) -> list[str]:
-    """Return a line for each silicone that is left out, and for each candidate that can't be cast."""
+def skipped_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return a line for each silicone that is skipped, and for each candidate that can't be cast."""
     return [
-        *(f"left out, {name}: {why}" for name, why in data["left_out"].items()),
+        *(f"skipped, {name}: {why}" for name, why in data["skipped"].items()),
         *(f"can't be cast, {one['candidate']}: {'; '.join(one['failed'])}" for one in data["not_castable"]),
     ]
 
 
 def title(one: Mapping[str, Any]) -> str:
-    """Return a proposal's heading: its number, what it is, and whether its lengths were never measured."""
+    """Return a proposal's heading: its number, its kind, and whether its lengths were never measured."""
     return f"{one['rank']}. {one['label']}" + ("" if one["lengths_measured"] else " (not measured at these lengths)")
 
 
 def is_first_other(proposals: Sequence[Mapping[str, Any]], i: int) -> bool:
-    """Tell whether the heading `OTHERS` stands over a candidate."""
+    """Tell whether a candidate is under the heading `OTHERS`."""
     return proposals[i]["nearest_other"] and not any(one["nearest_other"] for one in proposals[:i])
 
 
@@ -81,11 +81,11 @@ def measured_words(measured: Mapping[str, Any]) -> str:
     """Return a unit's measurement, by whom, and whether it is within the target."""
     level, second = percent(measured["level"]), measured.get("also")
     also = f", also printed as {percent(second)}" if second and percent(second) != level else ""
-    return f"measured {level} ({measured['by']}{also}): {'meets' if measured['meets'] else 'outside'} the wish"
+    return f"measured {level} ({measured['by']}{also}): {'meets' if measured['meets'] else 'outside'} the target"
 
 
 def lines(one: Mapping[str, Any]) -> list[str]:
-    """Return a proposal's size, mass and hours, then what speaks for it and what is not known of it."""
+    """Return a proposal's size, mass and hours, then its reasons and its unknowns."""
     checks = "moulds not checked" if one["checks"] is None else f"moulds pass at {one['checks']} places"
     size = (
         f"{number(one['diameter_mm'], 3)} mm wide, {number(one['height_mm'], 3)} mm high, "

@@ -1,4 +1,4 @@
-"""Why a named unit is not among the proposals, or where it stands."""
+"""The reason why a named unit is no proposal, or its rank."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def explain(made: Inversion, named: str) -> dict[str, Any]:
     silicones = tuple(layer.material for layer in spec.layers)
     alike = name_from(target, _lengths(spec), silicones)
     among = own is not None or (alike in rows and _is_same_unit(spec, found.spec(rows[alike])))
-    variant = estimate_input(spec, target.wish.frequency_hz)
+    variant = estimate_input(spec, target.goals.frequency_hz)
     data: dict[str, Any] = {
         "name": spec.name,
         "listed": own and own["rank"],
@@ -50,15 +50,15 @@ def explain(made: Inversion, named: str) -> dict[str, Any]:
         "of": int(made.rows.size),
         "among": among,
         "measured": measurement(target, variant),
-        "probability_min": target.wish.probability_min,
+        "probability_min": target.goals.probability_min,
         "probability": own and own["probability"],
         "edge": own and own["edge"],
     }
     reasons = [] if among else _not_tried(found, spec, alike if alike in rows else None)
     unknown = [layer for layer in variant.layers if layer.youngs_modulus.value is None]
     if own and own["nearest_other"]:
-        why = "was measured outside the wish" if own["measured"] else "is below the probability that is asked for"
-        reasons.append(f"it is no proposal: it {why}, and stands among the nearest others as number {own['rank']}")
+        why = "was measured outside the target" if own["measured"] else "is below the probability that is asked for"
+        reasons.append(f"it is no proposal: it {why}, and is among the nearest others as number {own['rank']}")
     elif unknown:
         names = listed(dict.fromkeys(layer.material for layer in unknown))
         reasons.append(f"{names}: {unknown[0].youngs_modulus.note}")
@@ -122,5 +122,5 @@ def _not_tried(found: Candidates, spec: Spec, alike: str | None) -> list[str]:
     if any(a == b for a, b in itertools.pairwise(names)):
         reasons.append("neighbouring layers are of one silicone, which is tried as one layer")
     other = f"it has the lengths of {alike}, with another motor or circuit"
-    between = f"not tried: {other if alike else 'its lengths lie between the steps, see vary.step_mm'}"
+    between = f"not tried: {other if alike else 'its lengths are between the steps, see vary.step_mm'}"
     return reasons or [between]

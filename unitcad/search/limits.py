@@ -1,4 +1,4 @@
-"""What a target asks for, as limits on its candidates; if none meets them all, the nearest values that one meets."""
+"""Limits of a target on its candidates; if none meets them all, the nearest values that one meets."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.errors import Refusal
 from unitcad.search.candidates import Candidates
-from unitcad.text import listed, number
+from unitcad.text import listed, number, some
 
 _PITCHES = np.unique(np.round([*np.arange(1.0, 100.0, 0.1), *np.arange(100.0, MOST_PITCH_MM + 1.0)], 1))
 """Pitches that are offered, mm: those of three digits."""
@@ -21,7 +21,7 @@ _PITCHES = np.unique(np.round([*np.arange(1.0, 100.0, 0.1), *np.arange(100.0, MO
 
 @dataclass(frozen=True)
 class Limit:
-    """A limit: the target's key and value, what it limits in words, the unit, each row's value, and who meets it.
+    """A limit: the target's key and value, the limited quantity, the unit, each row's value, and who meets it.
 
     is_least: `asked` is the least value that is allowed, otherwise the largest.
     """
@@ -36,7 +36,7 @@ class Limit:
 
     @property
     def far(self) -> np.ndarray:
-        """How far each row is from meeting it: |ln| of its value over what was asked."""
+        """Distance of each row from meeting it: |ln| of its value over the asked one."""
         with np.errstate(divide="ignore"):
             far = np.abs(np.log(self.values / self.asked))
         return np.where(self.met, 0.0, np.where(np.isnan(far), np.inf, far))
@@ -58,7 +58,7 @@ class Limit:
 
 def limits(found: Candidates) -> list[Limit]:
     """Return the limits that a target sets besides the level."""
-    wish = found.target.wish
+    goals = found.target.goals
     columns = {
         "diameter_max_mm": ("diameter", " mm", found.diameter_mm),
         "height_max_mm": ("height", " mm", found.height_mm),
@@ -70,7 +70,7 @@ def limits(found: Candidates) -> list[Limit]:
     return [
         Limit(key, what, unit, most, values, values <= most * (1 + 1e-9))
         for key, (what, unit, values) in columns.items()
-        if (most := getattr(wish, key)) is not None
+        if (most := getattr(goals, key)) is not None
     ]
 
 
@@ -86,12 +86,17 @@ def _level_limits(found: Candidates, measured: Mapping[int, Mapping[str, Any]]) 
     A row's value is the level that it meets with the probability that is asked for, or its measured level if that is
     nearer.
     """
-    wish, share = found.target.wish, found.target.wish.probability_min
+    goals, share = found.target.goals, found.target.goals.probability_min
     own = np.full(found.count, np.nan)
     own[list(measured)] = [one["level"] for one in measured.values()]
     met = found.probability >= share
     met[[row for row, one in measured.items() if one["meets"]]] = True
-    what, unit, least, most = "an edge level of", f" (probability {share:g}, or measured)", wish.edge_min, wish.edge_max
+    what, unit, least, most = (
+        "an edge level of",
+        f" (probability {share:g}, or measured)",
+        goals.edge_min,
+        goals.edge_max,
+    )
     if least is None:
         values = np.fmin(found.predictive.quantile(share), own)
         return [Limit("edge_max", what, unit, most or np.inf, values, met)]
@@ -147,14 +152,14 @@ def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]])
 
 
 def _nearest(found: Candidates, far: np.ndarray, among: np.ndarray) -> int:
-    """Return the nearest row; of equals the one that relies least on what was not measured."""
+    """Return the nearest row; of equals the one with the fewest unmeasured inputs."""
     rows = np.flatnonzero(among)
     return int(rows[np.lexsort((rows, found.novelty[rows], np.round(far[rows], 9)))[0]])
 
 
 def _pitch(found: Candidates, row: int) -> float | None:
     """Return the least pitch at which a row's crosstalk ratio is within its limit, mm; None if there is none."""
-    geometry, most = found.geometries[found.geometry[row]], found.target.wish.crosstalk_ratio_max
+    geometry, most = found.geometries[found.geometry[row]], found.target.goals.crosstalk_ratio_max
     pitches = _PITCHES[geometry.lengths.diameter - 1e-9 <= _PITCHES].tolist()
 
     def is_met(pitch: float) -> bool:
@@ -173,4 +178,4 @@ def label(found: Candidates, row: int) -> str:
 
 
 def _left_out(found: Candidates) -> str:
-    return f"; not tried, without a modulus: {listed(found.left_out)}" if found.left_out else ""
+    return f"; not tried, without a modulus: {some(found.skipped)}" if found.skipped else ""

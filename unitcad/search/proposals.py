@@ -1,4 +1,4 @@
-"""From a target to proposals as JSON-ready data: the best of each kind, cast in thought, with what speaks for it."""
+"""From a target to proposals as JSON-ready data: the best of each kind, with moulds drawn, and with reasons."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _TRIES = 3
 """Candidates of a kind that are judged until one can be cast."""
 RANKS = "design, which side is soft, silicones with another side soft"
 NOT_RANKED = "walls, caps, diameter, frequency, and silicones with the same side soft"
-"""What the measured units tell apart, and what they do not: the range is only wider where they have another value."""
+"""The measured units do not tell these apart: another value only widens the range."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
         one["equal_to"] = None if first is one or one["nearest_other"] else first["rank"]
     data = {
         "name": target.name,
-        "wish": {key: value for key, value in _wish(target).items() if value is not None},
+        "target": {key: value for key, value in _goals(target).items() if value is not None},
         "tried": {
             "candidates": found.count,
             "geometries": int(np.unique(found.geometry).size),
@@ -81,7 +81,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
             ],
         },
         "leads": leads_block(target),
-        "left_out": found.left_out,
+        "skipped": found.skipped,
         "proposals": proposals,
         "not_castable": out,
     }
@@ -89,7 +89,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
 
 
 def leads_block(target: Target) -> dict[str, Any]:
-    """Return which model leads, by which units, and what the evidence ranks and what not."""
+    """Return the leading model, the units behind it, the keys that the evidence ranks and those that it does not."""
     slow = ", by the moduli of a slow pull" if target.asked.estimate.moduli == "quasi-static" else ""
     by = f"the paper's nine levels{slow}" if target.fit is None else f"the lab's fit {target.fit.name}"
     model = lead_of(target.asked.estimate.moduli, target.fit).model
@@ -133,18 +133,18 @@ def _is_other(found: Candidates, probability: float, measured: Mapping[str, Any]
 
     It was measured outside the target, or is less probable than is asked for and was not measured within it.
     """
-    return not measured["meets"] if measured else probability < found.target.wish.probability_min
+    return not measured["meets"] if measured else probability < found.target.goals.probability_min
 
 
 def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[str, Any]]) -> list[Kind]:
     """Return the kinds in their order, those measured within the target first, the nearest others last.
 
-    A measured unit within the target stands for its kind if the kind's best is less probable than is asked for.
+    A measured unit within the target represents its kind if the kind's best is less probable than required.
     """
     made = []
     for kind in kinds(found, rows):
         inside = [int(row) for row in kind.rows if measured.get(int(row), {}).get("meets")]
-        if inside and found.probability[kind.best] < found.target.wish.probability_min:
+        if inside and found.probability[kind.best] < found.target.goals.probability_min:
             kind = replace(kind, rows=np.array([*inside, *(row for row in kind.rows if row not in inside)]))
         made.append(kind)
 
@@ -156,8 +156,8 @@ def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[
 
 
 def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None) -> dict[str, Any]:
-    """Return a candidate as data: what it is, its probability and range, its measurement, limits, unmeasured inputs."""
-    variant, lengths, wish = estimate_input(spec), found.lengths(row), found.target.wish
+    """Return a candidate as data: its kind, its probability and range, its measurement, limits, unmeasured inputs."""
+    variant, lengths, goals = estimate_input(spec), found.lengths(row), found.target.goals
     low, middle, high = (float(end[row]) for end in found.range)
     measured = measurement(found.target, variant)
     data: dict[str, Any] = {
@@ -170,7 +170,7 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
         "motor": lengths.motor,
         "measured": measured,
         "nearest_other": _is_other(found, float(found.probability[row]), measured),
-        "probability_min": wish.probability_min,
+        "probability_min": goals.probability_min,
         "probability": float(found.probability[row]),
         "group": kind.group,
         "edge": {"p10": low, "p50": middle, "p90": high},
@@ -185,18 +185,18 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
         "lengths_gain": _gain(kind),
         "remarks": [*warnings(spec), *_scale(spec)],
     }
-    if wish.pitch_mm is not None:
-        ratio = crosstalk_ratio(variant, 1e-3 * wish.pitch_mm)
+    if goals.pitch_mm is not None:
+        ratio = crosstalk_ratio(variant, 1e-3 * goals.pitch_mm)
         data["crosstalk"] = {
             "value": ratio.value,
             "low": ratio.low,
             "high": ratio.high,
-            "pitch_mm": wish.pitch_mm,
+            "pitch_mm": goals.pitch_mm,
             "drive": variant.drive,
             "range": CROSSTALK_RANGE,
             "neighbour": (ratio.value or ratio.middle) * middle,
         }
-        if wish.crosstalk_ratio_max is not None and (ratio.high or 0.0) > wish.crosstalk_ratio_max:
+        if goals.crosstalk_ratio_max is not None and (ratio.high or 0.0) > goals.crosstalk_ratio_max:
             data["remarks"].append(
                 f"the crosstalk ratio may reach {number(ratio.high or 0.0, 2)}: the body's range goes over the limit"
             )
@@ -224,8 +224,8 @@ def name_from(target: Target, lengths: Lengths, materials: Sequence[str]) -> str
     return re.sub(r"[^a-z0-9.]+", "-", "-".join(parts).lower()).strip("-")[:110]
 
 
-def _wish(target: Target) -> dict[str, Any]:
-    return {key: getattr(target.wish, key) for key in target.wish.__struct_fields__}
+def _goals(target: Target) -> dict[str, Any]:
+    return {key: getattr(target.goals, key) for key in target.goals.__struct_fields__}
 
 
 def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
@@ -242,7 +242,7 @@ def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
 
 
 def _gain(kind: Kind) -> str:
-    """Say what lengths do to a kind's probability."""
+    """Say how lengths change a kind's probability."""
     if kind.rows.size < 2:
         return "its lengths are the only ones within the limits"
     return (

@@ -75,7 +75,7 @@ def kinds(found: Candidates, rows: np.ndarray) -> list[Kind]:
 
 
 def unmeasured(variant: EstimateInput) -> list[str]:
-    """Return what of a candidate the nearest measured unit had otherwise."""
+    """Return the inputs in which a candidate differs from the nearest measured unit."""
     return nearest(variant)["differs_in"]
 
 
@@ -93,7 +93,7 @@ def measurement(target: Target, variant: EstimateInput) -> dict[str, Any] | None
         by = "the paper" if len(variant.layers) > 1 else "the paper, of which design is not said"
     else:
         return None
-    least, most = target.wish.edge_min or 0.0, target.wish.edge_max or np.inf
+    least, most = target.goals.edge_min or 0.0, target.goals.edge_max or np.inf
     return {"level": level, "also": also, "by": by, "meets": bool(least <= level <= most)}
 
 

@@ -1,4 +1,4 @@
-"""The file that says what is wished for, what is at hand and what may vary.
+"""The target file: the target, the things at hand, and the lengths that may vary.
 
 [target]
 edge_max = 0.06                     # of the motor's amplitude, at the unit's edge
@@ -52,44 +52,76 @@ MOST_GEOMETRIES = 20_000
 
 
 class TargetTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is wished for: the level at the edge, at most or at least, and limits on everything else."""
+    """The target: a level at the edge, and limits on size, mass, time and crosstalk."""
 
-    edge_max: Level | None = None
-    edge_min: Level | None = None
-    probability_min: Annotated[float, Meta(ge=0.01, le=0.99, description="of meeting the level")] = 0.5
-    crosstalk_ratio_max: Ratio | None = None
-    pitch_mm: Pitch | None = None
-    diameter_max_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM)] | None = None
-    height_max_mm: Annotated[float, Meta(ge=0.5, le=kinds.LONGEST_MM)] | None = None
-    mass_max_g: Annotated[float, Meta(ge=0.01, le=1e4, description="silicone and motor")] | None = None
-    cure_hours_max: CureHours | None = None
-    frequency_hz: kinds.Frequency | None = None
+    edge_max: Annotated[
+        Level | None, Meta(description="largest level at the edge, as a fraction of the motor's amplitude")
+    ] = None
+    edge_min: Annotated[Level | None, Meta(description="smallest level at the edge, for a unit that amplifies")] = None
+    probability_min: Annotated[
+        float, Meta(ge=0.01, le=0.99, description="smallest probability of meeting the level")
+    ] = 0.5
+    crosstalk_ratio_max: Annotated[
+        Ratio | None,
+        Meta(
+            description="largest ratio of the motion at a neighbour's middle to that at the unit's edge; needs pitch_mm"
+        ),
+    ] = None
+    pitch_mm: Annotated[Pitch | None, Meta(description="distance between the middles of two units")] = None
+    diameter_max_mm: Annotated[
+        Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM)] | None, Meta(description="largest diameter")
+    ] = None
+    height_max_mm: Annotated[
+        Annotated[float, Meta(ge=0.5, le=kinds.LONGEST_MM)] | None, Meta(description="largest height")
+    ] = None
+    mass_max_g: Annotated[float, Meta(ge=0.01, le=1e4, description="largest mass of silicone and motor")] | None = None
+    cure_hours_max: Annotated[
+        CureHours | None, Meta(description="longest time from the first weighing until the unit is out of the mould")
+    ] = None
+    frequency_hz: Annotated[
+        kinds.Frequency | None, Meta(description="frequency of the drive; default: the motor's")
+    ] = None
 
 
 class AtHandTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What there is to make a unit of; None: every shipped silicone and design."""
+    """Silicones, motors, printer and bench at hand."""
 
-    materials: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=20)] | None = None
-    designs: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=10)] | None = None
-    motors: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=10)] = (DEFAULT_MOTOR,)
-    printer: Name = "fdm-0.4"
-    scale_g: Annotated[float, Meta(ge=1e-6, le=1000, description="the scale's last digit")] = 0.01
-    room_c: Annotated[float, Meta(ge=5, le=45)] = 23.0
-    vacuum: bool = True
+    materials: Annotated[
+        Annotated[tuple[Name, ...], Meta(min_length=1, max_length=20)] | None,
+        Meta(description="silicones at hand, by name; default: all shipped ones"),
+    ] = None
+    designs: Annotated[
+        Annotated[tuple[Name, ...], Meta(min_length=1, max_length=10)] | None,
+        Meta(description="designs to try, by name; default: all shipped ones"),
+    ] = None
+    motors: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=10, description="motors at hand, by name")] = (
+        DEFAULT_MOTOR,
+    )
+    printer: Annotated[Name, Meta(description="printer of the catalogue")] = "fdm-0.4"
+    scale_g: Annotated[float, Meta(ge=1e-6, le=1000, description="smallest step of the scale")] = 0.01
+    room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room")] = 23.0
+    vacuum: Annotated[bool, Meta(description="whether a vacuum chamber is at hand")] = True
 
 
 class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What may vary, each from its least to its largest value; caps are as thick as walls unless they are given.
+    """Lengths and numbers of layers to try."""
 
-    Without `wall_mm` see `walls`.
-    """
-
-    layers: Annotated[tuple[Layers, ...], Meta(min_length=1, max_length=MOST_LAYERS)] = (1, 2)
-    wall_mm: tuple[Wall, Wall] | None = None
-    cap_mm: tuple[Wall, Wall] | None = None
-    diameter_mm: tuple[kinds.MotorDiameter, kinds.MotorDiameter] | None = None
-    step_mm: Annotated[Step, Meta(description="of walls and caps")] = 0.25
-    diameter_step_mm: Step = 1.0
+    layers: Annotated[
+        tuple[Layers, ...], Meta(min_length=1, max_length=MOST_LAYERS, description="numbers of layers to try")
+    ] = (1, 2)
+    wall_mm: Annotated[
+        tuple[Wall, Wall] | None,
+        Meta(description="smallest and largest wall; default: 1 to 2, for a single layer 1 to 2.5"),
+    ] = None
+    cap_mm: Annotated[
+        tuple[Wall, Wall] | None, Meta(description="smallest and largest cap; default: as thick as the wall")
+    ] = None
+    diameter_mm: Annotated[
+        tuple[kinds.MotorDiameter, kinds.MotorDiameter] | None,
+        Meta(description="smallest and largest diameter; default: 14, or the smallest that takes the motor"),
+    ] = None
+    step_mm: Annotated[Step, Meta(description="step of walls and caps")] = 0.25
+    diameter_step_mm: Annotated[Step, Meta(description="step of the diameter")] = 1.0
 
     def walls(self, layers: int) -> tuple[float, float]:
         """Return the least and largest wall of units of so many layers, mm.
@@ -100,15 +132,17 @@ class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class ModelsTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the levels are estimated by: a lab's fit, the body and the moduli."""
+    """Inputs of the estimate."""
 
-    fit: Annotated[str | None, Meta(description="a lab-fit.toml of unitcad fit")] = None
-    tissue: Name = "forearm"
-    moduli: Moduli = "small-strain"
+    fit: Annotated[str | None, Meta(description="lab-fit.toml of unitcad fit")] = None
+    tissue: Annotated[Name, Meta(description="body under the unit")] = "forearm"
+    moduli: Annotated[
+        Moduli, Meta(description="moduli of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")
+    ] = "small-strain"
 
 
 class TargetFile(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A wish as typed. `spec`: tables that every proposal's spec has; further entries as in a spec."""
+    """A target for `unitcad design`."""
 
     target: TargetTable
     at_hand: AtHandTable = AtHandTable()
@@ -123,7 +157,7 @@ class TargetFile(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class Target:
-    """A validated wish.
+    """A validated target.
 
     `materials`: the silicones at hand, `designs` those to try; `entries`: the tables that a spec of it carries, its own
     catalogue entries among them.
@@ -137,7 +171,7 @@ class Target:
     fit: LabFit | None = None
 
     @property
-    def wish(self) -> TargetTable:
+    def goals(self) -> TargetTable:
         """The table `target`."""
         return self.asked.target
 
@@ -162,7 +196,7 @@ def load_target(source: str | os.PathLike[str]) -> Target:
 
 
 def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path()) -> Target:
-    """Return the target of a file's data; `folder` is where its relative paths start. Raises as `load_target`."""
+    """Return the target of a file's data; its relative paths start at `folder`. Raises as `load_target`."""
     _check_percent(data)
     try:
         asked = convert(data, TargetFile)
@@ -218,12 +252,14 @@ def _check_percent(data: Mapping[str, Any]) -> None:
             raise Refusal(f"target.{key}", value, "is a fraction of the motor's amplitude, at most 2", value / 100)
 
 
-def _check_target(wish: TargetTable) -> None:
-    if wish.edge_max is None and wish.edge_min is None:
+def _check_target(goals: TargetTable) -> None:
+    if goals.edge_max is None and goals.edge_min is None:
         raise Refusal("target.edge_max", None, "is required, or edge_min for a unit that amplifies")
-    if wish.edge_max is not None and wish.edge_min is not None and wish.edge_min >= wish.edge_max:
-        raise Refusal("target.edge_min", wish.edge_min, f"must be below edge_max, {wish.edge_max:g}", wish.edge_max / 2)
-    if wish.crosstalk_ratio_max is not None and wish.pitch_mm is None:
+    if goals.edge_max is not None and goals.edge_min is not None and goals.edge_min >= goals.edge_max:
+        raise Refusal(
+            "target.edge_min", goals.edge_min, f"must be below edge_max, {goals.edge_max:g}", goals.edge_max / 2
+        )
+    if goals.crosstalk_ratio_max is not None and goals.pitch_mm is None:
         raise Refusal("target.pitch_mm", None, "is required with crosstalk_ratio_max")
 
 
@@ -243,7 +279,7 @@ def _check_spec(tables: Mapping[str, Mapping[str, Any]]) -> None:
             raise unknown_name(f"spec.{key}", "...", _SPEC_KEYS)
         for other, place in (("part", "at_hand.motors"), ("printer", "at_hand.printer")):
             if other in table:
-                raise Refusal(f"spec.{key}.{other}", table[other], f"stands in {place}")
+                raise Refusal(f"spec.{key}.{other}", table[other], f"is in {place}")
 
 
 def _entries(asked: TargetFile, data: Mapping[str, Any], fit_text: str) -> dict[str, Any]:

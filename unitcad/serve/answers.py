@@ -1,7 +1,7 @@
-"""What the page is told about a text: of a unit's spec or of an array.
+"""Answers to the page about a text: of a unit's spec or of an array.
 
-Runs in a worker process, which a hang or a crash ends. A text from the page is data: what it names in files is read,
-and code is run, only where the spec that the server was started with names the same.
+Runs in a worker process, which a hang or a crash ends. A text from the page is data: its files are read and its code is
+run only if the spec that the server was started with names the same.
 """
 
 from __future__ import annotations
@@ -81,26 +81,26 @@ def answers_about(data: Mapping[str, Any]) -> Any:
 def effective(text: bytes, trusted: bytes) -> bytes:
     """Return {"text": the effective spec as TOML, "asked", "code"} of a text, or {"refused": why}.
 
-    `asked` leaves out what the text leaves out, so that defaults follow other values; `code`: whether it holds code.
-    Both hold the texts of the files that the text may name, and no other code.
+    `asked` has only the keys of the text, so that defaults follow other values; `code`: whether it has code. Both
+    include the texts of the files that the text may name, and no other code.
     """
     try:
         data = parse_toml(text.decode(), "the text")
         kind = answers_about(data)
         known = msgspec.json.decode(trusted, type=Trusted)
         subject: Any = kind.settled(data, known)
-        asked, code = kind.asked_toml(text.decode(), data, subject, known), kind.holds_code(subject)
+        asked, code = kind.asked_toml(text.decode(), data, subject, known), kind.has_code(subject)
     except UnitcadError as error:
         return msgspec.json.encode({"refused": str(error)})
     return msgspec.json.encode({"text": kind.as_toml(subject), "asked": asked, "code": code})
 
 
 def _fault(error: UnitcadError) -> Fault:
-    message = str(error).replace(UNIT_ALONE, "")  # the page shows the unit alone, and has no options
+    message = str(error).replace(UNIT_ALONE, "")  # the page shows only the unit, and has no options
     if isinstance(error, Refusal):
         given = error.as_dict()
         if isinstance(error, UnknownKey):
-            # What is nearest is a key's name; `remedied` tells whether the text is accepted with it.
+            # The nearest value is a key's name; `remedied` tells whether the text is accepted with it.
             rename = (str(error.nearest), given["value"]) if error.nearest else None
             return Fault(message.partition(NEAREST)[0], error.field, line=error.line, rename=rename)
         return Fault(message, error.field, given["nearest"], error.line)

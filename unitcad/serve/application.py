@@ -22,12 +22,12 @@ from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import names_device, read, read_text, regular, write
 from unitcad.report.page import page_data
 from unitcad.rooms import stored_spec
-from unitcad.serve.gate import Gate, Limits
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.jobs import RESULTS, Jobs, build_folder, sweep_folder
-from unitcad.serve.keys import Keys
 from unitcad.serve.live_page import HEADER_POLICY, live_page
 from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
 from unitcad.serve.questions import ANSWER_S, Questions, Superseded
+from unitcad.serve.request_guard import Limits, RequestGuard
 from unitcad.text import toml
 from unitcad.workers import NoWorker, WorkerEnded
 
@@ -48,9 +48,9 @@ _SANDBOX = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a server works on: the first text and its file's name, where files go, what texts may name and start from.
+    """State of a server: the first text and its file's name, the folders of files, the files that texts may name.
 
-    `folder`: where specs are saved; `out`: where results go, whose files are served. `batch`: a folder of variants that
+    `folder`: for saved specs; `out`: for results, whose files are served. `batch`: a folder of variants that
     the page lists. `campaign`: a file that a room shows as a page of its own, and the module of that page.
     """
 
@@ -67,7 +67,7 @@ class Setting:
     campaign: tuple[Path, str] | None = None
 
 
-def application(live: Live, limits: Limits = Limits()) -> Gate:  # noqa: B008  # frozen
+def application(live: Live, limits: Limits = Limits()) -> RequestGuard:  # noqa: B008  # frozen
     """Return the ASGI application of a live page."""
     setting = live.setting
     routes = [
@@ -82,7 +82,7 @@ def application(live: Live, limits: Limits = Limits()) -> Gate:  # noqa: B008  #
         Route("/cancel", live.cancel, methods=["POST"]),
     ]
     inner = Starlette(routes=routes, lifespan=live.lifespan)
-    return Gate(inner, setting.token, setting.hosts, live.cookie, live.keys, limits)
+    return RequestGuard(inner, setting.token, setting.hosts, live.cookie, live.keys, limits)
 
 
 class Live:
@@ -91,7 +91,7 @@ class Live:
     def __init__(self, setting: Setting) -> None:
         self.setting = setting
         self.cookie = f"unitcad-{setting.port}"
-        self.keys = Keys(setting.token)
+        self.keys = AccessKeys(setting.token)
         self.questions = Questions(setting.text, setting.trusted)
         self.jobs = Jobs(setting.out, self.keys)
         self._saving = asyncio.Lock()
@@ -111,7 +111,7 @@ class Live:
         await asyncio.gather(self.jobs.close(), self.questions.close())
 
     async def page(self, request: Request) -> Response:
-        """Answer with the page, and let the browser keep what loads it again."""
+        """Answer with the page, with the cookie that loads it again."""
         setting = self.setting
         if setting.campaign and "token" in request.query_params:
             # Its page has no script that takes the token out of the address.
@@ -200,9 +200,9 @@ class Live:
         if all(value.is_integer() for value in values):
             values = [int(value) for value in values]  # a count of units takes no 3.0
         asked = f'base = "spec.toml"\n\n[sweep]\nmode = "product"\n{toml(sweep.key)} = {toml(values)}\n'
-        # A folder of its own, in which the sweep file stays beside the results.
+        # A folder of its own, which has the sweep file next to the results.
         arguments = ["batch", "{sweep}", "-o", f"{{folder}}/{RESULTS}", "--report", *code]
-        # The base leaves out what the text leaves out: defaults follow the key's values as they do on the page.
+        # The base has only the keys of the text: defaults follow the key's values as they do on the page.
         files, first = {"spec.toml": given["asked"], "sweep.toml": asked}, f"0 of {len(values)} variants"
         state = self.jobs.start("the sweep", arguments, files, sweep_folder(self.setting.out), first)
         return msgspec.json.encode(state)
@@ -271,7 +271,7 @@ class Live:
 
 
 async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaitable[bytes]]) -> Response:
-    """Parse a message, handle it, and answer with JSON: with the one fault where there is one."""
+    """Parse a message, handle it, and answer with JSON: with the one fault if there is one."""
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
         return PlainTextResponse("messages are application/json\n", 415)
     try:
@@ -313,12 +313,12 @@ def _json(content: bytes, status: int = 200) -> Response:
 
 
 def _plain(path: Path) -> str:
-    """Return a path for an argument in which braces stand for files."""
+    """Return a path for an argument in which braces are placeholders of files."""
     return str(path).replace("{", "{{").replace("}", "}}")
 
 
 def _within(root: Path, asked: str) -> Path | None:
-    """Return the regular file below a folder that a request's path means; None where it means none, or a way out."""
+    """Return the regular file below a folder that a request's path means; None if it means none, or a way out."""
     parts = PurePosixPath(asked).parts
     if (
         not parts

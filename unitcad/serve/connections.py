@@ -36,7 +36,7 @@ class Connection(H11Protocol):
             min(waiting, key=lambda one: one.since).transport.abort()
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes in, and wait on where they hold no whole headers."""
+        """Take bytes in, and wait for more until the headers are whole."""
         super().data_received(data)
         if self.conn.their_state is not h11.IDLE:
             self._done()

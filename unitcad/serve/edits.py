@@ -19,7 +19,7 @@ from unitcad.validation.dotted import no_entry
 def edited(text: str, edits: Sequence[Edit]) -> str:
     """Return a TOML text after `edits`.
 
-    Raises UnitcadError for a text that is no TOML, Refusal for a path that runs through what is not there.
+    Raises UnitcadError for a text that is no TOML, Refusal for a path through a missing key.
     """
     if not edits:
         return text
@@ -27,7 +27,7 @@ def edited(text: str, edits: Sequence[Edit]) -> str:
         document = tomlkit.parse(text)
     except (TOMLKitError, RecursionError, ValueError):
         parse_toml(text, "the text")  # whose words the page shows without an edit too
-        raise UnitcadError("the text: holds TOML that can't be edited value by value; change the text") from None
+        raise UnitcadError("the text: has TOML that can't be edited value by value; change the text") from None
     for edit in edits:
         _apply(document, edit)
     return tomlkit.dumps(document)
@@ -79,7 +79,7 @@ def _index(node: Sequence[Any], step: str, edit: Edit) -> int:
 
 
 def _value(edit: Edit) -> Any:
-    """Return an edit's value, read where it is a text in TOML syntax."""
+    """Return an edit's value, parsed if it is a text in TOML syntax."""
     if not edit.toml:
         return edit.value
     try:

@@ -1,4 +1,4 @@
-"""The form of a spec: a group for each table of its schema, with documented ranges, choices and what holds now."""
+"""The form of a spec: a group for each table of its schema, with documented ranges, choices and current values."""
 
 from __future__ import annotations
 
@@ -41,36 +41,38 @@ LAST_TABLES = (
     ("output", "Output", OutputTable),
 )
 _OPTIONAL = {"fpcb": "wires", "wires": "fpcb"}
-"""Tables that may be left out, each with the one whose place it takes."""
+"""Optional tables, each with the one that it replaces."""
 _NEEDS = {"wires": {"diameter_mm": 0.3}}
-"""What a table begins with: the wire of a small motor, across its insulation."""
+"""Values of a new table: the wire of a small motor, across its insulation."""
 _UNITS = ("mm", "hz", "um", "g", "c", "kpa")
 """Units that a key ends in."""
 _TEXTS_OF_FILES = ("estimate.fit_source",)
 
 
 def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
-    """Return the form of a spec's plain data; `spec` is the effective one, None where the data is refused."""
-    holds = to_data(spec) if spec else {}
+    """Return the form of a spec's plain data; `spec` is the effective one, None if the data is refused."""
+    settled = to_data(spec) if spec else {}
     choices = choices_of(data)
-    made = [Group("", "Unit", [*fields(AskedSpec, "", data, holds, choices, ("name", "design", "diameter_mm"))])]
+    made = [Group("", "Unit", [*fields(AskedSpec, "", data, settled, choices, ("name", "design", "diameter_mm"))])]
     layers = data.get("layers")
     for i in range(len(layers) if isinstance(layers, list) else 0):
-        made.append(Group(f"layers.{i}", f"Layer {i + 1}", [*fields(LayerTable, f"layers.{i}", data, holds, choices)]))
-    return [*made, *table_groups((*_TABLES, *LAST_TABLES), data, holds, choices)]
+        made.append(
+            Group(f"layers.{i}", f"Layer {i + 1}", [*fields(LayerTable, f"layers.{i}", data, settled, choices)])
+        )
+    return [*made, *table_groups((*_TABLES, *LAST_TABLES), data, settled, choices)]
 
 
 def table_groups(
     tables: Sequence[tuple[str, str, type[msgspec.Struct]]],
     data: Mapping[str, Any],
-    holds: Mapping[str, Any],
+    settled: Mapping[str, Any],
     choices: Choices,
 ) -> Iterator[Group]:
     """Yield a group for each of the tables (path, title, type); arguments as of `fields`."""
     for path, title, table in tables:
         optional = path in _OPTIONAL
         present = not optional or isinstance(data.get(path), dict)
-        shown = [*fields(table, path, data, holds, choices)] if present else []
+        shown = [*fields(table, path, data, settled, choices)] if present else []
         yield Group(path, title, shown, present, optional, _NEEDS.get(path, {}), _OPTIONAL.get(path, ""))
 
 
@@ -78,13 +80,13 @@ def fields(
     table: type[msgspec.Struct],
     path: str,
     data: Mapping[str, Any],
-    holds: Mapping[str, Any],
+    settled: Mapping[str, Any],
     choices: Choices,
     only: tuple[str, ...] = (),
 ) -> Iterator[Field]:
     """Yield a field for each key of a table at a path.
 
-    `data` is what the text gives, `holds` the settled data, `choices` the words by path, `only` the keys meant.
+    `data` is the text's data, `settled` the resolved data, `choices` the words by path, `only` the chosen keys.
     """
     for name, info in fields_of(table).items():
         where = f"{path}.{name}" if path else name
@@ -92,7 +94,7 @@ def fields(
             continue
         given = at(data, where)
         default = None if info.default is msgspec.NODEFAULT else info.default
-        value = next((one for one in (given, at(holds, where)) if one is not ABSENT and one is not None), default)
+        value = next((one for one in (given, at(settled, where)) if one is not ABSENT and one is not None), default)
         entries = _numbers_of(info.type, value)
         if entries and value is not None:
             for i, (kind, one) in enumerate(zip(entries, value, strict=True)):
@@ -105,7 +107,7 @@ def fields(
 
 
 def _numbers_of(kind: Any, value: Any) -> tuple[Any, ...]:
-    """Return the kinds of a list's entries where it has a fixed number of numbers; else none."""
+    """Return the kinds of a list's entries if it has a fixed number of numbers; else none."""
     if not isinstance(value, list | tuple):
         return ()
     tuples = (typing.get_args(one) for one in alternatives(kind) if typing.get_origin(one) is tuple)
@@ -116,7 +118,7 @@ def _numbers_of(kind: Any, value: Any) -> tuple[Any, ...]:
 
 
 def _label(name: str) -> str:
-    """Return a key in words, without its unit, which the page sets beside it."""
+    """Return a key in words, without its unit, which the page sets next to it."""
     words, _, last = name.rpartition("_")
     return (words if words and last in _UNITS else name).replace("_", " ")
 
@@ -141,7 +143,7 @@ def _field(path: str, label: str, kind: Any, value: Any, given: bool, choices: l
     if several:
         how, words = "words", several
     elif mixed or (listed and not single):
-        # A list is typed as TOML has it, and what may be a word or a number.
+        # Lists, and values that may be a word or a number, are typed as TOML.
         how, value = "toml", None if value is None else toml(value)
     elif bool in members:
         how = "switch"
@@ -183,6 +185,6 @@ def choices_of(data: Mapping[str, Any]) -> Choices:
 
 
 def _modulus(entry: Material) -> str:
-    """Return what the list of materials says of one: its modulus at the motor's frequency."""
+    """Return the remark on a material in the list: its modulus at the motor's frequency."""
     modulus = entry.youngs_modulus_kpa
     return f"{number(modulus.value, 3)} kPa" if modulus else "no modulus at small strain"

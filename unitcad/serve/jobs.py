@@ -14,16 +14,16 @@ from pathlib import Path
 
 from unitcad.errors import UnitcadError
 from unitcad.files import scratch
-from unitcad.serve.keys import Keys
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.serve.messages import JobState
 from unitcad.workers import STAGES, Call, Pool, run_here
 
 MOST_KEPT = 20
 """Jobs that are remembered."""
 STAGE = "stage: "
-"""What a line of a job begins with that names its stage."""
+"""Prefix of a job's line that names its stage."""
 GRACE_S = 10.0
-"""Seconds that a cancelled job may take to write what it has."""
+"""Seconds that a cancelled job may take to write its results."""
 MOST_LINES = 200
 """Lines of a job that are kept."""
 RESULTS = "results"
@@ -31,7 +31,7 @@ RESULTS = "results"
 
 
 class Job:
-    """A command under way or ended: `state` is what the page is told."""
+    """A command under way or ended: `state` is for the page."""
 
     def __init__(self, title: str, stage: str) -> None:
         self.state = JobState(job=secrets.token_hex(8), title=title, stage=stage, lines=[])
@@ -54,7 +54,7 @@ class Job:
 class Jobs:
     """The jobs of a server; results go below `out`, whose files have addresses of `keys`."""
 
-    def __init__(self, out: Path, keys: Keys) -> None:
+    def __init__(self, out: Path, keys: AccessKeys) -> None:
         self.out, self.keys = out, keys
         self.known: dict[str, Job] = {}
         self.pool: Pool | None = None
@@ -69,7 +69,7 @@ class Jobs:
     ) -> JobState:
         """Run `unitcad` with arguments in which {folder} is `place`, and {NAME} the path of a file of `files` in it.
 
-        `place` ends with the job. `stage` is the first one's name. No `await` stands between the look for another job
+        `place` ends with the job. `stage` is the first one's name. There is no `await` between the look for another job
         and the start. Raises UnitcadError while another job runs, OSError.
         """
         running = next((job for job in self.known.values() if not job.state.ended), None)
@@ -161,7 +161,7 @@ def _made(out: Path) -> Iterator[None]:
         yield
     finally:
         if not before:
-            with suppress(OSError):  # it holds something
+            with suppress(OSError):  # it is not empty
                 out.rmdir()
 
 

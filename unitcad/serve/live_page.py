@@ -1,4 +1,4 @@
-"""The live page: the programs of the report, the form beside them, and what it starts with."""
+"""The live page: the programs of the report, the form next to them, and the first data."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SHARED = (
 """Programs of the report that the page runs."""
 PROGRAMS = ("server.js", "kept.js", "changes.js", "form.js", "pinned.js", "jobs.js", "refused_rows.js", "live.js")
 HEADER_POLICY = "frame-ancestors 'none'"
-"""What a policy in the page itself can't say."""
+"""The directives that a policy in the page itself can't have."""
 
 
 def live_page(
@@ -31,7 +31,7 @@ def live_page(
 ) -> str:
     """Return the HTML of the page that starts with a spec's `text`, the file `name` of `folder`.
 
-    It holds no token: that stands in the address that is opened, and the page takes it from there.
+    It has no token: the opened address has it, and the page takes it from there.
     `starts` are the texts to start from by their names, None for one that may not be used. `batch`: the data of a
     batch's page, whose rows then open live.
     """

@@ -1,4 +1,4 @@
-"""What the page and the server say to each other: JSON of these types, unknown keys refused. Lengths in mm."""
+"""Messages between the page and the server: JSON of these types, unknown keys refused. Lengths in mm."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Message(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Edit(Message, frozen=True, kw_only=True):
-    """A change of the spec's text: the value at a dotted path, or `remove`: the key goes, its default holds.
+    """A change of the spec's text: the value at a dotted path, or `remove`: the key goes, and its default counts.
 
     `toml`: the value is a text in TOML syntax, such as [2, 3].
     """
@@ -33,7 +33,7 @@ class Edit(Message, frozen=True, kw_only=True):
     toml: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what TOML can't hold, which msgspec tells as a fault of the message."""
+        """Refuse values that TOML lacks, which msgspec reports as a fault of the message."""
         if not (self.remove and self.value is None) and not _is_toml(self.value, DEEPEST):
             raise ValueError(f"an edit's value has no null and nests at most {DEEPEST} deep")
 
@@ -46,7 +46,7 @@ def _is_toml(value: Any, deepest: int) -> bool:
 class Ask(Message, frozen=True, kw_only=True):
     """A question about a spec's text, after `edits`. `page` names the asker: its newer question drops an older one.
 
-    `since` takes back what was changed since the text was last accepted, newest first.
+    `since` reverts the changes since the text was last accepted, newest first.
     """
 
     text: Text
@@ -57,7 +57,7 @@ class Ask(Message, frozen=True, kw_only=True):
 
 
 class Save(Message, frozen=True, kw_only=True):
-    """A wish to write the text as a file in the folder; `replace`: a file that is there."""
+    """A request to write the text as a file in the folder; `replace`: a file that is there."""
 
     text: Text
     name: FileName
@@ -65,13 +65,13 @@ class Save(Message, frozen=True, kw_only=True):
 
 
 class Build(Message, frozen=True, kw_only=True):
-    """A wish for the full build of the text."""
+    """A request for the full build of the text."""
 
     text: Text
 
 
 class Sweep(Message, frozen=True, kw_only=True):
-    """A wish for a batch: the values of one key from `low` to `high`, `count` of them."""
+    """A request for a batch: the values of one key from `low` to `high`, `count` of them."""
 
     text: Text
     key: Path
@@ -81,7 +81,7 @@ class Sweep(Message, frozen=True, kw_only=True):
 
 
 class Cancel(Message, frozen=True, kw_only=True):
-    """A wish that a job end."""
+    """A request that a job end."""
 
     job: JobId
 
@@ -89,7 +89,7 @@ class Cancel(Message, frozen=True, kw_only=True):
 class Fault(Struct, frozen=True, omit_defaults=True):
     """A value that is refused: the sentence, its field, a value that would be accepted, and its line in the text.
 
-    `at` is the field whose change is to blame, where that is another one, and `at_nearest` a value accepted there.
+    `at` is the field whose change caused it, if that is another one, and `at_nearest` a value accepted there.
     `leave_out`: without the key, and without those of `together`, the text is accepted. `rename`: the right name of an
     unknown key, and its value.
     """
@@ -108,8 +108,8 @@ class Fault(Struct, frozen=True, omit_defaults=True):
 class Field(Struct, frozen=True, omit_defaults=True):
     """A control of the form.
 
-    `value` is what holds now, `given` tells whether the text says it, `required` whether it must. A number has its
-    documented range from `low` to `high`. `choices` are words, each with what it means; of kind `words` is a list of
+    `value` is the current value, `given` tells whether the text has it, `required` whether it must. A number has its
+    documented range from `low` to `high`. `choices` are words, each with its meaning; of kind `words` is a list of
     some of them.
     """
 
@@ -126,9 +126,9 @@ class Field(Struct, frozen=True, omit_defaults=True):
 
 
 class Group(Struct, frozen=True, omit_defaults=True):
-    """A table of the form; `optional`: it may be put in and left out, as `present` tells.
+    """A table of the form; `optional`: it may be added and removed; `present`: it is there.
 
-    `needs` are the values that it begins with, `instead` the table whose place it takes.
+    `needs` are its first values, `instead` the table that it replaces.
     """
 
     path: str
@@ -141,7 +141,7 @@ class Group(Struct, frozen=True, omit_defaults=True):
 
 
 class Answer(Struct, kw_only=True, omit_defaults=True):
-    """What a question gets: the text after its edits, the faults, and what was asked for where there is none.
+    """An answer: the text after its edits, the faults, and the results if there is none.
 
     `milliseconds` is the time that it took, `processor_ms` that of the processor.
     `groups` are the form's; `spec` the effective spec; `figures` are (name, value, unit), `drawings` (caption, SVG).
@@ -188,6 +188,6 @@ class Source(Struct, frozen=True):
 
 
 class Trusted(Struct, frozen=True):
-    """What the page's texts may name besides data: all the files of one of these specs, and no other."""
+    """Files that the page's texts may name: all those of one of these specs, and no other."""
 
     sources: list[Source] = []

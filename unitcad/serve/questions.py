@@ -13,7 +13,7 @@ from unitcad.serve.messages import Ask, Trusted, What
 from unitcad.workers import Pool, TimedOut, WorkerEnded
 
 ANSWER_S: dict[What, float] = {"unit": 20.0, "moulds": 60.0, "estimate": 30.0}
-"""Seconds that a question may take, by what is asked."""
+"""Seconds that a question may take, by its kind."""
 GRACE_S = 1.5
 """Seconds after which an overtaken question is ended: before, its answer is nearer than another worker."""
 _UNDONE: dict[What, str] = {"unit": "not made", "moulds": "not judged", "estimate": "not estimated"}
@@ -97,7 +97,7 @@ class Questions:
         await asyncio.gather(*(asyncio.to_thread(pool.shutdown) for pool in self._pools.values()))
 
     def _overtake(self, ask: Ask) -> asyncio.Event:
-        """Tell the older question of the same page; returns what a newer one will set."""
+        """Notify the older question of the same page; return the event that a newer one will set."""
         key = ask.page, ask.what
         older = self._newest.pop(key, None)
         if older:

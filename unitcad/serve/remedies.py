@@ -1,4 +1,4 @@
-"""What makes a refused text accepted: a value for the field that was changed, or leaving a key out."""
+"""Changes that make a refused text acceptable: a value for the changed field, or a key removed."""
 
 from __future__ import annotations
 
@@ -29,11 +29,10 @@ Judge = Callable[[dict[str, Any]], Mapping[str, Any]]
 def remedied(
     faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[Edit], judge: Judge, whole: Judge
 ) -> list[Fault]:
-    """Return the faults of plain data, each with its remedies: what `judge` accepts, and where it can be `whole` too.
+    """Return the faults of plain data, each with its remedies: changes that `judge` accepts, if possible `whole` too.
 
-    `since` takes back what was changed since the data was accepted, newest first. Where one of these changes alone is
-    to blame for a fault of another field, the fault stands `at` the changed one. `whole` also refuses what no tools can
-    be made of.
+    `since` reverts the changes since the data was accepted, newest first. If one of these changes caused a fault of
+    another field, the fault is `at` the changed one. `whole` also refuses units without possible tools.
     """
     changed = {edit.path for edit in since}
     blamed = None
@@ -86,13 +85,13 @@ def _offering(fault: Fault, nearest: Any) -> Fault:
 
 
 def _tried(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool, judge: Judge, whole: Judge) -> Any:
-    """Return what to offer for a fault in place of its nearest value, which meets its own limit; None for nothing."""
+    """Return the value to offer for a fault, whose nearest value meets only its own limit; None for nothing."""
     whole_too = _onwards(data, fault.field, fault.nearest, whole)
     if whole_too is not None:
         return whole_too
     if own and (nearest := _nearest(data, own, judge, whole)) is not None:
         return nearest
-    # Where nothing makes all of it accepted, or nothing says what was, it cures its own fault.
+    # If no change makes all of it acceptable, or the former data is unknown, it cures its own fault.
     cures = not alone or not own or _accepted(_after(data, Edit(path=fault.field, value=fault.nearest)), judge)
     return fault.nearest if cures else None
 
@@ -123,7 +122,7 @@ def _renamed(data: Mapping[str, Any], path: str, right: str) -> dict[str, Any]:
 
 
 def _left_out(faults: Sequence[Fault], data: Mapping[str, Any], judge: Judge) -> list[Fault]:
-    """Return the faults, told to leave their keys out where the text is accepted once all of them are gone."""
+    """Return the faults, marked to remove their keys together if the text is accepted without all of them."""
     fields = [fault.field for fault in faults]
     without = copy.deepcopy(dict(data))
     if len(fields) < 2 or not all([drop(without, field) for field in fields]) or not _accepted(without, judge):
@@ -175,7 +174,7 @@ def _is_float(value: object) -> TypeGuard[float]:
 
 
 def _after(data: Mapping[str, Any], edit: Edit) -> dict[str, Any]:
-    """Return plain data after an edit; unchanged where its path leads nowhere."""
+    """Return plain data after an edit; unchanged if its path leads nowhere."""
     changed = copy.deepcopy(dict(data))
     try:
         if edit.remove:

@@ -20,7 +20,7 @@ def serve(
         str | None,
         typer.Argument(metavar="SPEC", help="A spec, array or campaign file, a template, or a folder of results."),
     ] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Where builds and sweeps from the page go.")] = Path("out"),
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder of builds and sweeps from the page.")] = Path("out"),
     port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = 0,
     host: Annotated[
         str, typer.Option(help="The address that it binds to; another one than the loopback needs UNITCAD_TOKEN.")
@@ -31,7 +31,7 @@ def serve(
     """Open a live page of a spec in the browser.
 
     A change of a number shows unit, moulds, refusals and estimate at once. Ctrl-C ends it.
-    The environment variable UNITCAD_TOKEN is the token in the address; left out, a random one.
+    The environment variable UNITCAD_TOKEN is the token in the address. Default: a random one.
     """
 
     def ready(address: str) -> None:

@@ -26,7 +26,7 @@ from unitcad.serve.jobs import RESULTS
 from unitcad.serve.messages import Source, Trusted
 from unitcad.spec import parse_toml, read_toml
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
-from unitcad.text import listed
+from unitcad.text import some
 from unitcad.validation import compound_kind, custom_templates, default_template, every_template
 from unitcad.validation.shipped_files import is_path, named_file
 
@@ -97,7 +97,7 @@ def serve(
 async def _told(
     server, listening: socket.socket, ready: Callable[[], None], close: Callable[[], Awaitable[None]]
 ) -> None:
-    """Run a server, and say when it answers and a signal ends it; `close` then ends what it waits for."""
+    """Run a server, and report when it answers and when a signal ends it; `close` then ends its waiting requests."""
     running = asyncio.create_task(server.serve(sockets=[listening]))
     while not (server.started or running.done()):
         await asyncio.sleep(0.01)
@@ -110,7 +110,7 @@ async def _told(
 
 
 def _source(source: str | None) -> tuple[str | None, Path | None]:
-    """Return the first spec and the folder of a batch. Raises UnitcadError for a folder that holds no result."""
+    """Return the first spec and the folder of a batch. Raises UnitcadError for a folder without a result."""
     if source is None or source in every_template() or not Path(source).is_dir():
         return source, None
     folder = Path(source)
@@ -124,7 +124,7 @@ def _source(source: str | None) -> tuple[str | None, Path | None]:
         if len(specs) == 1:
             return str(specs[0]), None
         if specs:
-            raise UnitcadError(f"{error}; it has {listed([path.name for path in specs])}: give one of them") from None
+            raise UnitcadError(f"{error}; it has {some(path.name for path in specs)}: give one of them") from None
         raise
     return None, folder
 
@@ -169,5 +169,5 @@ def _trusted(data: Mapping[str, Any], path: Path, code: bool) -> Source:
     for field, unit in answers.units(data, path.parent):
         design = files_named(unit).get("design")
         if design and is_custom(design) and not is_body_file(design) and not code:
-            raise Refusal(field, design, "is code; it runs in the live page with --allow-code alone: read it first")
+            raise Refusal(field, design, "is code; it runs in the live page only with --allow-code: read it first")
     return Source(str(path.parent.resolve()), named)

@@ -1,4 +1,4 @@
-"""What the page is told about a unit's spec: its form, the unit itself, the moulds judged, the estimate."""
+"""Answers to the page about a unit's spec: its form, the unit itself, the moulds judged, the estimate."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def judge(data: dict[str, Any]) -> Mapping[str, Any]:
 
 
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
-    """Return what `judge` does. Raises UnitcadError also for a unit that has no moulds."""
+    """Return the result of `judge`. Raises UnitcadError also for a unit that has no moulds."""
 
     spec = effective(convert(data, AskedSpec))
     _ = MouldSet(spec).plan
@@ -59,7 +59,7 @@ def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
 
 
 def asked_toml(text: str, data: Mapping[str, Any], spec: Spec, trusted: Trusted) -> str:
-    """Return what a text asks for as TOML that names no file: the text itself where it names none."""
+    """Return a text as TOML that names no file: the text itself if it names none."""
     import tomlkit
 
     return tomlkit.dumps(with_files(data, trusted)) if files_named(data) else text
@@ -75,8 +75,8 @@ def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[
     yield "design", data
 
 
-def holds_code(spec: Spec) -> bool:
-    """Tell whether a spec holds code. Raises Refusal where it may not run."""
+def has_code(spec: Spec) -> bool:
+    """Tell whether a spec has code. Raises Refusal if it may not run."""
     code = spec.design_source is not None and not is_body_file(spec.design)
     if code and not is_allowed(spec.design, spec.design_source or ""):
         raise Refusal("design", spec.design, "code from a page does not run")
@@ -84,14 +84,14 @@ def holds_code(spec: Spec) -> bool:
 
 
 def folder_for(data: Mapping[str, Any], trusted: Trusted) -> Path | None:
-    """Return the folder that a text's files start at; None unless it names those of a trusted spec alone.
+    """Return the folder that a text's files start at; None unless it names only those of a trusted spec.
 
     Raises Refusal for a design's file that no trusted spec names.
     """
     named, design = files_named(data), data.get("design")
     folders = [Path(source.folder) for source in trusted.sources if source.named == named]
     if not folders and is_custom(design) and data.get("design_source") is None:
-        limit = "a design's file is read only where the spec that the server was started with names it"
+        limit = "a design's file is read only if the spec that the server was started with names it"
         raise Refusal("design", design, limit)
     return folders[0] if named and folders else None
 

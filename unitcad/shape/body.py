@@ -1,4 +1,4 @@
-"""A named solid of a unit or its tooling: what every export, mould check and report handles."""
+"""A named solid of a unit or its tooling: the unit of every export, mould check and report."""
 
 from __future__ import annotations
 
@@ -25,18 +25,17 @@ Kind = Literal[
     "frame",
     "holder",
 ]
-"""What a body is: a part of the unit (layer to wire) or a piece of tooling."""
+"""Kind of a body: a part of the unit (layer to wire) or a piece of tooling."""
 
 
 @dataclass(frozen=True)
 class Body:
     """One solid, as assembled (mm, z = 0 at the skin).
 
-    `name` comes from role and layer number alone ("layer1", "cup2", "base"), never from a material or a variant, since
+    `name` comes only from role and layer number ("layer1", "cup2", "base"), never from a material or a variant, since
     files of equal bodies are shared. `made` is "cast", "printed", "cut" (from film or filament) or "bought".
-    `step` is the pour that it belongs to. `upside_down`: how it lies on the printer's bed, turned by 180 degrees about
-    x. `removal` is the direction in which a piece of tooling is taken away, None for one that stays; the plan
-    has the order.
+    `step` is the pour that it belongs to. `upside_down`: it is printed turned by 180 degrees about x. `removal` is the
+    direction in which a piece of tooling is taken away, None for one that stays; the plan has the order.
     """
 
     name: str

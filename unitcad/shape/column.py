@@ -1,8 +1,8 @@
-"""What of a set of shapes stands in an upright round column, told from the trees alone.
+"""The part of a set of shapes inside an upright round column, found from the trees without meshes.
 
-Two columns about which the same shapes stand in the same way hold the same solid: what is in one tells of the other.
-The trees are cut down to the nodes that reach into the column, and moved so that its axis is at x = y = 0. What a node
-holds outside the column is left out as far as its box, or a plate's outline, tells; so equal results mean congruent
+Two columns with the same shapes at the same places contain the same solid, so one finding is valid for both.
+The trees are cut down to the nodes that reach into the column, and moved so that its axis is at x = y = 0. Parts of a
+node outside the column are dropped as far as its box, or a plate's outline, shows them; so equal results mean congruent
 contents, and different ones mean nothing.
 """
 
@@ -42,7 +42,7 @@ _ARC_SIDES = 96
 _OUTSIDE = 1.0
 """How far beyond the column a box that reaches farther is cut off, mm."""
 _CLEAR = 1 / 64
-"""How far a circle drawn as a polygon may stand off its arc; nearer than this two things count as touching, mm."""
+"""Largest distance of a circle's polygon from its arc; nearer than this two things count as touching, mm."""
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,13 @@ class Standing:
         return [int(i) for i in self._group.near(column)]
 
     def within(self, column: Column) -> tuple[Shape, ...]:
-        """Return what stands in the column, its axis moved to x = y = 0: equal for columns of equal contents."""
+        """Return the contents of the column, its axis moved to x = y = 0: equal for columns of equal contents."""
         parts = (self._group.children[i].within(column) for i in self._group.near(column))
         return tuple(part for part in parts if part is not None)
 
 
 class _Node:
-    """A node of a tree with the boxes of its children where they stand."""
+    """A node of a tree with the boxes of its placed children."""
 
     def __init__(
         self,
@@ -110,7 +110,7 @@ class _Node:
         return np.flatnonzero(reaches & (self._extents[:, 2] <= column.high) & (self._extents[:, 5] >= column.low))
 
     def outlines(self, leaf: Extrude) -> list[np.ndarray]:
-        """Return the outlines of an upright prism where they stand: below, above where it tapers, its holes; mm."""
+        """Return the placed outlines of an upright prism, mm: below, above if it tapers, its holes."""
         if not self._outlines:
             turn = np.array(self.turn, float)[:2, :2]
             for profile in (leaf.profile, *((leaf.top,) if leaf.top else ()), *leaf.holes):
@@ -173,13 +173,13 @@ def _dot(row: Sequence[float], column: Sequence[float]) -> float:
 
 
 def extent(shape: Shape) -> Extent:
-    """Return a box that holds a shape: (x0, y0, z0, x1, y1, z1), mm; of what is cut the body's."""
+    """Return a box around a shape: (x0, y0, z0, x1, y1, z1), mm; of a cut shape the box of its body."""
     return _Nodes().of(shape).extent
 
 
 @lru_cache(maxsize=4096)
 def _box_of(shape: Shape) -> Extent:
-    """Return a box that holds a leaf, in its own frame, mm; a circle's polygon may stand out of the circle a little."""
+    """Return a box around a leaf in its own frame, mm; a circle's polygon may exceed the circle a little."""
     match shape:
         case Revolve(profile):
             _, z0, r, z1 = profile.bounds
@@ -239,7 +239,7 @@ def _leaf_within(node: _Node, leaf: Shape, column: Column) -> Shape | None:
     x, y, z = node.move
     placed = Place(leaf, node.turn, (x - column.x, y - column.y, z))
     if not on_grid:
-        # Off the grid: snapped, two leaves that stand differently could become equal.
+        # Off the grid: snapped, two leaves at different places could become equal.
         object.__setattr__(placed, "move", tuple(round(v, 9) for v in (x - column.x, y - column.y, z)))
     return placed
 
@@ -252,7 +252,7 @@ def _is_rectangle(profile: Profile) -> bool:
 
 
 def _side_of(corners: np.ndarray, column: Column) -> int:
-    """Tell where the column stands of an upright prism's outline: -1 wholly inside, 1 wholly outside, 0 across."""
+    """Return the column's place relative to an upright prism's outline: -1 inside, 1 outside, 0 across."""
     corners = corners - (column.x, column.y)
     after = np.roll(corners, -1, axis=0)
     along = after - corners
@@ -260,7 +260,7 @@ def _side_of(corners: np.ndarray, column: Column) -> int:
     nearest = np.hypot(*(corners + share[:, None] * along).T).min()
     if nearest <= column.radius + _CLEAR:
         return 0
-    # The angle that the outline turns through about the axis: a full turn where the axis is inside.
+    # The angle that the outline turns through about the axis: a full turn if the axis is inside.
     turned = np.arctan2(
         corners[:, 0] * after[:, 1] - corners[:, 1] * after[:, 0], np.einsum("ij,ij->i", corners, after)
     ).sum()

@@ -11,7 +11,7 @@ import numpy as np
 GRID_PER_MM = 1024
 """Lengths live on a grid of 1/1024 mm: sums and differences are exact in binary, so faces meant to coincide do."""
 FACETS = 0.01
-"""Largest distance of a STEP body's facets from its surface, mm: what is no thicker is left by facets or rounding."""
+"""Largest distance of a STEP body's facets from its surface, mm; thinner films come from facets or rounding."""
 
 Vertex = tuple[float, float, float]
 _BLOCK = 256
@@ -33,7 +33,7 @@ class Profile:
     vertex, 0 for a line, positive for an arc that turns left (the DXF polyline's convention).
     x and y in mm on the grid.
 
-    Raises ProfileError where the curve crosses or touches itself, runs clockwise, or has fewer than three sides.
+    Raises ProfileError if the curve crosses or touches itself, runs clockwise, or has fewer than three sides.
     """
 
     vertices: tuple[Vertex, ...]
@@ -71,7 +71,7 @@ class Profile:
                 angle = 4 * math.atan(bulge)
                 cx, _, radius = arc_centre((x0, y0), (x1, y1), bulge)
                 area = math.copysign(radius**2 * (abs(angle) - math.sin(abs(angle))) / 2, bulge)
-                # A segment's centroid lies 4 R sin^3(t/2) / (3 (t - sin t)) from the centre, towards the arc's middle.
+                # A segment's centroid is 4 R sin^3(t/2) / (3 (t - sin t)) from the centre, towards the arc's middle.
                 half = abs(angle) / 2
                 reach = 4 * radius * math.sin(half) ** 3 / (3 * (abs(angle) - math.sin(abs(angle))))
                 outward = (y1 - y0) / math.hypot(x1 - x0, y1 - y0) * math.copysign(1, bulge)
@@ -107,7 +107,7 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> Profile:
 
 def rounded_rectangle(half_x: float, half_y: float, radius: float, key: float = 0.0) -> Profile:
     """Return a rectangle about the origin with three or four round corners (mm); a `key` > 0 cuts the one at (+x, +y)
-    straight at 45 degrees by that length, so that what fits round it goes on one way only.
+    straight at 45 degrees by that length, so that a counterpart fits in one attitude only.
     """
     a, b, r, quarter = half_x, half_y, radius, math.tan(math.pi / 8)
     first = [(a, b - key, 0.0), (a - key, b, 0.0)] if key else [(a, b - r, quarter), (a - r, b, 0.0)]
@@ -185,7 +185,7 @@ def _crosses_itself(polygon: np.ndarray) -> bool:
     def side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
         return np.sign((q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0]))
 
-    # Sides that overlap along the longer way of the whole stand near each other in this order.
+    # In this order, sides that overlap along the longer axis are neighbours.
     along, across = np.argsort(high.max(axis=0) - low.min(axis=0))[::-1]
     order = np.argsort(low[:, along], kind="stable")
     ends = np.searchsorted(low[order, along], high[order, along], side="right")

@@ -1,8 +1,8 @@
 """Solids as data: a small frozen tree that three kernels realise. Lengths in mm on the grid.
 
-Quarter turns keep everything on the grid. What is turned by another angle has its grid in the turned frame: a solid is
-drawn and cut there, then turned as a whole. Points that are equal in that frame stay equal; faces that lie on each
-other do so but for a rounding, so the joint of two such pieces beside a cavity takes a seal that reaches into both.
+Quarter turns keep everything on the grid. A solid turned by another angle has its grid in the turned frame: a solid is
+drawn and cut there, then turned as a whole. Points that are equal in that frame stay equal; coincident faces stay so up
+to rounding, so the joint of two such pieces next to a cavity needs a seal that reaches into both.
 
 A tree is hashable, picklable and costs nothing to import; `content_hash` is stable over processes and machines.
 """
@@ -22,7 +22,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Revolve:
-    """A profile in the (r, z) half-plane, turned fully about the z axis. Raises ProfileError where r < 0."""
+    """A profile in the (r, z) half-plane, turned fully about the z axis. Raises ProfileError if r < 0."""
 
     profile: Profile
 
@@ -89,7 +89,7 @@ class Common:
 
 @dataclass(frozen=True)
 class Component:
-    """The connected piece of `shape` that holds the point `at` (mm)."""
+    """The connected piece of `shape` around the point `at` (mm)."""
 
     shape: Shape
     at: tuple[float, float, float]
@@ -97,7 +97,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Below:
-    """`shape` and everything under it, straight down to z = `bottom` (mm), which lies below the shape."""
+    """`shape` and everything under it, straight down to z = `bottom` (mm), which is below the shape."""
 
     shape: Shape
     bottom: float
@@ -115,7 +115,7 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Place:
-    """`shape` turned by `turn`, then moved by `move` (mm). Raises ProfileError where `turn` is no proper rotation."""
+    """`shape` turned by `turn`, then moved by `move` (mm). Raises ProfileError if `turn` is no proper rotation."""
 
     shape: Shape
     turn: Turn = UNTURNED
@@ -159,7 +159,7 @@ def cut(body: Shape, tools: Iterable[Shape]) -> Shape:
 
 
 def moved(shape: Shape, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape:
-    """`shape` moved by (x, y, z) mm; not wrapped where that is nothing."""
+    """`shape` moved by (x, y, z) mm; not wrapped if that is no move."""
     return Place(shape, move=(x, y, z)) if (x, y, z) != (0.0, 0.0, 0.0) else shape
 
 
@@ -173,7 +173,7 @@ def rotated(shape: Shape, axis: str, degrees: float) -> Shape:
     quarters = round(degrees / 90)
     rest = math.radians(degrees - 90.0 * quarters)
     c, s = (math.cos(rest), math.sin(rest)) if rest else (1, 0)
-    # By the nearest quarter turn and what is left: quarter turns are exact, opposite angles mirror each other.
+    # By the nearest quarter turn and the remainder: quarter turns are exact, opposite angles mirror each other.
     c, s = ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
     turns: dict[str, Turn] = {
         "x": ((1, 0, 0), (0, c, -s), (0, s, c)),

@@ -1,7 +1,7 @@
-"""The requested spec: the tables of a spec as a TOML file holds them. Lengths in mm, the unit in each name.
+"""The tables of a spec as typed in a TOML file. Lengths in mm, the unit in each name.
 
-None means that the key is left out; `unitcad.spec.effective` has the same spec with every value there. Only types and
-ranges of single values are checked here. What depends on several values is checked by the design and `validation`.
+None means that the key is missing; `unitcad.spec.effective` has the same spec with every value there. Only types and
+ranges of single values are checked here. The design and `validation` check conditions on several values.
 """
 
 from __future__ import annotations
@@ -47,47 +47,73 @@ class MotorTable(Table, frozen=True, kw_only=True):
     Without either it is `DEFAULT_MOTOR`.
     """
 
-    part: str | None = None
-    diameter_mm: kinds.MotorDiameter | None = None
-    thickness_mm: kinds.MotorThickness | None = None
+    part: Annotated[
+        str | None, Meta(description="motor of the catalogue (unitcad list motors), or of the spec's own [motors.NAME]")
+    ] = None
+    diameter_mm: Annotated[kinds.MotorDiameter | None, Meta(description="diameter of the can; default: the part's")] = (
+        None
+    )
+    thickness_mm: Annotated[
+        kinds.MotorThickness | None, Meta(description="thickness of the can; default: the part's")
+    ] = None
     drive: kinds.Drive | None = None
-    fill: Annotated[bool, Meta(description="Layer 1 reaches the motor: no ring of air between them")] = False
+    fill: Annotated[bool, Meta(description="true: Layer 1 reaches the motor, without a ring of air between them")] = (
+        False
+    )
 
 
 class FpcbTable(Table, frozen=True, kw_only=True):
     """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
 
-    tail: Literal["one", "both"] = "one"
-    thickness_mm: CircuitThickness = 0.11
-    tail_width_mm: TailWidth = 3.0
-    tail_length_mm: Annotated[Length, Meta(description="how far the tail stands out of the body")] = 10.0
-    pad_diameter_mm: Length | None = None
+    tail: Annotated[
+        Literal["one", "both"], Meta(description="sides on which the circuit leaves: one (+x), or both")
+    ] = "one"
+    thickness_mm: Annotated[CircuitThickness, Meta(description="thickness of the circuit")] = 0.11
+    tail_width_mm: Annotated[
+        TailWidth, Meta(description="width of the tail; half of it is at most 0.7 of the core's radius")
+    ] = 3.0
+    tail_length_mm: Annotated[Length, Meta(description="length of the tail outside the body")] = 10.0
+    pad_diameter_mm: Annotated[
+        Length | None, Meta(description="diameter of the pad on the motor; default: as wide as the design allows")
+    ] = None
     tail_end_width_mm: Annotated[
-        TailWidth | None, Meta(description="of a tail's free end, which must pass the slot")
+        TailWidth | None,
+        Meta(description="width of the tail's free end, such as a connector, which must pass the slot"),
     ] = None
 
 
 class WiresTable(Table, frozen=True, kw_only=True):
     """Wires instead of a circuit: side by side, from the motor's side out along +x, through one exit."""
 
-    diameter_mm: Annotated[float, Meta(ge=0.05, le=20)]
-    count: Annotated[int, Meta(ge=1, le=8)] = 2
-    length_mm: Annotated[Length, Meta(description="how far the wires stand out of the body")] = 10.0
+    diameter_mm: Annotated[float, Meta(ge=0.05, le=20, description="diameter of one wire with its insulation")]
+    count: Annotated[int, Meta(ge=1, le=8, description="number of wires")] = 2
+    length_mm: Annotated[Length, Meta(description="length of the wires outside the body")] = 10.0
 
 
 class LayerTable(Table, frozen=True, kw_only=True):
     """One silicone layer: a wall and, in a design of closed layers, a cap."""
 
-    material: str
-    wall_mm: Thickness
-    cap_mm: Thickness | None = None
+    material: Annotated[
+        str,
+        Meta(description="silicone of the catalogue (unitcad list materials), or of the spec's own [materials.NAME]"),
+    ]
+    wall_mm: Annotated[Thickness, Meta(description="thickness of the layer at the skin")]
+    cap_mm: Annotated[
+        Thickness | None,
+        Meta(description="thickness of the layer above the motor, for a design that has caps"),
+    ] = None
 
 
 class MouldsTable(Table, frozen=True, kw_only=True):
     """The tooling. Whatever the printer's catalogue entry gives can be given here instead."""
 
-    printer: str = "fdm-0.4"
-    cavities: tuple[Cavities, Cavities] | Literal["fill"] = (1, 1)
+    printer: Annotated[
+        str, Meta(description="printer of the catalogue (unitcad list printers), or of the spec's own [printers.NAME]")
+    ] = "fdm-0.4"
+    cavities: Annotated[
+        tuple[Cavities, Cavities] | Literal["fill"],
+        Meta(description="columns and rows of cavities in one mould, or fill: as many as the bed takes"),
+    ] = (1, 1)
     bed_x_mm: kinds.Bed | None = None
     bed_y_mm: kinds.Bed | None = None
     bed_z_mm: kinds.Bed | None = None
@@ -107,66 +133,95 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     filament_hole_mm: kinds.FilamentHole | None = None
     engraving_depth_mm: kinds.EngravingDepth | None = None
     engraving_stroke_mm: kinds.EngravingStroke | None = None
-    pour: Literal["open", "injected"] = "open"
-    sprue_mm: Annotated[float, Meta(ge=3.0, le=50, description="3 by syringe, 4 by gravity")] = 3.0
+    pour: Annotated[
+        Literal["open", "injected"],
+        Meta(description="open: struck off along the rim; injected: under a lid with sprue and vents"),
+    ] = "open"
+    sprue_mm: Annotated[
+        float,
+        Meta(ge=3.0, le=50, description="diameter of the sprue of each cavity under a lid: 3 by syringe, 4 by gravity"),
+    ] = 3.0
     vents: Annotated[
-        Vents | None, Meta(description="of each cavity under a lid; left out, as many as clear the air")
+        Vents | None,
+        Meta(description="number of vents of each cavity under a lid, in fours; default: as many as clear the air"),
     ] = None
-    filament_mm: Annotated[float, Meta(ge=0.2, le=20)] = 1.75
+    filament_mm: Annotated[float, Meta(ge=0.2, le=20, description="diameter of the filament in the core")] = 1.75
     plinth_height_mm: Annotated[
-        Annotated[float, Meta(ge=0.6, le=100)] | None, Meta(description="left out, 2 mm in whole layers")
+        Annotated[float, Meta(ge=0.6, le=100)] | None,
+        Meta(description="height of the plinth; default: 2 mm in whole printed layers"),
     ] = None
     plate_mm: Annotated[
-        Annotated[float, Meta(ge=0.5, le=100)] | None, Meta(description="left out, 4 mm in whole layers")
+        Annotated[float, Meta(ge=0.5, le=100)] | None,
+        Meta(description="thickness of the base's plate; default: 4 mm in whole printed layers"),
     ] = None
-    ledge_mm: Annotated[float, Meta(ge=LEAST_LEDGE, le=100)] = 0.6
+    ledge_mm: Annotated[
+        float, Meta(ge=LEAST_LEDGE, le=100, description="width of the core's ledge that carries the tongue")
+    ] = 0.6
 
 
 class CastingTable(Table, frozen=True, kw_only=True):
     """The lab: scale, mixing, room and the margin on a silicone's elongation."""
 
-    scale_resolution_g: Annotated[float, Meta(ge=1e-6, le=1000)] = 0.01
-    minimum_mix_g: Annotated[float, Meta(ge=0.001, le=1e6)] = 2.0
-    waste: Annotated[float, Meta(ge=0, le=10, description="extra mix as a fraction of what the cavities take")] = 0.5
-    room_c: Annotated[float, Meta(ge=5, le=45)] = 23.0
-    vacuum: bool = True
+    scale_resolution_g: Annotated[float, Meta(ge=1e-6, le=1000, description="smallest step of the scale")] = 0.01
+    minimum_mix_g: Annotated[float, Meta(ge=0.001, le=1e6, description="smallest batch to mix")] = 2.0
+    waste: Annotated[float, Meta(ge=0, le=10, description="extra mix, as a fraction of the cavities' content")] = 0.5
+    room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room, which sets pot life and cure")] = (
+        23.0
+    )
+    vacuum: Annotated[bool, Meta(description="whether a vacuum chamber is at hand")] = True
     strain_margin: Annotated[
         float,
-        Meta(ge=0.01, le=1, description="the part of a silicone's elongation at break that demoulding may use"),
+        Meta(ge=0.01, le=1, description="fraction of a silicone's elongation at break that demoulding may use"),
     ] = 0.5
 
 
 class EstimateTable(Table, frozen=True, kw_only=True):
     """Inputs of the attenuation estimate; what is left out is the motor's."""
 
-    frequency_hz: kinds.Frequency | None = None
-    amplitude_um: kinds.Amplitude | None = None
-    tissue: str = "forearm"
-    models: Annotated[tuple[Model, ...], Meta(min_length=1)] = ("rule", "published", "corrected", "divider")
-    moduli: Annotated[Moduli, Meta(description="of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")] = (
-        "small-strain"
-    )
-    fit: Annotated[str | None, Meta(description="a lab-fit.toml of unitcad fit: a lab's own constants and ranges")] = (
-        None
-    )
-    fit_source: Annotated[str | None, Meta(description="the text of that file; filled in when it is read")] = None
+    frequency_hz: Annotated[
+        kinds.Frequency | None, Meta(description="frequency of the drive; default: the motor's")
+    ] = None
+    amplitude_um: Annotated[
+        kinds.Amplitude | None, Meta(description="amplitude of the motor; default: the motor's own")
+    ] = None
+    tissue: Annotated[
+        str, Meta(description="body under the unit, of the catalogue or of the spec's own [tissue.NAME.LAYER]")
+    ] = "forearm"
+    models: Annotated[
+        tuple[Model, ...], Meta(min_length=1, description="models of the level; fem are the finite elements")
+    ] = ("rule", "published", "corrected", "divider")
+    moduli: Annotated[
+        Moduli,
+        Meta(description="modulus of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa"),
+    ] = "small-strain"
+    fit: Annotated[
+        str | None, Meta(description="lab-fit.toml of unitcad fit next to the spec: the lab's own constants and ranges")
+    ] = None
+    fit_source: Annotated[str | None, Meta(description="text of that file; unitcad fills it in")] = None
 
 
 class OutputTable(Table, frozen=True, kw_only=True):
     """Formats, and the largest distance of a mesh from the true surface."""
 
     formats: Annotated[
-        tuple[Format, ...] | None, Meta(description="by default step, stl, 3mf; without a B-rep kernel stl, 3mf")
+        tuple[Format, ...] | None,
+        Meta(description="file formats; default: step, stl, 3mf, without a B-rep kernel stl, 3mf"),
     ] = None
-    tolerance_mm: Annotated[float, Meta(ge=0.0005, le=0.2)] = 0.01
+    tolerance_mm: Annotated[
+        float, Meta(ge=0.0005, le=0.2, description="largest distance of a mesh from the true round surface")
+    ] = 0.01
 
 
 class AskedSpec(Table, frozen=True, kw_only=True):
     """A haptic unit as asked for; `layers` run from the inside out, one entry being a single-layer control."""
 
-    name: Annotated[str, Meta(min_length=1, max_length=120)]
-    design: str
-    diameter_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM)]
+    name: Annotated[
+        str, Meta(min_length=1, max_length=120, description="a name of the variant; the result's folder begins with it")
+    ]
+    design: Annotated[
+        str, Meta(description="a design (unitcad list designs), FILE.py:NAME, or a file of bodies (.step, .stl, .3mf)")
+    ]
+    diameter_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM, description="diameter of the unit")]
     motor: MotorTable = MotorTable(part=DEFAULT_MOTOR)
     fpcb: FpcbTable | None = None
     wires: WiresTable | None = None
@@ -180,8 +235,9 @@ class AskedSpec(Table, frozen=True, kw_only=True):
     printers: dict[str, PrinterEntry] = {}
     tissue: dict[str, Annotated[dict[str, TissueEntry], Meta(min_length=1, description=_TISSUE)]] = {}
     parameters: Annotated[
-        dict[str, bool | int | float | str], Meta(description="further values that a custom design reads")
+        dict[str, bool | int | float | str],
+        Meta(description="values that a custom design reads: numbers, texts, true or false"),
     ] = {}
     design_source: Annotated[
-        str | None, Meta(description="the text of a custom design's file, or its bodies; filled in when it is read")
+        str | None, Meta(description="text of a custom design's file, or its bodies; unitcad fills it in")
     ] = None

@@ -1,7 +1,7 @@
 """A design that is a file of bodies: `design = "body.step"`, also .stp, .stl and .3mf. Lengths in mm.
 
 The bodies' meshes become part of the effective spec, as text: a line a body, with its name, vertices and faces. So a
-result's spec.toml stands alone, the result's hash covers them, and reading it again needs no B-rep library.
+result's spec.toml is complete, the result's hash covers them, and reading it again needs no B-rep library.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from unitcad.shape import Polyhedron
 from unitcad.shape.profile import FACETS, GRID_PER_MM
 
 MOST_FACES = 40_000
-"""Triangles of all bodies together: what moulds can be made round in a minute or so."""
+"""Most triangles of all bodies together, for which the moulds take about a minute."""
 _HEAD = "unitcad bodies 1"
 _NAME = re.compile(r"layer[1-9][0-9]?|motor|fpcb|[a-z][a-z0-9-]{0,31}")
 _HALF = 0.5 + 1e-6
@@ -38,15 +38,15 @@ _HALF = 0.5 + 1e-6
 def body_text(design: str, path: Path) -> str:
     """Return the text of a file's bodies.
 
-    The bodies are checked as `unitcad check` does. Raises Refusal, with the finding's code, for what has an error, or a
-    size that suggests another unit; and for a file that can't be read or has too many triangles. Raises Unfinished if
-    the check lacks time or memory.
+    The bodies are checked as `unitcad check` does. Raises Refusal, with the finding's code, for a body with an error,
+    or with a size that suggests another unit; and for a file that can't be read or has too many triangles. Raises
+    Unfinished if the check lacks time or memory.
     """
     try:
         read(path, largest=LARGEST)
     except UnitcadError as error:
         raise Refusal("design", design, str(error)) from None
-    # The solids of an assembly may share volume: a layer is what the ones inside it leave.
+    # The solids of an assembly may share volume: the inner ones are cut out of a layer.
     report = check_file(path, Options(ignore=("G002",)) if _is_step(path) else Options())
     scale = s_scale.likely_unit(report.facts, None) if readers.kind_of(path.name) == "step" else ()
     for finding in (*report.findings, *scale):
@@ -114,7 +114,7 @@ def _bodies(path: Path) -> list[tuple[str, np.ndarray, np.ndarray]]:
 
 
 def _on_grid(design: str, name: str, vertices: np.ndarray, faces: np.ndarray) -> Polyhedron:
-    """Return a body with its corners on the grid, where faces of moulds meet them; what becomes flat is left out."""
+    """Return a body with its corners on the grid, on which faces of moulds meet them; flattened faces are dropped."""
     cells = np.floor(vertices * GRID_PER_MM + _HALF).astype("<i4")
     cells, index = np.unique(cells, axis=0, return_inverse=True)
     faces = index.reshape(-1)[faces]

@@ -7,6 +7,7 @@ from functools import lru_cache
 from msgspec import structs
 
 from unitcad import catalogue
+from unitcad.spec.asked import FpcbTable
 from unitcad.spec.effective import Moulds, Spec
 from unitcad.text import number
 
@@ -14,7 +15,7 @@ MOTOR_SIZES = ("diameter_mm", "thickness_mm")
 
 
 def printer_of(spec: Spec) -> catalogue.Printer:
-    """Return the catalogue's printer with what the spec's moulds override."""
+    """Return the catalogue's printer with the lengths that the spec's moulds override."""
     return _overridden(catalogue.printers(spec.printers)[spec.moulds.printer], spec.moulds)
 
 
@@ -36,15 +37,27 @@ def motor_of(spec: Spec) -> catalogue.Motor | None:
     return None
 
 
-def assumed_lengths(spec: Spec) -> list[str]:
-    """Return the motor's lengths that nobody has measured, with the range of each."""
+def assumed_lengths(spec: Spec) -> dict[str, str]:
+    """Return the assumed lengths, which nobody has measured, by their keys."""
     motor = motor_of(spec)
     sizes = [(size, getattr(motor, size)) for size in MOTOR_SIZES] if motor else []
-    return [
-        f"motor.{size} = {number(value.value, 3)} ({number(value.low, 3)} to {number(value.high, 3)})"
+    found = {
+        f"motor.{size}": f"{number(value.low, 3)} to {number(value.high, 3)}"
         for size, value in sizes
         if value.status == "assumed" and value.value == getattr(spec.motor, size)
-    ]
+    }
+    if (key := "motor.thickness_mm") in found and motor and motor.thickness_mm.high:
+        proud = motor.thickness_mm.high - spec.motor.thickness_mm
+        found[key] += f": up to {number(proud, 2)} mm out of the skin's plane"
+    if spec.fpcb and spec.fpcb.thickness_mm == FpcbTable().thickness_mm:
+        found["fpcb.thickness_mm"] = "usual stock"
+    return found
+
+
+def said_of(spec: Spec, key: str) -> str:
+    """Return "key = value" for a length of a spec."""
+    table, _, name = key.partition(".")
+    return f"{key} = {number(getattr(getattr(spec, table), name), 3)}"
 
 
 def _within(size: float, entry: catalogue.Value[float]) -> bool:

@@ -26,7 +26,7 @@ _NAMES: dict[type, str] = {
 }
 """Kinds of plain data in words, in the order in which a refusal lists them."""
 _HALF_PAIR = re.compile(r"[\ud800-\udfff]")
-"""What stands for a byte that is not UTF-8."""
+"""Replacement of a byte that is not UTF-8."""
 _MOST_KEYS = 5
 """Keys of a table that a refusal names."""
 _LARGEST_INT = 2**63 - 1
@@ -41,8 +41,8 @@ DEEPEST = 20
 def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
     """Return `data`, the table at `field`, as a `kind`, types strict. Raises Refusal for the first unfit value.
 
-    A number that is infinite, huge or none is refused wherever it stands, and so is what nests too deeply. A kind's
-    numbers have limits that they may reach (ge, le), so that a limit is what a refusal can offer.
+    A number that is infinite, huge or none is refused at any place, and so is data that nests too deeply. A kind's
+    numbers have limits that they may reach (ge, le), so that a refusal can offer the limit.
     """
     check_plain(data, field)
     try:
@@ -52,7 +52,7 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
 
 
 def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
-    """Raise Refusal for what no key takes: huge numbers and NaN, dates, invisible characters, deep nesting."""
+    """Raise Refusal for values that no key takes: huge numbers and NaN, dates, invisible characters, deep nesting."""
     if isinstance(node, str) and not SOURCES.intersection(field.split(".")):
         _check_text(node, field)
     if isinstance(node, float) and not math.isfinite(node):
@@ -78,7 +78,7 @@ def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
 def _check_text(text: str, field: str) -> None:
     refused = invisible(text)
     if refused is not None:
-        limit = f"holds {refused!a}: control characters and those that turn the direction of text are refused"
+        limit = f"has {refused!a}: control characters and those that turn the direction of text are refused"
         raise Refusal(field, text, limit, without_invisible(text).strip() or None)
 
 
@@ -87,9 +87,9 @@ def _below(field: str, key: object) -> str:
 
 
 def _refusals(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
-    """Yield what is wrong with `node` as a `kind`, in the order of the data.
+    """Yield the refusals of `node` as a `kind`, in the order of the data.
 
-    msgspec says only by a sentence where and why it refused, so place and limit are looked up in the types again.
+    msgspec reports place and reason only in a sentence, so place and limit are looked up in the types again.
     """
     if _fits(node, kind):
         return
@@ -180,13 +180,13 @@ def _name(plain: type, kind: Any) -> str:
     optional = [name for name in fields if name not in required][:_MOST_KEYS]
     if not required:
         return f"a table, with keys such as {', '.join(optional)}"
-    return f"a table with {', '.join(required)}{' and, where wanted, ' if optional else ''}{', '.join(optional)}"
+    return f"a table with {', '.join(required)}{' and optionally ' if optional else ''}{', '.join(optional)}"
 
 
 def _list_of(kind: Any) -> str:
-    """Say what a list holds, by an example where its entries are short."""
+    """Describe the entries of a list, by an example if they are short."""
     entry = entry_in(kind)
-    if meaning(kind) and not _words(entry):
+    if meaning(kind) and _plain_kinds(entry) & {list, dict}:
         return f": {meaning(kind)}"
     if table_in(entry):
         return f", each entry {_name(dict, entry)}"
@@ -202,16 +202,16 @@ def _length(kind: Any) -> int:
 
 
 def _in_list(value: Any, kind: Any) -> list[Any] | None:
-    """Return a single value as the list that was meant; None where it is no entry."""
+    """Return a single value as the list that was meant; None if it is no entry."""
     listed = [value] * _length(kind)
     return listed if _fits(listed, kind) else None
 
 
 def _needs(kind: Any) -> str:
-    """Say what an empty text, list or table must hold."""
+    """Describe the content that an empty text, list or table needs."""
     entry = named_in(kind) or entry_in(kind)
     words = f"one or more of {', '.join(_words(entry))}" if entry and _words(entry) else ""
-    needed = meaning(kind) or words or ("one entry or more" if entry else "one character or more")
+    needed = words or meaning(kind) or ("one entry or more" if entry else "one character or more")
     return f"must not be empty: needs {needed}"
 
 

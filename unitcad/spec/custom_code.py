@@ -1,6 +1,6 @@
 """A custom design: `design = "path/to/file.py:NAME"`, a function or a Design in that file, or a file of bodies.
 
-The file's text becomes part of the effective spec. So a result's spec.toml stands alone, the result's hash covers the
+The file's text becomes part of the effective spec. So a result's spec.toml is complete, the result's hash covers the
 code, and a worker elsewhere needs no file.
 """
 
@@ -50,7 +50,7 @@ def name_in_file(design: str) -> str:
 
 
 def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a spec's data with its custom design's text in `design_source`, where it has one, and its fit's.
+    """Return a spec's data with its custom design's text in `design_source`, and with its fit's text, if it names them.
 
     A relative path starts at `folder`. Such a file is the person's own: its code may run.
     Raises UnitcadError for a file that can't be read.
@@ -89,7 +89,7 @@ def _with_fit(data: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 
 # Code runs only where somebody has allowed it: it came from a file that the command line led to, or with --allow-code.
-# Text that lies in a result, or that a spec brings along, is data until then.
+# Text in a result or in a spec is data until then.
 _allowed: set[str] = set()
 ANY = "any"
 
@@ -100,7 +100,7 @@ def allow(codes: Iterable[str]) -> None:
 
 
 def allowed() -> frozenset[str]:
-    """Return what this process may run, for a worker that gets its tasks from here."""
+    """Return the code that this process may run, for its workers."""
     return frozenset(_allowed)
 
 

@@ -1,6 +1,6 @@
-"""A haptic unit with everything settled: what validation makes of an asked spec and what every other module sees.
+"""The resolved spec of a haptic unit, which validation makes of a typed spec and which every other module reads.
 
-Every value is there. `None` and "fill" remain only where they mean something: no circuit, no wires, as many vents as
+Every value is there. `None` and "fill" remain only with a meaning: no circuit, no wires, as many vents as
 clear the air, as many cavities as the bed takes. Lengths in mm, the unit in each name.
 """
 
@@ -60,7 +60,7 @@ class Circuit(Table, frozen=True, kw_only=True):
 
 
 class CastLayer(Table, frozen=True, kw_only=True):
-    """One silicone layer: its wall, and its cap where the design gives it one (0: an open ring)."""
+    """One silicone layer: its wall, and its cap if the design has caps (0: an open ring)."""
 
     material: str
     wall_mm: float
@@ -68,7 +68,7 @@ class CastLayer(Table, frozen=True, kw_only=True):
 
 
 class Moulds(Table, frozen=True, kw_only=True):
-    """The tooling's lengths, the printer's written out where the spec overrides none."""
+    """The tooling's lengths, with the printer's written out unless the spec overrides them."""
 
     printer: str
     cavities: tuple[int, int] | Literal["fill"]
@@ -135,7 +135,7 @@ else:
         def __call__(cls, /, *values: object, **keys: Any) -> Spec:
             if values:
                 raise UnitcadError("Spec takes its keys by name, as in Spec(name=..., design=...); `load` reads a file")
-            # Validation knows the designs and lies above this room: it is loaded when a spec is asked for.
+            # Validation knows the designs and is above this room: it is loaded when a spec is asked for.
             return import_module("unitcad.validation").from_tables(keys)
 
         @property
@@ -195,7 +195,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
 
     @classmethod
     def settled(cls, **values: Any) -> Spec:
-        """Return the spec of these values, all of them there, unchecked: for validation alone."""
+        """Return the spec of these values, all of them there, unchecked: only for validation."""
         return type(Struct).__call__(cls, **values)
 
     @property
@@ -213,7 +213,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
         rows = [
             ("design", self.design),
             ("diameter_mm", self.diameter_mm),
-            ("motor", self.motor.part or f"{self.motor.diameter_mm:g} x {self.motor.thickness_mm:g} mm"),
+            ("motor", f"{self.motor.diameter_mm:g} x {self.motor.thickness_mm:g} mm"),
             ("circuit", self.fpcb and f"tail {self.fpcb.tail}, {self.fpcb.tail_width_mm:g} mm wide"),
             *(
                 (f"layers.{i}", f"{layer.material}, wall {layer.wall_mm:g} mm, cap {layer.cap_mm:g} mm")
@@ -226,5 +226,5 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
 
 
 def with_formats(spec: Spec, formats: tuple[Format, ...] = ()) -> Spec:
-    """Return the spec with other formats, or with none: what does not depend on them is keyed so."""
+    """Return the spec with other formats, or with none: for keys that do not depend on them."""
     return structs.replace(spec, output=structs.replace(spec.output, formats=formats))

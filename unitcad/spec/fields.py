@@ -1,4 +1,4 @@
-"""Introspection of the spec's tables: their keys, the kinds of value that a key takes, what a key means."""
+"""Introspection of the spec's tables: their keys, the kinds of value that a key takes, the meaning of a key."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ def _is_table(kind: Any) -> bool:
 
 
 def named_in(kind: Any) -> Any:
-    """Return the kind of any name's value in a free table that `kind` allows; None where it allows none."""
+    """Return the kind of any name's value in a free table that `kind` allows; None if it allows none."""
     return next((typing.get_args(k)[1] for k in alternatives(kind) if typing.get_origin(k) is dict), None)
 
 
 def entry_in(kind: Any, index: int = 0) -> Any:
-    """Return the kind of entry `index` of a list that `kind` allows; None where it allows no list so long."""
+    """Return the kind of entry `index` of a list that `kind` allows; None if it allows no list so long."""
     for member in alternatives(kind):
         if typing.get_origin(member) in (tuple, list):
             entries = typing.get_args(member)
@@ -55,7 +55,7 @@ def entry_in(kind: Any, index: int = 0) -> Any:
 
 
 def index_in(step: str, count: int) -> int | None:
-    """Return a path's step as an index of a list of `count` entries; None where it is none."""
+    """Return a path's step as an index of a list of `count` entries; None if it is none."""
     if not (step.isascii() and step.isdigit()) or len(step) > len(str(count)):
         return None
     return int(step) if int(step) < count else None

@@ -16,19 +16,28 @@ from msgspec import structs
 from unitcad.errors import UnitcadError
 from unitcad.files import read_text
 from unitcad.spec.effective import Spec, with_formats
+from unitcad.spec.toml_lines import has_more
+
+MOST = 20_000
+"""Keys, tables and list entries that a TOML file may have, together."""
 
 
 def read_toml(path: Path, links: bool = True) -> dict[str, Any]:
     """Return a TOML file's data.
 
-    Raises UnitcadError with line and column where it does not parse, for a special file, and for one that is larger
+    Raises UnitcadError with line and column if it does not parse, for a special file, and for one that is larger
     than `unitcad.files.LARGEST`; without `links` for a symbolic link too.
     """
     return parse_toml(read_text(path, links=links), str(path))
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Return a TOML text's data. Raises UnitcadError, which says `name`, and the place where it does not parse."""
+    """Return a TOML text's data.
+
+    Raises UnitcadError, which begins with `name`: with the place if the text does not parse, and if it is too large.
+    """
+    if has_more(text, MOST):
+        raise UnitcadError(f"{name}: has more than {MOST:,} keys, tables and list entries")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -36,7 +45,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
     except RecursionError:
         raise UnitcadError(f"{name}: nests too deeply") from None
     except ValueError:
-        raise UnitcadError(f"{name}: holds a number of thousands of digits") from None
+        raise UnitcadError(f"{name}: has a number of thousands of digits") from None
 
 
 def _unquoted(text: str, error: str) -> str:
@@ -52,7 +61,7 @@ def _unquoted(text: str, error: str) -> str:
 
 
 def to_data(spec: Spec) -> dict[str, Any]:
-    """Return the spec as plain data without what is None; validated again, it is the same spec."""
+    """Return the spec as plain data without None values; validated again, it is the same spec."""
     data = without_none(msgspec.to_builtins(spec))
     for layer in data["layers"]:
         if not layer["cap_mm"]:
@@ -90,7 +99,7 @@ _MOST_TEXTS, _LONGEST = 256, 2000
 
 
 def _key_text(key: str, value: Any) -> str:
-    """Return one key of a spec as TOML, as it stands in the whole."""
+    """Return one key of a spec as TOML, as in the whole file."""
     named = key, repr(value)
     if named in _TEXTS:
         return _TEXTS[named]

@@ -43,9 +43,9 @@ class BatchResult:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A row a variant, as in batch.json: what was swept, volumes in mm3, masses in g, edge levels.
+        """A row a variant, as in batch.json: the swept values, volumes in mm3, masses in g, edge levels.
 
-        Raises UnitcadError where the folder has gone, or has neither batch.json nor variants.parquet.
+        Raises UnitcadError if the folder has gone, or has neither batch.json nor variants.parquet.
         """
         table = read_batch(self.folder)
         if table is None:
@@ -71,25 +71,18 @@ _MOST_ROWS = 20
 def make(
     sweep: Sweep, folder: Path, options: BatchOptions, workers: Workers, watch: Watch = lambda summary, outcome: None
 ) -> Summary:
-    """Make a sweep's variants in `folder`: estimates alone as one table in this process, all else by `workers`.
+    """Make a sweep's variants in `folder`: only estimates as one table in this process, otherwise by `workers`.
 
-    Raises Refusal or UnitcadError where nothing can be run.
+    Raises Refusal or UnitcadError if nothing can be run.
     """
-    if options.store == "":
-        raise WrongArgument("store", "", "needs a folder or an address", "store")
-    if options.store and options.store.startswith("memory://"):
-        if workers.jobs != 0:
-            raise WrongArgument("store", options.store, "is in the memory of one process: leave it out, or jobs = 0")
-        if options.shard or options.folders is False:
-            raise WrongArgument("store", options.store, "ends with this process: each variant needs a folder then")
     if options.folders is False and workers.scheduler is not None and options.store is None and not options.shard:
         why = "results of a cluster go to folders here, or with --store to a store: name one, or leave it out"
         raise WrongArgument("folders", False, why)
     if options.folders and options.only == ("estimate",) and not sweep.of_compounds:
-        raise WrongArgument("folders", True, "estimates alone are one table: leave it out")
+        raise WrongArgument("folders", True, "estimates only are one table: leave it out")
     if options.shard:
         if options.only == ("estimate",):
-            raise WrongArgument("shard", str(options.shard), "estimates alone are one table: leave it out")
+            raise WrongArgument("shard", str(options.shard), "estimates only are one table: leave it out")
         whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
         variants = counted(sweep, options.limit)
         store = store_of(folder, options.shard, whole.batch, variants, options.store)
@@ -125,13 +118,13 @@ def batch(
     """Make every variant of a sweep in the folder `out` (out/<name> by default), each distinct part once.
 
     `sweep` is a file, the name of a shipped sweep, or a `unitcad.sweeps.Sweep`. `set` changes values of every variant,
-    `formats` and `only` choose what is made, as for `unitcad.build`. `jobs` is the number of worker processes, one a
+    `formats` and `only` choose the outputs, as for `unitcad.build`. `jobs` is the number of worker processes, one a
     core by default, with 0 this process. `limit` makes the first variants only; `timeout` is in seconds a variant.
     `store` is a folder or an address (s3://bucket/path) that workers put content into; `folders` says whether each
     variant has a folder, by default below 1,000 variants. `tables` are any of csv, json, parquet; by default the
     first two, from 10,000 variants on the last one. `shard`, such as "3/16", makes one part of the sweep. The same call
-    again goes on where an earlier one ended. What becomes of a variant is in the result. Raises Refusal or UnitcadError
-    where nothing can be run.
+    again resumes an interrupted one. The result has the outcome of each variant. Raises Refusal or UnitcadError if
+    nothing can be run.
     """
     check_number("jobs", jobs, 0, 1024, whole=True)
     check_number("timeout", timeout, 0.001, 1e9)

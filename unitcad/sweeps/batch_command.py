@@ -46,7 +46,7 @@ def batch(
     ],
     shards: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[SHARD]...", help="After merge: the shards' folders, or the one that holds them."),
+        typer.Argument(metavar="[SHARD]...", help="After merge: the shards' folders, or their common parent."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="The batch's own folder; else out/<the sweep's name>.")
@@ -82,9 +82,9 @@ def batch(
         typer.Option(metavar="S", min=0.001, max=1e7, callback=finite, help="Seconds that a variant may take."),
     ] = (None),
     limit: Annotated[int | None, typer.Option(metavar="N", help="The first N variants only.")] = None,
-    cache: Annotated[Path | None, typer.Option(help="Where distinct parts are kept; else in the user's cache.")] = None,
+    cache: Annotated[Path | None, typer.Option(help="Cache of distinct parts. Default: the user's cache.")] = None,
     cache_limit: Annotated[
-        float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="What the cache keeps at the end.")
+        float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="Largest cache after the batch.")
     ] = 4096,
     store: Annotated[
         str | None,
@@ -129,9 +129,9 @@ def batch(
         print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)
         return
     if chosen == ("estimate",) and scheduler is not None:
-        raise Refusal("--scheduler", scheduler, "estimates alone are computed in this process: leave it out")
+        raise Refusal("--scheduler", scheduler, "estimates only are computed in this process: leave it out")
     if chosen == ("estimate",) and store is not None:
-        raise Refusal("--store", store, "estimates alone are one table and no files: leave it out")
+        raise Refusal("--store", store, "estimates only are one table and no files: leave it out")
     folder = out or Path("out") / wanted.slug
     made = folder / options.shard.folder if options.shard else folder
     workers = Workers(jobs, scheduler, Certificates(tls_ca_file, tls_cert, tls_key))
@@ -167,16 +167,14 @@ def _confirm_merges(ctx: typer.Context) -> None:
 
 
 def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: bool, as_json: bool) -> None:
-    """Join shards as one batch: in the folder that holds them, or in `out`."""
+    """Join shards as one batch: in their parent folder, or in `out`."""
 
     folders = [each for path in named for each in (shard_folders(path) or [path])]
     whole = out or (folders[0].parent if folders else Path())
     try:
         summary = merge(whole, folders, options)
     except KeyboardInterrupt:
-        typer.echo(
-            f"interrupted: the shards are as before, and so is what {whole} has; the same command goes on", err=True
-        )
+        typer.echo(f"interrupted: shards and {whole} are unchanged; the same command resumes", err=True)
         sys.exit(130)
     _write_page(whole, page)
     if as_json:
@@ -188,7 +186,7 @@ def _merge(named: list[Path], out: Path | None, options: BatchOptions, page: boo
 
 
 def _write_page(folder: Path, asked: bool) -> None:
-    """Write a batch's page where it is asked for; one that is there is kept up."""
+    """Write a batch's page if it is asked for; one that is there is kept up."""
 
     if asked or (folder / PAGE).is_file():
         with progress(folder.name) as say:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from unitcad.cache import DEFAULT_LIMIT_MB
+from unitcad.cache import DEFAULT_LIMIT_MB, absolute
 from unitcad.spec.asked import OUTPUTS
 from unitcad.sweeps.shards import Shard
 
@@ -19,6 +19,7 @@ class BatchOptions:
     of finished variants, not only their sizes. `store` is the address (a folder, s3://bucket/path)
     of a store that workers write to; with `folders` each variant also has its folder, with None if there are few.
     `tables` are names of results.TABLES, None chooses by the number of variants. `shard` is a part of the sweep.
+    Raises WrongArgument for an address that is no store's.
     """
 
     only: Sequence[str] = OUTPUTS
@@ -33,3 +34,7 @@ class BatchOptions:
     folders: bool | None = None
     tables: Sequence[str] | None = None
     shard: Shard | None = None
+
+    def __post_init__(self) -> None:
+        if self.store is not None:
+            absolute(self.store)

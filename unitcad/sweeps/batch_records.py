@@ -34,7 +34,7 @@ class JournalEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Result of one variant; `same_as` is the index of an earlier, equal variant, whose result it shares.
 
     `values` are those that were swept, `row` those that came out; `manifest` is the SHA-256 of its manifest.json.
-    `record` is where a store has its files.
+    `record` is if a store has its files.
     """
 
     index: int
@@ -58,7 +58,7 @@ class Failure(Struct, frozen=True):
 
 
 class Summary(Struct):
-    """Outcome of a batch: variants by what became of them, geometries, seconds; `stopped` says why it ended early.
+    """Outcome of a batch: variants by outcome, geometries, seconds; `stopped` says why it ended early.
 
     `resumed` counts variants that an earlier run finished, and those that equal another one.
     """

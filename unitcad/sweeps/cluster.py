@@ -51,7 +51,7 @@ def check_certificates(certificates: Certificates, scheduler: str | None) -> Non
 def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple[Executor, int]:
     """Connect to a Dask cluster; return its executor, and how many tasks it runs at once.
 
-    Raises UnitcadError without the extra, for certificates that can't be used, or where no scheduler answers in time.
+    Raises UnitcadError without the extra, for certificates that can't be used, or if no scheduler answers in time.
     """
     try:
         from distributed import Client

@@ -1,4 +1,4 @@
-"""Where a batch's results go, as its parent sees it: folders on this disk, or a store that workers write to."""
+"""Destinations of a batch's results, as its parent sees them: folders on this disk, or a store of the workers."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ class Destination(Protocol):
     """The place of a batch's results."""
 
     def stands(self, entry: JournalEntry) -> bool:
-        """Check whether what the journal says of a variant is still there."""
+        """Check whether a variant's result is still in the place that the journal states."""
         ...
 
     def damaged(self, entry: JournalEntry) -> str:
-        """Return the SHA-256 of the manifest of a result that does not stand any more, if it is to be replaced here."""
+        """Return the SHA-256 of the manifest of an outdated result, if it is to be replaced here."""
         ...
 
     def task(self, task: Task) -> Task:
-        """Return a task that says where its results go."""
+        """Return a task with the destination of its results."""
         ...
 
     def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
@@ -75,8 +75,8 @@ class InStore:
     """A store that workers write to; only rows pass through the parent.
 
     With `cache`, a folder on the disk of workers and parent, work is shared by it, else by the store. Workers that run
-    `apart`, on machines of their own, may have another disk where the parent has a folder: what they say that they
-    keep there is looked for.
+    `apart`, on machines of their own, may have another disk in place of the parent's folder: their results are looked
+    for there.
     """
 
     def __init__(self, store: SharedStore, verify: bool, cache: DiskStore | None, *, apart: bool = False) -> None:

@@ -25,13 +25,13 @@ from unitcad.spec import Spec
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import Failure, JournalEntry, Summary
+from unitcad.sweeps.insensitive_keys import swept_estimate
+from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Journal
 from unitcad.sweeps.results import FIRST, write_results, write_timings
 from unitcad.sweeps.run import MOST_FAILURES, batch_head, counted
 from unitcad.sweeps.sweep import Sweep
 from unitcad.sweeps.task import OK
-from unitcad.sweeps.unread_keys import swept_estimate
-from unitcad.sweeps.unread_keys import warnings as unread_warnings
 from unitcad.validation import from_data, put
 from unitcad.validation.fit_text import lab_fit
 
@@ -39,7 +39,7 @@ BLOCK = 1 << 15
 FREE = re.compile(r"layers\.(\d+)\.material|estimate\.frequency_hz|name|casting\..+")
 """Paths that are validated one by one: no other value decides whether theirs is accepted, without a tail end width."""
 SILICONES = re.compile(r"materials(\.|$)|estimate\.moduli")
-"""Paths that decide what a silicone's name means: beside one of them a layer's material is not independent."""
+"""Paths that decide the meaning of a silicone's name: a layer's material is not independent of them."""
 FIELDS = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
 
 
@@ -87,7 +87,7 @@ def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
         paths = [path for path in sweep.paths if path != "name"]
         columns = list(dict.fromkeys([*FIRST, *paths, "name", "design", "diameter_mm", *(f"edge_{m}" for m in models)]))
         found = swept_estimate(sweep, count)
-        summary.warnings += unread_warnings(found)
+        summary.warnings += insensitive_warnings(found)
         write_results(out, columns, lambda: _entries(sweep, blocks), head, found, options.tables, count)
         _count(summary, blocks)
         summary.seconds = round(time.perf_counter() - start, 3)
@@ -219,7 +219,7 @@ def _block(
 def _merged(units: Units, same: np.ndarray) -> Iterator[tuple[np.ndarray, Units]]:
     """Yield rows of units and these units, neighbouring layers of one silicone as one: `variant_units.merged`.
 
-    `same` (rows, N - 1) tells where a layer is of the silicone of the one inside it.
+    `same` (rows, N - 1) tells if a layer is of the silicone of the one inside it.
     """
     for pattern in np.unique(same, axis=0):
         rows = np.flatnonzero((same == pattern).all(axis=1))

@@ -1,4 +1,4 @@
-"""Where variants are made, as `concurrent.futures.Executor`: in this process, in workers, on a Dask cluster."""
+"""Executors of variants, as `concurrent.futures.Executor`: in this process, in workers, on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Workers:
 
     @contextlib.contextmanager
     def executor(self, timeout: float | None = None) -> Iterator[tuple[Executor, int]]:
-        """Yield an executor and how many tasks it runs at once; the end of the block ends what was started for it.
+        """Yield an executor and its number of tasks at once; the end of the block ends its processes.
 
         Raises Refusal or UnitcadError for an invalid combination, or a scheduler that does not answer.
         """
@@ -53,7 +53,7 @@ class Workers:
             try:
                 yield cluster, threads
             finally:
-                cluster.shutdown(wait=False)  # which takes back what is still with the scheduler
+                cluster.shutdown(wait=False)  # which cancels the tasks that the scheduler still has
         elif self.jobs == 0:
             if timeout is not None:
                 raise WrongArgument("timeout", timeout, "only a worker process can be ended in time; with -j from 1 on")

@@ -19,7 +19,7 @@ def export(
         typer.Argument(metavar="HASH...", help="The hash at the end of a variant's folder, or how it begins."),
     ],
     batch: Annotated[Path, typer.Option("--batch", help="The batch's folder.")] = Path(),
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Where the folders go; else to the batch.")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Default: the batch's folder.")] = None,
     store: Annotated[str | None, typer.Option(metavar="ADDRESS", help="The store; else the batch's.")] = None,
     where: Annotated[Path | None, typer.Option("--cache", help="The cache's folder; else the user's.")] = None,
     as_json: AsJson = False,

@@ -1,10 +1,10 @@
 """The record of finished variants: one line a variant, appended as it ends, so that a kill loses nothing.
 
-<out>/batch.lock      held while a batch runs: a second one in the same folder is refused
+<out>/batch.lock      locked while a batch runs: a second one in the same folder is refused
 <out>/journal.jsonl   a head that says which batch this is, then a line a finished variant; the last one counts
 
-Each line ends with a checksum over itself and over what the batch is. A line that was damaged, or that belongs to
-another batch, is left out, and its variant is checked again.
+Each line ends with a checksum over itself and over the batch's identity. unitcad skips damaged lines and those of
+another batch, and checks their variants again.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ LONGEST = 1 << 26
 
 
 class Journal:
-    """The journal of one output folder, open and locked; `damaged` counts the lines that were left out.
+    """The journal of one output folder, open and locked; `damaged` counts the skipped lines.
 
     `first` is the least index that there may be; `beside` are names that the folder may have from before.
-    Raises UnitcadError for a folder that isn't ours, that holds another batch, or in which a batch is running.
+    Raises UnitcadError for a folder that isn't ours, that has another batch, or in which a batch is running.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Journal:
         self._lock.release()
 
     def abandon(self) -> None:
-        """Let go of the folder, and remove what was begun in it: nothing was made."""
+        """Unlock the folder, and remove the files begun in it: nothing was made."""
         self.close()
         with contextlib.suppress(OSError):
             for path in self._begun:
@@ -100,7 +100,7 @@ class Journal:
         self.close()
 
     def own(self, index: int) -> JournalEntry | None:
-        """Return the last line of a variant as it was written; None where there is none."""
+        """Return the last line of a variant as it was written; None if there is none."""
         place = index - self._first
         if not 0 <= place < len(self._lines) or self._lines[place] == NOT_THERE:
             return None
@@ -132,7 +132,7 @@ class Journal:
     def _continues(self, path: Path) -> bool:
         """Check whether a journal is this batch's, of this version of the code; count the lines that are damaged.
 
-        Raises UnitcadError where the folder holds another batch.
+        Raises UnitcadError if the folder has another batch.
         """
         if path.is_symlink() or not path.is_file():
             raise UnitcadError(f"{path}: is not a file; choose another folder with -o")
@@ -156,7 +156,7 @@ class Journal:
         return True
 
     def _entries(self, path: Path) -> Iterator[tuple[bytes, JournalEntry]]:
-        """Yield the lines below the head that are whole, and what they hold."""
+        """Yield the whole lines below the head, and their entries."""
         with open(path, "rb") as file:
             file.readline(LONGEST)
             for line in _lines(file):
@@ -166,7 +166,7 @@ class Journal:
 
 
 def batch_in(out: Path) -> str | None:
-    """Return the identity of the batch whose journal is in a folder; None where there is none, or a damaged one."""
+    """Return the identity of the batch whose journal is in a folder; None if there is none, or a damaged one."""
     try:
         with open(out / JOURNAL, "rb") as file:
             head = _head(file.readline(LONGEST))
@@ -198,7 +198,7 @@ def _packed(data: dict[str, Any], seed: int) -> bytes:
 
 
 def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
-    """Return the data of a line; None where it is damaged or of another batch."""
+    """Return the data of a line; None if it is damaged or of another batch."""
     text, _, _ = line.rpartition(b', "crc": "')
     if line != text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed):
         return None
@@ -206,7 +206,7 @@ def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
 
 
 def _entry(line: bytes, seed: int) -> JournalEntry | None:
-    """Return the entry in a line; None where it is damaged, or holds something else."""
+    """Return the entry in a line; None if it is damaged, or something else."""
     data = _unpacked(line, seed)
     try:
         return None if data is None else convert(data, JournalEntry)
@@ -215,7 +215,7 @@ def _entry(line: bytes, seed: int) -> JournalEntry | None:
 
 
 def _head(line: bytes) -> dict[str, Any] | None:
-    """Return a journal's head; None where the line is none. Version 1 has no checksum."""
+    """Return a journal's head; None if the line is none. Version 1 has no checksum."""
     head = _unpacked(line, 0)
     if head is None:
         try:
@@ -228,7 +228,7 @@ def _head(line: bytes) -> dict[str, Any] | None:
 
 def _another(out: Path, name: str) -> UnitcadError:
     return UnitcadError(
-        f"{out}: holds another batch ({name}, or the same with other values or options); "
+        f"{out}: has another batch ({name}, or the same with other values or options); "
         "choose another folder with -o, or delete it"
     )
 
@@ -256,9 +256,9 @@ def _check_free(out: Path, head: BatchHead, beside: Collection[str]) -> None:
     if all(path.name == LOCK or path.name in beside for path in out.iterdir()):
         return
     if any(out.glob(SHARDS)):
-        raise UnitcadError(f"{out}: holds shards, which unitcad batch merge joins; else choose another folder with -o")
+        raise UnitcadError(f"{out}: has shards, which unitcad batch merge joins; else choose another folder with -o")
     if not (out / LOCK).exists():
-        raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")
+        raise UnitcadError(f"{out}: has files that are no batch's result; choose another folder with -o")
     try:
         there = files.read_json(out / TABLE, largest=files.LARGEST_TABLE, links=False)
         name, same = there["name"], there["batch"] == head.batch

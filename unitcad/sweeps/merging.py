@@ -12,23 +12,23 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import ADDRESS, STORE
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import JournalEntry, Summary
+from unitcad.sweeps.insensitive_keys import swept_estimate
+from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Journal
 from unitcad.sweeps.result_folders import folders_wanted, lost, make_folders
 from unitcad.sweeps.results import columns_of, write_results
 from unitcad.sweeps.run import count_entry
 from unitcad.sweeps.shards import ShardRecord, read_shards, shard_folders
 from unitcad.sweeps.store_address import found_at, note_store
-from unitcad.sweeps.unread_keys import swept_estimate
-from unitcad.sweeps.unread_keys import warnings as unread_warnings
-from unitcad.text import listed
+from unitcad.text import some
 
 
 def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     """Put the shards in `folders` together as one batch in `out`: its journal, its tables and, if wanted, its folders.
 
     The result is that of the same sweep without shards. Of `options` those of folders, tables and cache count. Raises
-    UnitcadError where shards are missing, not finished, or of different batches, and where their store has lost
-    something; nothing new is then left in `out`.
+    UnitcadError if shards are missing, unfinished, or of different batches, or if their store has lost content; `out`
+    is then unchanged.
     """
     start = time.perf_counter()
     shards = read_shards(folders)
@@ -39,7 +39,7 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     wanted = folders_wanted(options, first.variants)
     if len(opened) > 1 and not wanted:
         raise UnitcadError(
-            f"the shards have their results in {len(opened)} stores, {', '.join(sorted(opened))}, and a batch has one; "
+            f"the shards have their results in {len(opened)} stores, {some(sorted(opened))}, and a batch has one; "
             "merge with --folders"
         )
     _expect_finished(shards, stores)
@@ -67,7 +67,7 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
             finally:
                 cache.close()
         found = swept_estimate(first.sweep, first.variants) if "estimate" in first.head.outputs else None
-        summary.warnings += unread_warnings(found)
+        summary.warnings += insensitive_warnings(found)
         write_results(
             out, columns_of(first.sweep, journal), journal.entries, first.head, found, options.tables, first.variants
         )
@@ -91,7 +91,7 @@ def _opened(folder: Path, record: ShardRecord) -> Journal:
 def _maker(*records: ShardRecord) -> str:
     numbers = [f"{record.number}/{record.of}" for record in records]
     each = "each of " if len(numbers) > 1 else ""
-    return f"the sweep with {each}--shard {listed(numbers)} and"
+    return f"the sweep with {each}--shard {some(numbers)} and"
 
 
 def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping[Path, SharedStore]) -> None:
@@ -101,7 +101,7 @@ def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping
     for folder, record in shards:
         store = stores[folder]
         missing = list[int]()
-        needed: dict[str, tuple[JournalEntry, int]] = {}  # of each pack: its first variant, and where its last one ends
+        needed: dict[str, tuple[JournalEntry, int]] = {}  # of each pack: its first variant, and the end of its last one
         with _opened(folder, record) as part:
             for index in record.indices:
                 entry = part.own(index)

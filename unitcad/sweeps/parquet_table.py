@@ -25,7 +25,7 @@ def can_write() -> bool:
 
 
 def write_parquet(path: Path, head: Values, columns: list[str], rows: Callable[[], Iterable[Values]]) -> None:
-    """Write rows, read twice: a column's type is that of all its values, text (JSON) where they have several.
+    """Write rows, read twice: a column's type is that of all its values, text (JSON) if they have several.
 
     Raises Missing without the extra, OSError.
     """
@@ -63,7 +63,7 @@ def _kind(value: Any) -> str:
 
 
 def _of(kinds: set[str]) -> str:
-    """Return the one kind of a column's values; "other" where there is none."""
+    """Return the one kind of a column's values; "other" if there is none."""
     if kinds == {"int", "float"}:
         return "float"
     return next(iter(kinds)) if len(kinds) == 1 else "text" if not kinds else "other"

@@ -11,14 +11,13 @@ from unitcad.errors import Refusal
 from unitcad.rooms import load
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
-from unitcad.text import listed
 from unitcad.validation import compound_kind
 
 
-def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
+def check_path(path: str, base: dict[str, Any], place: str = "sweep") -> None:
     """Refuse a path that no spec has, or that names a list entry which `base` (a spec's data) lacks.
 
-    `where` is the table of the sweep file that has it. "layers.0.wall_mm", "estimate.frequency_hz" and whole tables
+    `place` is the table of the sweep file that has it. "layers.0.wall_mm", "estimate.frequency_hz" and whole tables
     ("fpcb", "layers") are paths.
     """
     kind: Any = _kind(base)
@@ -28,7 +27,7 @@ def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
         table, entry = table_in(kind), entry_in(kind)
         if table is not None:
             if step not in fields_of(table):
-                raise _unknown(path, base, where)
+                raise _unknown(path, base, place)
             kind = fields_of(table)[step].type
         elif entry is not None:
             there = node if isinstance(node, list) else []
@@ -40,7 +39,7 @@ def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
         elif any(typing.get_origin(k) is dict or k is Any for k in alternatives(kind)):
             return
         else:
-            raise _unknown(path, base, where)
+            raise _unknown(path, base, place)
         node = node[int(step)] if isinstance(node, list) else node.get(step) if isinstance(node, dict) else None
 
 
@@ -48,7 +47,7 @@ def _entries(count: int) -> str:
     """Say how the entries of a list are numbered."""
     if count < 2:
         return "its only one is 0" if count else "it is empty"
-    return f"they are {listed(map(str, range(count)))}"
+    return f"they are 0 to {count - 1}"
 
 
 def known_paths(base: dict[str, Any]) -> list[str]:
@@ -72,8 +71,8 @@ def _walk(kind: Any, prefix: str, node: Any) -> Iterator[str]:
             yield from _walk(entry, f"{prefix}{i}.", below)
 
 
-def _unknown(path: str, base: dict[str, Any], where: str) -> Refusal:
+def _unknown(path: str, base: dict[str, Any], place: str) -> Refusal:
     known = known_paths(base)
     begun = sorted((name for name in known if path and name.startswith(path)), key=len)
     close = begun or difflib.get_close_matches(path, known, n=1, cutoff=0.0)
-    return Refusal(f"{where}.{path}", path, "there is no such path in a spec", close[0] if close else None)
+    return Refusal(f"{place}.{path}", path, "there is no such path in a spec", close[0] if close else None)

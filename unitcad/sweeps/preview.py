@@ -11,12 +11,12 @@ from unitcad.pipeline.plan import body_key, checked_outputs, groups
 from unitcad.pipeline.subjects import subject
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import Preview, RefusedVariant
+from unitcad.sweeps.insensitive_keys import swept_estimate
+from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.result_folders import folders_wanted
 from unitcad.sweeps.results import tables_of
 from unitcad.sweeps.run import NEXT, counted
 from unitcad.sweeps.sweep import Sweep
-from unitcad.sweeps.unread_keys import swept_estimate
-from unitcad.sweeps.unread_keys import warnings as unread_warnings
 
 LOOKED_AT = 20_000
 """Variants whose geometry is worked out; of a larger sweep the rest is estimated in proportion."""
@@ -30,8 +30,8 @@ ROW_BYTES = {"csv": 100, "json": 300, "parquet": 8}
 def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     """Count variants, distinct geometries and parts, files and megabytes: of a shard its own, if one is asked for.
 
-    Every variant that is looked at is validated; `refused` holds the first ones that are refused. Raises UnitcadError
-    where all are.
+    Every counted variant is validated; `refused` has the first refusals. Raises UnitcadError
+    if all are.
     """
     only = checked_outputs(options.only)
     whole = counted(sweep, options.limit)
@@ -65,7 +65,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
         linked = (shared + own) * variants
         if folders_wanted(options, count):
             files, stored = each * variants, shared * number + own * variants
-        else:  # a store's: what a geometry's variants share, and packs of their records
+        else:  # a store's: the shared contents of a geometry, and packs of its records
             files, stored = (contents + 1) * number + variants / NEXT, shared * number + packed * variants
     rows = sum(ROW_BYTES[name] for name in tables) * count
     return Preview(
@@ -78,7 +78,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
         linked_mb=round((linked + rows) / 1e6, 3),
         refused_count=round(len(refused) * share),
         refused=refused[:MOST_REFUSED],
-        warnings=unread_warnings(swept_estimate(sweep, whole)) if "estimate" in only else [],
+        warnings=insensitive_warnings(swept_estimate(sweep, whole)) if "estimate" in only else [],
     )
 
 

@@ -1,6 +1,6 @@
-"""Results in a shared store: a record of each variant, several in one pack, and what variants of a geometry share.
+"""Results in a shared store: a record of each variant, several in one pack, and the shared contents of a geometry.
 
-A record holds a variant's own files and the SHA-256 of those that it shares: about 3 kB, deflated, or 15 with an
+A record has a variant's own files and the SHA-256 of those that it shares: about 3 kB, deflated, or 15 with an
 estimate. The variants of one task make one pack: an object store charges by the request.
 """
 
@@ -39,7 +39,7 @@ class _Record(msgspec.Struct, frozen=True):
 
 
 def pack(store: SharedStore, products: Sequence[Product]) -> list[RecordPlace]:
-    """Write the records of some products as one pack; return where each of them lies. Raises OSError."""
+    """Write the records of some products as one pack; return the place of each. Raises OSError."""
     if not products:
         return []
     records = [
@@ -57,8 +57,8 @@ def pack(store: SharedStore, products: Sequence[Product]) -> list[RecordPlace]:
 def read_record(store: SharedStore, place: RecordPlace) -> tuple[Product, str]:
     """Return the product at a place, without its manifest as data, and the code that made it.
 
-    Raises MissingContent where it is not there or damaged, UnitcadError for a record that names a file outside its
-    folder, OSError where the store can't be reached.
+    Raises MissingContent if it is not there or damaged, UnitcadError for a record that names a file outside its
+    folder, OSError if the store can't be reached.
     """
     packed = store.part(place.pack, place.start, place.end, place.sha256)
     record = msgspec.msgpack.decode(zlib.decompress(packed), type=_Record)
@@ -76,7 +76,7 @@ def export(
     cache: DiskStore,
     placing: Callable[[Path], AbstractContextManager[Path]] = replacing,
 ) -> None:
-    """Make a variant's folder from its record; files that it shares are links to `cache`, which keeps what comes in.
+    """Make a variant's folder from its record; files that it shares are links to `cache`, which gets new contents.
 
     `placing` yields the fresh folder that takes the place of `folder`.
     Raises MissingContent for what the store lacks, UnitcadError for a folder that is none, OSError.
@@ -92,7 +92,7 @@ def export(
 
 
 def intact(store: SharedStore, place: RecordPlace, manifest: str) -> bool:
-    """Compare the hash of everything that a variant's folder would hold; `manifest` is that of its manifest.json."""
+    """Compare the hash of everything that a variant's folder would contain; `manifest` is that of its manifest.json."""
     try:
         product, _ = read_record(store, place)
         if digest(product.own["manifest.json"]) != manifest:
@@ -116,12 +116,12 @@ def known_bundle(store: SharedStore, geometry: str) -> Bundle | None:
 
 
 def offer_bundle(store: SharedStore, geometry: str, bundle: Bundle, *, anew: bool = False) -> bool:
-    """Write a geometry's bundle once its contents are there; False where another worker was first."""
+    """Write a geometry's bundle once its contents are there; False if another worker was first."""
     return store.enter(_key(geometry), vars(bundle), anew=anew)
 
 
 def packed_specs(store: SharedStore, specs: Sequence[str]) -> bytes | str:
-    """Return specs deflated; the SHA-256 under which the store has them where they are large."""
+    """Return specs deflated; the SHA-256 under which the store has them if they are large."""
     deflating = zlib.compressobj(9, zdict=_dictionary())
     packed = deflating.compress(msgspec.json.encode(list(specs))) + deflating.flush()
     return packed if len(packed) <= LARGEST_SPECS * len(specs) else store.keep(packed)
@@ -135,13 +135,13 @@ def unpacked_specs(store: SharedStore, packed: bytes | str) -> list[str]:
 
 @cache
 def store_at(address: str) -> SharedStore:
-    """Return the process's store at an address: it knows what it has written there."""
+    """Return the process's store at an address: it knows its own writes."""
     return SharedStore(address)
 
 
 @cache
 def _dictionary() -> bytes:
-    """Return the text of a spec like most: one that is deflated against it has little more than what differs."""
+    """Return the text of a typical spec: deflated against it, other specs are little more than their differences."""
     return msgspec.json.encode([subject_of_data(read(default_template())).text])
 
 

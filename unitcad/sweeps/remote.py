@@ -15,13 +15,13 @@ from unitcad.sweeps.task import Task, VariantOutcome
 
 
 class Receiver(Folders):
-    """Folders of what remote workers return: contents once each, and by geometry what need not be made again."""
+    """Folders of the results of remote workers: each content once, and the reusable files of each geometry."""
 
     def task(self, task: Task) -> Task:
         return replace(task, known=self.known(task.geometry))
 
     def known(self, geometry: str) -> Bundle | None:
-        """Return the bundle of a geometry, or None where any of it is missing."""
+        """Return the bundle of a geometry, or None if any of it is missing."""
         bundle = self.store.peek(_key(geometry))
         if bundle is None or not all(map(self.store.has, bundle["files"].values())):
             return None

@@ -1,4 +1,4 @@
-"""Which destination a batch has, and folders made from what is in a store."""
+"""The destination of a batch, and folders made from a store."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ FOLDERS_BELOW = 1000
 
 
 def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskStore, remote: bool) -> Destination:
-    """Return where the results of a batch in `out` go. Raises UnitcadError for a store that can't be used.
+    """Return the destination of a batch in `out`. Raises UnitcadError for a store that can't be used.
 
-    Without folders a batch goes on in the store that an earlier run of it noted, unless another one is asked for.
+    Without folders a batch reuses the store that an earlier run noted, unless another one is given.
     """
     address = options.store
     if address is None and not folders_wanted(options, variants):
@@ -49,7 +49,7 @@ def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskS
 
 
 def _kept(out: Path) -> SharedStore | None:
-    """Return the store of a batch's earlier run; None where there is none, or it can't be reached."""
+    """Return the store of a batch's earlier run; None if there is none, or it can't be reached."""
     with contextlib.suppress(UnitcadError):
         return _store_of(out)
     return None
@@ -75,7 +75,7 @@ def make_folders(
 ) -> None:
     """Make the folders in `out` that are not there, or not whole, of variants that are in a store; `then` gets each.
 
-    Raises UnitcadError for what the store has lost, which the `maker` makes again, OSError.
+    Raises UnitcadError for lost contents, which the `maker` makes again, and OSError.
     """
     done: set[str] = set()
     with files.scratch(out) as scratch:
@@ -94,7 +94,7 @@ def make_folders(
 
 def lost(entry: JournalEntry, error: MissingContent, maker: str = _BATCH) -> UnitcadError:
     """Return the error for a variant whose record or content a store has lost; the `maker` makes it again."""
-    return UnitcadError(f"variant {entry.index}: {error}; {maker} --verify makes again what is missing")
+    return UnitcadError(f"variant {entry.index}: {error}; {maker} --verify makes missing contents again")
 
 
 def export_variants(
@@ -102,9 +102,9 @@ def export_variants(
 ) -> Iterator[Path]:
     """Make the folders of some variants of a batch below `out`, by their hashes or how those begin; yield each.
 
-    All are looked up before the first one is made. The store is that of the batch, else the one at `address`. Raises
-    WrongArgument for a hash that no variant has, or several; UnitcadError for a batch without a store, and for what
-    the store has lost; OSError.
+    All are looked up before the first one is made. The store is that of the batch; default: the one at `address`.
+    Raises WrongArgument for a hash that no variant has, or several; UnitcadError for a batch without a store, and for
+    lost contents; OSError.
     """
     wanted = [_stored(batch, each) for each in hashes]
     store = _store_of(batch, address)
@@ -121,7 +121,7 @@ def export_variants(
 def stored_spec(batch: Path, folder: str) -> str:
     """Return the spec of a variant of a batch that has no folder for it, as text, from the batch's store.
 
-    Raises UnitcadError where no variant has a folder of that name, and for what the store has lost; OSError.
+    Raises UnitcadError if no variant has a folder of that name, and for lost contents; OSError.
     """
     if not (batch / JOURNAL).is_file():
         raise WrongArgument("folder", folder, f"{batch} is not the folder of a batch")
@@ -132,7 +132,7 @@ def stored_spec(batch: Path, folder: str) -> str:
 
 
 def _stored(batch: Path, wanted: str) -> tuple[JournalEntry, RecordPlace]:
-    """Return a variant's line of the journal, and where its record is in the store."""
+    """Return a variant's line of the journal, and the place of its record in the store."""
     entry = _entry_of(batch, wanted)
     if entry.record is None:
         raise UnitcadError(f"{batch / entry.folder}: this variant is not in a store, its folder is its result")

@@ -15,10 +15,10 @@ from msgspec import to_builtins
 from unitcad import files
 from unitcad.report.batch_table import CSV, JSON, PARQUET
 from unitcad.sweeps.batch_records import BatchHead, JournalEntry, Summary, Values
+from unitcad.sweeps.insensitive_keys import SweptEstimate
 from unitcad.sweeps.journal import Journal
 from unitcad.sweeps.parquet_table import can_write, write_parquet
 from unitcad.sweeps.sweep import Sweep
-from unitcad.sweeps.unread_keys import SweptEstimate
 from unitcad.text import cell
 
 TABLES = {"csv": CSV, "json": JSON, "parquet": PARQUET}
@@ -38,7 +38,7 @@ def write_results(
 ) -> None:
     """Write the tables `asked` for (names of TABLES), and those that are there from before.
 
-    With None these are CSV and JSON below MOST_ROWS `variants`, else Parquet where its extra is installed. `entries`
+    With None these are CSV and JSON below MOST_ROWS `variants`, otherwise Parquet if its extra is installed. `entries`
     gives the variants in the sweep's order, one at a time. Raises Missing for Parquet without the extra, OSError.
     """
     asked = tables_of(variants, asked)
@@ -61,7 +61,7 @@ def tables_of(variants: int, asked: Collection[str] | None) -> Collection[str]:
 
 
 def write_timings(out: Path, summary: Summary, workers: int) -> None:
-    """Write what this run did and how fast: not part of what is the same from run to run."""
+    """Write the counts and times of this run, which differ between runs."""
     timings = {key: value for key, value in to_builtins(summary).items() if key not in ("failures", "warnings")}
     fresh = summary.done - summary.resumed
     timings["variants_per_second"] = round(fresh / summary.seconds, 2) if summary.seconds else None
@@ -69,7 +69,7 @@ def write_timings(out: Path, summary: Summary, workers: int) -> None:
 
 
 def columns_of(sweep: Sweep, journal: Journal) -> list[str]:
-    """Return the columns: first those of every batch, then what was swept, then what came out as rows name it."""
+    """Return the columns: first those of every batch, then the swept paths, then the results."""
     columns: dict[str, None] = dict.fromkeys(FIRST)
     columns.update(dict.fromkeys(path for path in sweep.paths if path != "name"))
     for entry in journal.entries():

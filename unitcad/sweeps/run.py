@@ -24,6 +24,8 @@ from unitcad.sweeps import task as tasks
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import BatchHead, Failure, JournalEntry, Summary
 from unitcad.sweeps.destination import Destination, InStore
+from unitcad.sweeps.insensitive_keys import swept_estimate
+from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import JOURNAL, Journal
 from unitcad.sweeps.result_folders import destination_of, folders_wanted, make_folders
 from unitcad.sweeps.results import columns_of, write_results, write_timings
@@ -31,8 +33,6 @@ from unitcad.sweeps.shards import Shard, ShardRecord, write_shard
 from unitcad.sweeps.store_address import noted
 from unitcad.sweeps.sweep import MOST, Sweep
 from unitcad.sweeps.task import Job, Task, VariantOutcome
-from unitcad.sweeps.unread_keys import swept_estimate
-from unitcad.sweeps.unread_keys import warnings as unread_warnings
 from unitcad.workers import WorkerEnded
 
 WINDOW = 2048
@@ -62,8 +62,8 @@ def run(
     """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
 
     `executor`, of that many `workers`, is the caller's to shut down. With `remote` its workers don't share this disk:
-    results come back as messages. What an earlier run in `out` finished is not made again. Raises UnitcadError where
-    nothing can be run; whatever happens to a variant is in the summary.
+    results come back as messages. Variants that an earlier run in `out` finished are not made again. Raises
+    UnitcadError if nothing can be run; the summary has the outcome of each variant.
     """
     head = batch_head(sweep, checked_outputs(options.only), options)
     count = counted(sweep, options.limit)
@@ -93,7 +93,7 @@ def run(
             make_folders(out, journal.entries(), destination.store, cache)
         estimated = "estimate" in head.outputs and not options.shard  # of a shard nothing can be said
         found = swept_estimate(sweep, summary.variants) if estimated else None
-        summary.warnings += unread_warnings(found)
+        summary.warnings += insensitive_warnings(found)
         columns = columns_of(sweep, journal)
         write_results(out, columns, journal.entries, head, found, options.tables, count)  # those of a shard are parts
         summary.seconds = round(time.perf_counter() - start, 3)
@@ -181,9 +181,9 @@ class _Batch:
             self._collect()
 
     def _to_make(self) -> Iterator[tuple[int, JournalEntry | None]]:
-        """Yield the variants that are not finished, with what the journal has of them.
+        """Yield the unfinished variants, with their entries of the journal.
 
-        What failed before comes last: a batch that stops at a failure has made all others by then.
+        Variants that failed before come last: a batch that stops at a failure has made all others by then.
         """
         failed: list[int] = []
         for index in self.indices:
@@ -201,7 +201,7 @@ class _Batch:
         """Bring up to STEP variants into the window; return whether more may follow.
 
         Those that are refused or equal to another one are noted at once. A shard fills the whole window, since it
-        chooses where in it to begin.
+        chooses its first variant in it.
         """
         for _ in range(WINDOW if self.options.shard else STEP):
             if self.waiting >= WINDOW or self.summary.stopped:
@@ -238,7 +238,7 @@ class _Batch:
             self.running[self.executor.submit(tasks.work, self.destination.task(task))] = task
 
     def _next(self) -> tuple[str, list[Job]] | None:
-        """Choose a variant to try again alone; else a geometry not yet made; else more of one that is."""
+        """Choose a variant to repeat by itself; else a geometry not yet made, else more of one that is."""
         if self.again:
             key, job = self.again.popleft()
             return key, [job]
@@ -254,7 +254,7 @@ class _Batch:
         return key, jobs
 
     def _collect(self, at_once: bool = False) -> None:
-        """Take up what is done; wait for the first, or with `at_once` for none."""
+        """Collect finished tasks; wait for the first, or with `at_once` for none."""
         for future in wait(list(self.running), 0 if at_once else None, return_when="FIRST_COMPLETED").done:
             task = self.running.pop(future)
             group = self.groups.get(task.geometry)
@@ -262,7 +262,7 @@ class _Batch:
                 outcomes = tasks.outcomes(future.result())
             except WorkerEnded as error:
                 self._lost(task, error)
-            except UnitcadError:  # with NoWorker: where no worker can start, none of the others can be made either
+            except UnitcadError:  # with NoWorker: if no worker can start, none of the others can be made either
                 raise
             except (Exception, CancelledError) as error:
                 self._lost(task, error)
@@ -283,7 +283,7 @@ class _Batch:
             trim(self.options)
 
     def _lost(self, task: Task, error: BaseException) -> None:
-        """Handle a task whose worker ended: each of its variants is tried alone, to see which one ended it."""
+        """Handle a task whose worker ended: each of its variants is tried by itself, to find the one that ended it."""
         if isinstance(error, CancelledError):
             raise UnitcadError(f"lost the scheduler after {self.summary.done} variants; the same command resumes")
         self.lost = True
@@ -346,7 +346,7 @@ def count_entry(summary: Summary, status: str, entry: Callable[[], JournalEntry 
 
 
 def shard_record(out: Path, sweep: Sweep, head: BatchHead, options: BatchOptions, count: int) -> ShardRecord:
-    """Return what the folder of a shard says of it: the head is that of the batch without shards."""
+    """Return the head of a shard's journal: that of the batch without shards."""
     assert options.shard
     whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
     return ShardRecord(
@@ -362,7 +362,7 @@ def shard_record(out: Path, sweep: Sweep, head: BatchHead, options: BatchOptions
 
 
 def _turn(shard: Shard | None) -> float:
-    """Return where in the window a shard begins: shards that begin together then make different geometries."""
+    """Return a shard's first place in the window: shards that start together then make different geometries."""
     return (shard.number - 1) / shard.of if shard else 0.0
 
 

@@ -1,7 +1,7 @@
 """Shards of a sweep: consecutive parts with a parent and a journal each, and one batch put together of them.
 
 <out>/store                   the store of all shards, unless another one is named
-<out>/shard-03-of-16/         a batch of its own, and shard.json, which says of what it is a part
+<out>/shard-03-of-16/         a batch of its own, and shard.json, which names the whole
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from unitcad.sweeps.batch_records import BatchHead
 from unitcad.sweeps.journal import SHARDS, batch_in
 from unitcad.sweeps.store_address import found_at
 from unitcad.sweeps.sweep import Sweep
+from unitcad.text import some
 
 RECORD = "shard.json"
 MOST_SHARDS = 9999
@@ -95,12 +96,12 @@ def shard_folders(out: Path) -> list[Path]:
 def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | None) -> str:
     """Return the address of the store of all shards in `out`: the one `asked` for, the shard's or the others', or new.
 
-    What a merge would refuse is refused before anything is made: raises UnitcadError where `out` holds another batch
-    than this one of so many variants, shards of another number, finished or not, or shards with another store.
+    Refuses early what a merge would refuse: raises UnitcadError if `out` has another batch than this one of so many
+    variants, shards of another number, or shards with another store.
     """
     held = batch_in(out)
     if held not in (None, batch):
-        raise UnitcadError(f"{out}: holds another batch, so shards can not be merged there; choose another with -o")
+        raise UnitcadError(f"{out}: has another batch, so shards can not be merged there; choose another with -o")
     kept, own = None, out / shard.folder
     if asked is None and (begun := _record(own)) is not None:
         asked = found_at(own, begun.store)
@@ -108,7 +109,7 @@ def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | No
         of = int(other.name.rpartition("-")[2])
         if of != shard.of:
             raise UnitcadError(
-                f"{out}: holds shards of {of} ({other.name}), with which one of {shard.of} can't be merged; go on with "
+                f"{out}: has shards of {of} ({other.name}), with which one of {shard.of} can't be merged; go on with "
                 f"--shard K/{of}, or choose another folder with -o"
             )
         if other == own or (record := _record(other)) is None:
@@ -128,7 +129,7 @@ def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | No
 
 
 def _record(folder: Path) -> ShardRecord | None:
-    """Return a shard's record; None where there is none yet, or a damaged one, which a merge names."""
+    """Return a shard's record; None if there is none yet, or a damaged one, which a merge names."""
     try:
         return _read(folder)
     except (UnitcadError, msgspec.MsgspecError):
@@ -143,10 +144,10 @@ def _read(folder: Path) -> ShardRecord:
 def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     """Return the records of all shards of one batch, in order.
 
-    Raises UnitcadError where one is missing, there twice, or of another batch.
+    Raises UnitcadError if one is missing, there twice, or of another batch.
     """
     if not folders:
-        raise UnitcadError("there are no shards to merge: name their folders, or the folder that holds them")
+        raise UnitcadError("there are no shards to merge: name their folders, or their common parent")
     records: dict[int, tuple[Path, ShardRecord]] = {}
     for folder in folders:
         try:
@@ -172,7 +173,7 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     of = next(iter(records.values()))[1].of
     missing = [number for number in range(1, of + 1) if number not in records]
     if missing:
-        named = ", ".join(f"{number}/{of}" for number in missing[:5]) + (" ..." if len(missing) > 5 else "")
+        named = some((f"{number}/{of}" for number in missing), 5)
         are = "is" if len(missing) == 1 else "are"
         them = "it" if len(missing) == 1 else "them"
         raise UnitcadError(f"{len(missing)} of {of} shards {are} missing: {named}; run {them} with --shard, then merge")

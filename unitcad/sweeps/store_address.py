@@ -1,4 +1,4 @@
-"""Where a batch's store is, as its folder notes it: by a way from the folder where both can be moved together."""
+"""The place of a batch's store, noted in its folder: relative to the folder if both can be moved together."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from unitcad.pipeline.write import ADDRESS, STORE
 
 
 def note_store(out: Path, address: str) -> None:
-    """Write into a batch's folder where its store is. Raises OSError."""
+    """Note the store's place in a batch's folder. Raises OSError."""
     files.write(out / ADDRESS, json.dumps({"store": noted(out, address)}).encode() + b"\n")
 
 
 def noted(out: Path, address: str) -> str:
-    """Return a store's address as a batch in `out` notes it: beside the batch or in it, so that both can be moved."""
+    """Return a store's address as a batch in `out` notes it: relative if near the batch, so that both can move."""
     near = {str((place / STORE).absolute()): way for place, way in ((out, STORE), (out.parent, f"../{STORE}"))}
     return near.get(address, address)
 
@@ -28,7 +28,7 @@ def found_at(out: Path, address: str) -> str:
 
 
 def store_noted(out: Path) -> str | None:
-    """Return the address of the store that a batch's folder notes, None where it notes none. Raises UnitcadError."""
+    """Return the address of the store that a batch's folder notes, None if it notes none. Raises UnitcadError."""
     if not (out / ADDRESS).is_file():
         return None
     return found_at(out, str(files.read_json(out / ADDRESS)["store"]))

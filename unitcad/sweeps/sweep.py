@@ -1,7 +1,7 @@
 """The sweep file: which specs, over which values. Variants are expanded one at a time.
 
-base = "unit.toml"                        # a template, a spec file beside this one, or a list of them
-name = "walls"                            # else the file's name
+base = "unit.toml"                        # a template, a spec file next to this one, or a list of them
+name = "walls"                            # default: the file's name
 [set]                                     # the same for every variant
 "output.formats" = ["stl"]
 [sweep]
@@ -31,6 +31,7 @@ from unitcad.rooms import load
 from unitcad.spec import check_plain, convert, read_toml
 from unitcad.spec.fields import fields_of
 from unitcad.sweeps.paths import check_path
+from unitcad.text import some
 from unitcad.validation import compound_kind, confirm_known, every_template, override, put, read
 from unitcad.validation.load import all_faults
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files
@@ -65,14 +66,25 @@ class Range(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SweepFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A sweep as typed: `from_file` validates `fixed` and the paths of `sweep`."""
+    """A sweep: which specs, over which values."""
 
-    base: str | Annotated[list[str], Meta(min_length=1)]
-    name: Annotated[str, Meta(min_length=1, max_length=60)] | None = None
+    base: Annotated[
+        str | Annotated[list[str], Meta(min_length=1)],
+        Meta(description="a template, a spec or array file next to this one (./mine.toml), or a list of them"),
+    ]
+    name: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=60)] | None,
+        Meta(description="a name of the sweep; default: that of the file"),
+    ] = None
     fixed: Annotated[dict[str, Any], Meta(description="values by path, the same for every variant")] = field(
         name="set", default_factory=dict
     )
-    sweep: Annotated[dict[str, Any], Meta(description="values by path", extra_json_schema={"properties": _KEYS})]
+    sweep: Annotated[
+        dict[str, Any],
+        Meta(
+            description="mode (product, zip or cases), and the values by path", extra_json_schema={"properties": _KEYS}
+        ),
+    ]
 
 
 class SweepTable(Struct, frozen=True):
@@ -83,7 +95,7 @@ class SweepTable(Struct, frozen=True):
 
 
 class CaseKeys(Struct, frozen=True):
-    """Keys of a case that are no paths: its base where it is not the file's first one, a name for its folder."""
+    """Keys of a case that are no paths: its base if it is not the file's first one, a name for its folder."""
 
     base: str | None = None
     name: str | None = None
@@ -104,7 +116,7 @@ class Axis:
 class Sweep:
     """A validated sweep: `bases` as (name, data); values by path for each case, or axes.
 
-    `written` are the bases that stand in a file; `fixed` the paths that the sweep, or an option, sets in every base.
+    `written` are the bases that come from a file; `fixed` the paths that the sweep, or an option, sets in every base.
     """
 
     name: str
@@ -177,7 +189,7 @@ class Sweep:
         return subject_of_data(self._data(index)).of
 
     def faults(self, index: int, first: UnitcadError) -> str:
-        """Return what is wrong with a refused variant in one line, `first` being what it was refused for."""
+        """Return the faults of a refused variant in one line; `first` is its refusal."""
         kind = compound_kind(self._data(index))
         if isinstance(first, Refusal) and kind:
             told = load(kind.subject).offered(first, self._data(index)) if index < EXPLAINED else _unoffered(first)
@@ -237,7 +249,7 @@ def load_sweep(source: str | os.PathLike[str]) -> Sweep:
 
 
 def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
-    """Return a validated sweep of a sweep file's data; `folder` is where its relative paths start."""
+    """Return a validated sweep of a sweep file's data; its relative paths start at `folder`."""
     file = convert(data, SweepFile)
     table, values = _parted(file.sweep, SweepTable, "sweep")
     typed = [_parted(case, CaseKeys, f"sweep.cases.{i}") for i, case in enumerate(table.cases)]
@@ -282,7 +294,7 @@ def _read_base(base: str, folder: Path) -> dict[str, Any]:
 def _values(path: str, given: Any, mode: Mode) -> Sequence[Any] | Range:
     """Return the values of an axis: a scalar or a table counts as one, a table with a range's keys as a range.
 
-    In a product each differs from the others. In a zip one may come again, beside another value of another axis.
+    In a product all differ. In a zip a value may repeat, combined with another value of another axis.
     """
     if isinstance(given, dict) and given.keys() & fields_of(Range).keys():
         given = convert(given, Range, f"sweep.{path}")
@@ -313,5 +325,5 @@ def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> No
         raise Refusal("sweep", None, 'the sweep is empty: it needs a path with values, such as "diameter_mm"')
     lengths = {axis.path: len(axis) for axis in axes if len(axis) > 1}
     if mode == "zip" and len(set(lengths.values())) > 1:
-        counts = ", ".join(f"{path} has {count}" for path, count in lengths.items())
+        counts = some(f"{path} has {count}" for path, count in lengths.items())
         raise Refusal("sweep.mode", "zip", f"the lists are of unequal lengths: {counts}")

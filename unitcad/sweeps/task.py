@@ -1,4 +1,4 @@
-"""The work of one task: some variants that share a geometry, one after the other. Runs where an executor puts it."""
+"""The work of one task: some variants that share a geometry, one after the other. Runs if an executor puts it."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class Task:
     """Variants of one geometry, and how to make them.
 
     With `store` (an address) results go there, and `specs` are the jobs' specs by `record_packs.packed_specs`; work is
-    then shared by `cache` where there is one, else by the store. With `out` and `cache` (folders that the worker
-    reaches) results go there. Without, they are in the outcomes, and `known` is what the caller has of this geometry.
+    then shared by `cache` if there is one, else by the store. With `out` and `cache` (folders that the worker
+    reaches) results go there. Without, they are in the outcomes, and `known` are the caller's files of this geometry.
     `allowed` is the code that the caller may run, and so may the worker.
     """
 
@@ -71,8 +71,8 @@ class Task:
 class VariantOutcome:
     """Outcome of one variant; `manifest` is the SHA-256 of its manifest.json.
 
-    `record` is where a store has the files. `product`, `contents` and `bundle` are set only where the caller places the
-    files.
+    `record` is the place of the files in a store. `product`, `contents` and `bundle` are set only if the caller places
+    the files.
     """
 
     index: int
@@ -94,7 +94,7 @@ Answer = list[VariantOutcome] | bytes
 
 
 def work(task: Task) -> Answer:
-    """Make a task's variants; return what `outcomes` takes. An error of one of them is in its outcome."""
+    """Make a task's variants; return the argument of `outcomes`. An error of one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
     custom_code.allow(task.allowed)
@@ -113,7 +113,7 @@ def outcomes(answer: Answer) -> list[VariantOutcome]:
 def _each(
     jobs: Sequence[Job], task: Task, make: Callable[[Job, Bundle | None], VariantOutcome], known: Bundle | None = None
 ) -> list[VariantOutcome]:
-    """Make each variant; an error is its outcome. `make` gets what is known of the geometry by then."""
+    """Make each variant; an error is its outcome. `make` gets the known files of the geometry."""
     done, known = [], known or task.known
     for job in jobs:
         start = time.perf_counter()
@@ -128,7 +128,7 @@ def _each(
 
 
 def _into_store(task: Task, store: SharedStore) -> list[VariantOutcome]:
-    """Make a task's variants, put what is new into the store, and return rows: when they return, all is there."""
+    """Make a task's variants, put new contents into the store, and return rows: when they return, all is there."""
     anew = any(job.damaged for job in task.jobs)
     try:
         specs = record_packs.unpacked_specs(store, task.specs)
@@ -153,6 +153,8 @@ def _delivered(job: Job, task: Task, known: Bundle | None, store: SharedStore, a
     spec = subject_of_text(job.spec)
     maker = _store(task.cache) if task.cache else MemoryStore(known)
     for left in reversed(range(TRIES)):
+        if not left:
+            maker = MemoryStore(known)  # others clear the cache all the time
         before = Counter(maker.counts)
         try:
             product = spec.make(task.only, task.check, maker, Progress())
@@ -160,8 +162,7 @@ def _delivered(job: Job, task: Task, known: Bundle | None, store: SharedStore, a
             store.keep_all([maker.content(sha) for sha in shared if anew or not store.noted(sha)], anew=anew)
             break
         except MissingContent:  # the cache is cleared meanwhile
-            if not left:
-                raise
+            continue
     outcome = _of_product(job, spec, product, maker.counts - before)
     bundle = maker.bundle() if isinstance(maker, MemoryStore) and outcome.built else None
     if bundle:
@@ -200,7 +201,7 @@ def _locally(job: Job, task: Task, out: Path, scratch: Path) -> VariantOutcome:
         return _outcome(job, spec, folder.name, manifest, _manifest_sha256(folder), Counter({"file reused": 1}))
     store = _store(task.cache)
     before = Counter(store.counts)
-    built = folders.write(folder, partial(spec.make, task.only, task.check, store), store, scratch=scratch)
+    built = folders.write(folder, partial(spec.make, task.only, task.check), store, scratch=scratch)
     return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
 
 
@@ -247,9 +248,9 @@ def _manifest_sha256(folder: Path) -> str:
 
 
 def _finished(folder: Path, spec: Subject, task: Task, damaged: str) -> Manifest | None:
-    """Return the manifest of a result that an interrupted run completed, if it is what is wanted now.
+    """Return the manifest of a result that an interrupted run completed, if it is the requested one.
 
-    Raises UnitcadError for a folder that holds something else.
+    Raises UnitcadError for a folder with something else.
     """
     if not folder.exists():
         return None
@@ -268,7 +269,7 @@ def _finished(folder: Path, spec: Subject, task: Task, damaged: str) -> Manifest
             files.read_json(folder / "timings.json", links=False).get("code") == task.code
             and set(manifest["outputs"]) == set(spec.outputs(task.only))
             and set(formats) == set(spec.formats)
-            and task.check != any(left["why"] == UNCHECKED for left in manifest["left_out"])
+            and task.check != any(left["reason"] == UNCHECKED for left in manifest["skipped"])
         )
     except (UnitcadError, KeyError, TypeError, AttributeError):
         return None

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import math
+
 from unitcad import catalogue
 from unitcad.designs import design_of
 from unitcad.designs.limits import EPS
-from unitcad.spec import Spec
+from unitcad.spec import Spec, motor_of
+from unitcad.text import number
 
 CIRCUIT_STOCK = (0.05, 0.5)
 """Usual finished thickness of a flexible circuit, mm."""
+MOST_RING_MM = 2.0
+"""Of the ring of air round a motor: twice that of the measured units."""
+GRAVITY, MOTOR_G_CM3 = 9.80665, 5.0
+"""Density of a motor whose mass no one states (assumed: coin motors have 4 to 6.5)."""
 
 
 def warnings(spec: Spec) -> list[str]:
     """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's."""
-    return [*_thin_layers(spec), *_leads(spec), *_circuit_stock(spec), *_play(spec), *_design(spec)]
+    return [*_thin_layers(spec), *_leads(spec), *_roof(spec), *_circuit_stock(spec), *_play(spec), *_design(spec)]
 
 
 def _thin_layers(spec: Spec) -> list[str]:
@@ -32,7 +39,54 @@ def _thin_layers(spec: Spec) -> list[str]:
 def _leads(spec: Spec) -> list[str]:
     if spec.fpcb or spec.wires or not design_of(spec).caps:
         return []
-    return ["no way out for the motor's leads: they lie between unit and skin; add a table [wires] or [fpcb]"]
+    offer = "add a table [wires] with diameter_mm, or [fpcb]"
+    return [f"no way out for the motor's leads: they lie between unit and skin; {offer}"]
+
+
+def _roof(spec: Spec) -> list[str]:
+    """Say where the roof spans too much air, and where the motor hangs in too wide a ring of it."""
+    if not design_of(spec).caps or spec.motor.fill:
+        return []
+    dims, close, found = design_of(spec).dimensions(spec), "motor.fill = true closes the ring", list[str]()
+    sag, hertz = roof(spec)
+    if hertz < spec.estimate.frequency_hz:
+        spans = f"caps of {sum(layer.cap_mm for layer in spec.layers):g} mm span {2 * dims.cavity_radius:g} mm of air"
+        tuned = f"the motor on them resonates near {number(hertz, 2)} Hz, below its {spec.estimate.frequency_hz:g} Hz"
+        found.append(f"{spans} and sag by {number(sag, 2)} mm; {tuned} (computed); {close}")
+    if dims.air_ring > MOST_RING_MM:
+        limit = f"{MOST_RING_MM:g} mm is twice that of any measured unit"
+        found.append(
+            f"the motor hangs in a ring of air of {dims.air_ring:g} mm; {limit}; {close}, thicker walls narrow it"
+        )
+    return found
+
+
+def roof(spec: Spec) -> tuple[float, float]:
+    """Return how far a unit's caps sag (mm), and the resonance of the motor that hangs on them (Hz).
+
+    A laminated plate clamped at the cavity's wall, pulled by its own weight and by a stiff disc of the motor's size in
+    its middle (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 1959, chapter 3); moduli are static.
+    """
+    dims, known = design_of(spec).dimensions(spec), catalogue.materials(spec.materials)
+    silicones = [known[layer.material] for layer in spec.layers]
+    thick = [layer.cap_mm / 1000 for layer in spec.layers]
+    stiff = [
+        1000 * float(each.quasistatic_modulus_kpa or each.modulus_100pct_kpa) / (1 - float(each.poisson_ratio) ** 2)
+        for each in silicones
+    ]
+    middles = [sum(thick[:i]) + thick[i] / 2 for i in range(len(thick))]
+    plies = list(zip(stiff, thick, middles, strict=True))
+    neutral = sum(e * t * z for e, t, z in plies) / sum(e * t for e, t, _ in plies)
+    rigidity = sum(e * (t**3 / 12 + t * (z - neutral) ** 2) for e, t, z in plies)
+    pressure = GRAVITY * sum(1000 * float(each.density_g_cm3) * t for each, t in zip(silicones, thick, strict=True))
+    motor = motor_of(spec)
+    can = math.pi * dims.motor_radius**2 * spec.motor.thickness_mm / 1000
+    kg = float(motor.mass_g if motor and motor.mass_g else MOTOR_G_CM3 * can) / 1000
+    span, share = dims.cavity_radius / 1000, dims.motor_radius / dims.cavity_radius
+    hung = 1 - share**2 - 4 * (share * math.log(share)) ** 2 / (1 - share**2)
+    stiffness = 16 * math.pi * rigidity / (span**2 * hung)
+    sag = GRAVITY * kg / stiffness + pressure * span**4 / (64 * rigidity)
+    return 1000 * sag, math.sqrt(stiffness / kg) / math.tau
 
 
 def _circuit_stock(spec: Spec) -> list[str]:

@@ -8,7 +8,6 @@ typed, so it is no consequence of the change.
 from __future__ import annotations
 
 import copy
-import tomllib
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -112,32 +111,3 @@ def _changes(data: dict[str, Any], refusal: Refusal, sound: dict[str, Any]) -> I
         changed = copy.deepcopy(data)
         if path and drop(changed, path):
             yield changed
-
-
-def line_of(text: str, path: str) -> int | None:
-    """Return the line, from 1, on which a TOML file says what stands at a path; of a missing key, its table's.
-
-    The first lines of a TOML file are mostly a TOML file themselves: the statement looked for ends the shortest of
-    them that has the path, and begins where the one before ends.
-    """
-    lines = text.replace("\r\n", "\n").split("\n")
-    while path and at(_parsed(lines), path) is ABSENT:
-        path = path.rpartition(".")[0]
-    if not path:
-        return None
-    low, high = 0, len(lines)
-    while high - low > 1:
-        middle = (low + high) // 2
-        ends = [*range(middle, high), *range(middle - 1, low, -1)]
-        end, head = next(((k, data) for k in ends if (data := _parsed(lines[:k])) is not None), (None, None))
-        if end is None:
-            break
-        low, high = (low, end) if at(head, path) is not ABSENT else (end, high)
-    return low + 1
-
-
-def _parsed(lines: list[str]) -> dict[str, Any] | None:
-    try:
-        return tomllib.loads("\n".join(lines))
-    except (ValueError, RecursionError):
-        return None

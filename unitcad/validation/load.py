@@ -16,9 +16,10 @@ from unitcad.rooms import FileKind, file_kinds
 from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
+from unitcad.spec.toml_lines import line_of
 from unitcad.validation.defaults import effective
 from unitcad.validation.dotted import ABSENT, at, put
-from unitcad.validation.faults import every_fault, line_of, settled
+from unitcad.validation.faults import every_fault, settled
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files, shipped_of
 from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
 
@@ -191,11 +192,11 @@ def _explained(first: Refusal, data: dict[str, Any], source: Source) -> Refusal:
 
 
 def _same(written: object, asked: object) -> bool:
-    """Tell whether what a file holds is what was asked; of what is nested too deeply to be compared, that it isn't."""
+    """Tell whether a file contains the given value; what is nested too deeply to be compared counts as the same."""
     try:
         return written is not ABSENT and written == asked
     except RecursionError:
-        return False
+        return True
 
 
 def all_faults(first: Refusal, data: Mapping[str, Any], text: str) -> list[Refusal]:

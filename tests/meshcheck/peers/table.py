@@ -1,4 +1,4 @@
-"""docs/check-peers.md: our verdicts, computed now, beside the frozen ones. `python table.py` writes it."""
+"""docs/evidence/check-peers.md: our verdicts, computed now, beside the frozen ones. `python table.py` writes it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from unitcad.meshcheck import FileReport, Options, check_file
 
 HERE = Path(__file__).parent
 CORPUS = HERE.parent.parent / "corpus"
-PAGE = HERE.parent.parent.parent / "docs" / "check-peers.md"
+PAGE = HERE.parent.parent.parent / "docs" / "evidence" / "check-peers.md"
 PEERS = ("trimesh", "admesh", "lib3mf", "PrusaSlicer")
 ASCII = "lib3mf reads binary STL only."
 ZEROS = "admesh recomputes every normal, since the stored ones are no unit vectors; the vertices stay."
@@ -60,12 +60,11 @@ def _verdict(report: FileReport) -> str:
 def page() -> str:
     """The page."""
     lines = [
-        "# Verdicts of `unitcad check` beside other programs",
+        "# `unitcad check` and other programs",
         "",
-        "numpy-stl's files (`tests/corpus`). `altered`: read, but changed or found in need of repair. Ours is computed",
-        "by the test that holds this page to the facts; the others are frozen in",
-        "`tests/meshcheck/peers/verdicts.json`, made by `make_verdicts.py` with trimesh 5.2,",
-        "admesh 0.98.4, lib3mf 2.5.0 and PrusaSlicer 2.5.0.",
+        "Verdicts on the files of numpy-stl (`tests/corpus`). `altered`: the program reads the file and changes it, or",
+        "calls it in need of repair. A test computes the column unitcad. The other columns are stored in",
+        "`tests/meshcheck/peers/verdicts.json`: trimesh 5.2, admesh 0.98.4, lib3mf 2.5.0, PrusaSlicer 2.5.0.",
         "",
         "| file | unitcad | " + " | ".join(PEERS) + " | why they differ |",
         "| --- " * (len(PEERS) + 3) + "|",
@@ -96,13 +95,13 @@ def page() -> str:
         lines.append(f"| {peer} | {counts['fail']} of 38 | {counts['pass']} of 13 |")
     lines += [
         "",
-        "Two of these samples contradict each other: an unprefixed metadata name that the specification does not know",
-        "must pass as `MustIgnore` and fail as `Undefined`. Unknown names pass; `undefined` and `null` count as none.",
+        "Two of these samples contradict each other: an unknown metadata name without prefix must pass as `MustIgnore`",
+        "and fail as `Undefined`. unitcad accepts unknown names; `undefined` and `null` count as no name.",
         "",
-        "Three choices where samples, specification and table of rules part. Self-crossing and overlapping shells",
-        "(G001, G002) are warnings in a 3MF file: the core specification (4.1) tells consumers to accept them and says",
-        "what is solid. A multiproperties group that names a texture itself is a warning, since MUSTPASS files do it.",
-        "Vertices listed apart that close the mesh by place (T006) are a warning too, as in any format.",
+        "unitcad deviates from the letter in three cases. Self-crossing and overlapping shells (G001, G002) are",
+        "warnings in a 3MF file, since the core specification (4.1) tells consumers to accept them. A multiproperties",
+        "group that names a texture is a warning, since MUSTPASS files have it. Vertices that close the mesh only by",
+        "their place (T006) are a warning, as in any format.",
         "",
     ]
     return "\n".join(lines)

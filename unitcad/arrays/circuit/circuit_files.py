@@ -51,7 +51,7 @@ def outline_path(outline: Profile) -> str:
             drawn.append(f"L{to}")
             continue
         radius = _um(arc_centre(start[:2], end[:2], start[2])[2])
-        # More than half a turn has a bulge over 1; what turns left runs against SVG's sweep, whose y points down.
+        # More than half a turn has a bulge over 1; left turns run against SVG's sweep, whose y points down.
         drawn.append(f"A{radius} {radius} 0 {int(abs(start[2]) > 1)} {int(start[2] < 0)} {to}")
     return "".join([*drawn, "Z"])
 
@@ -157,7 +157,7 @@ def kicad_board(laid: Wiring, outline: Profile) -> bytes:
 
 
 def _paper(outline: Profile) -> str:
-    """Return the least page that holds the outline and its margins."""
+    """Return the smallest page around the outline and its margins."""
     x0, y0, x1, y1 = outline.bounds
     wide, high = x1 - x0 + 2 * _CORNER_MM, y1 - y0 + 2 * _CORNER_MM
     sizes = (("A4", 297, 210), ("A3", 420, 297), ("A2", 594, 420), ("A1", 841, 594))
@@ -192,12 +192,15 @@ DXF = "circuit.dxf"
 
 
 def has_circuit(array: Array) -> bool:
-    """Tell whether one circuit joins all motors: where the units have no tails of their own."""
+    """Tell whether one circuit joins all motors, since the units have no tails of their own."""
     return not construction_of(array.construction, array.cast).own_tails
 
 
 def circuit_files(array: Array) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Return the files by their names, and why one was left out: DXF needs ezdxf. Raises Refusal as `outline`."""
+    """Return the files by their names, and the reason for a missing one: DXF needs ezdxf.
+
+    Raises Refusal as `outline`.
+    """
     if not has_circuit(array):
         return {}, {}
     laid = wiring(array)

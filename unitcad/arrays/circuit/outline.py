@@ -25,11 +25,11 @@ from unitcad.shape.profile import Vertex
 _CHORD = 0.04
 """Of an arc while it is a polygon, mm."""
 _OFF = 2e-3
-"""How far a polygon's corners may lie off the arc that takes their place, mm."""
+"""Largest distance of a polygon's corners from the arc that replaces them, mm."""
 _LEAST_SIDES = 4
 """Sides of a polygon that are taken for an arc."""
 _KEPT_OFF = 0.01
-"""What inner corners keep off silicone, mm: more than polygons and meshes are off."""
+"""Distance of inner corners from silicone, mm: more than the errors of polygons and meshes."""
 _TOGETHER = 32
 """Runs of sides that are compared with arcs at once."""
 _LEAST_AREA = 1e-6
@@ -41,8 +41,8 @@ _MOST_TURN = math.radians(170)
 def outline(array: Array, laid: Wiring | None = None) -> Profile:
     """Return the circuit's outline, counter-clockwise: pads and strips, inner corners of `circuit.corner_mm`.
 
-    `laid` is the array's wiring, where it is known. Raises Refusal as `wiring`, and for corners that would enclose a
-    hole or reach into a unit's silicone beside its notch.
+    `laid` is the array's wiring, if it is known. Raises Refusal as `wiring`, and for corners that would enclose a
+    hole or reach into a unit's silicone next to its notch.
     """
     table = array.circuit or CircuitTable()
     walls = tuple(
@@ -74,14 +74,14 @@ def _outline(laid: Wiring, walls: tuple[_Wall, ...], corner: float) -> Profile:
     closed, blocked = _rounded(laid, walls, corner)
     if blocked:
         tenths = range(2, math.ceil(10 * corner))
-        # What a corner reaches into, a larger one does too.
+        # A larger corner reaches into all that a smaller one does.
         fits = bisect(tenths, False, key=lambda tenth: bool(_rounded(laid, walls, tenth / 10)[1]))
         raise Refusal("circuit.corner_mm", corner, blocked, tenths[fits - 1] / 10 if fits else None)
     return Profile(tuple(_with_arcs(_distinct(np.asarray(closed.to_polygons()[0], float)))))
 
 
 def _rounded(laid: Wiring, walls: Sequence[_Wall], corner: float) -> tuple[CrossSection, str]:
-    """Return the circuit as a polygon with inner corners of a radius, and what speaks against it, or ""."""
+    """Return the circuit as a polygon with inner corners of a radius, and the objection to it, or ""."""
     discs = [CrossSection.circle(pad.radius, _segments(pad.radius)).translate((pad.x, pad.y)) for pad in laid.pads]
     joints = [CrossSection.circle(one.half, _segments(one.half)).translate(one.end) for one in laid.spine[:-1]]
     parts = [*discs, *joints, *(_rectangle(strip) for strip in laid.strips)]
@@ -91,7 +91,7 @@ def _rounded(laid: Wiring, walls: Sequence[_Wall], corner: float) -> tuple[Cross
     if closed.num_contour() != 1:
         return closed, "the circuit's inner corners would enclose a hole between its rows or pads"
     added = closed - whole
-    # One union for all walls of a clearance, and of what is added only what is near a wall: with all of it for each
+    # One union for all walls of a clearance, and of the additions only those near a wall: with all of it for each
     # wall a large array took seconds.
     pieces = added.decompose()
     x0, y0, x1, y1 = np.array([piece.bounds() for piece in pieces], float).reshape(-1, 4).T
@@ -107,12 +107,12 @@ def _rounded(laid: Wiring, walls: Sequence[_Wall], corner: float) -> tuple[Cross
             wall.clearance
         ]
         if beside.area() > _LEAST_AREA:
-            return closed, f"the circuit's inner corners would reach into the silicone of {wall.name} beside its notch"
+            return closed, f"the circuit's inner corners would reach into the silicone of {wall.name} next to its notch"
     return closed, ""
 
 
 def circuit_body(array: Array) -> Body:
-    """Return the circuit as it lies on the motors' backs."""
+    """Return the circuit at its place on the motors' backs."""
     laid = wiring(array)
     drawn = Extrude(outline(array, laid), laid.low, laid.high)
     return Body("circuit", "unit", "circuit", drawn, CIRCUIT_COLOUR, made="bought")
@@ -145,7 +145,7 @@ def _with_arcs(corners: np.ndarray) -> list[Vertex]:
     n = len(corners)
     ring = np.concatenate([corners, corners[:1]])
     sides = np.linalg.norm(np.diff(ring, axis=0), axis=1)
-    # Up to where a side is too long for an arc's; none has as many sides as half the finest circle.
+    # Up to the side that is too long for an arc's; none has as many sides as half the finest circle.
     long = np.append(np.flatnonzero(sides >= 2.5 * _CHORD), n)
     found: list[Vertex] = []
     at = 0
@@ -162,7 +162,7 @@ def _with_arcs(corners: np.ndarray) -> list[Vertex]:
 
 
 def _arc_sides(points: np.ndarray) -> int:
-    """Return how many sides from the first point on lie on one arc of at most `_MOST_TURN`, together with all before.
+    """Return the number of sides, from the first point on, that are on one arc of at most `_MOST_TURN`.
 
     A single side, between two points, always does.
     """
@@ -175,7 +175,7 @@ def _arc_sides(points: np.ndarray) -> int:
 
 
 def _off_arcs(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Tell for each of some counts whether the first so many points, three or more, do not lie on one arc."""
+    """Tell for each of some counts whether the first so many points, three or more, are not on one arc."""
     start, ends, middles = points[0], points[counts - 1], points[counts // 2]
     (ax, ay), (bx, by), (x, y) = (start - middles).T, (ends - middles).T, (ends - start).T
     seen, length = np.arctan2(ax * by - ay * bx, ax * bx + ay * by), np.hypot(x, y)
@@ -200,7 +200,7 @@ def _turn(points: np.ndarray) -> float:
 def laid_circuit(array: Array) -> tuple[Body, ...]:
     """Return the circuit in the frame that the silicone is cast in.
 
-    In a curved cast what of it lies within each unit is flat; between the units it bends freely, and is not drawn.
+    In a curved cast its part within each unit is flat; between the units it bends freely, and is not drawn.
     """
     whole = circuit_body(array)
     if array.cast == "flat":

@@ -22,7 +22,7 @@ LEAST_BEND = 10.0
 """Least radius that a circuit is bent to, over its thickness: two layers of copper, bent once (IPC-2223)."""
 _EPS = 1e-6
 Line = tuple[float, tuple[float, ...]]
-"""A row: where it lies across, and its units along it."""
+"""A row: its place across, and its units along it."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ class Wiring:
 def wiring(array: Array) -> Wiring:
     """Return the common circuit of an array's motors.
 
-    Raises Refusal, with the nearest value that fits, where a row or the spine runs into a unit or a strap slot, where
-    no gap is free, and where the circuit would be bent too much round the limb.
+    Raises Refusal, with the nearest value that fits, if a row or the spine runs into a unit or a strap slot, if no gap
+    is free, or if the circuit would be bent too much round the limb.
     """
     table = array.circuit or CircuitTable()
     pads, low, high = _pads(array, table)
@@ -109,7 +109,7 @@ def wiring(array: Array) -> Wiring:
 def _ways(
     array: Array, table: CircuitTable, pads: Sequence[CircuitPad]
 ) -> Iterator[tuple[list[Strip], list[Strip], bool]]:
-    """Yield rows and spine of each way that the circuit could lie, and whether the spine passes through its units."""
+    """Yield rows and spine of each possible circuit, and whether the spine passes through its units."""
     turned, half = table.rows == "y", table.row_width_mm / 2
     lines = _lines(pads, turned)
     single = len({u for _, along in lines for u in along}) == 1
@@ -142,7 +142,7 @@ def _pads(array: Array, table: CircuitTable) -> tuple[list[CircuitPad], float, f
         faces.add((pad.low, pad.high))
         found.append(CircuitPad(place.name, place.x, place.y, pad.radius))
     if len(faces) > 1:
-        raise Refusal("circuit", None, "one circuit lies flat, and the units' motors or circuits differ in height")
+        raise Refusal("circuit", None, "one circuit is flat, and the units' motors or circuits differ in height")
     narrowest = 2 * min(pad.radius for pad in found)
     if table.row_width_mm > narrowest + _EPS:
         limit = f"a row is no wider than the pads of {narrowest:g} mm"
@@ -161,7 +161,7 @@ def _lines(pads: Sequence[CircuitPad], turned: bool) -> list[Line]:
 
 
 def _gaps(pads: Sequence[CircuitPad], table: CircuitTable) -> list[float]:
-    """Return where a straight spine could lie, the middle's nearest first: between columns, or through a single one."""
+    """Return the possible places of a straight spine, the middle's nearest first: between columns, or through one."""
     columns = sorted({u for _, along in _lines(pads, table.rows == "y") for u in along})
     if len(columns) == 1:
         return columns
@@ -185,7 +185,10 @@ def _strip(start: Point, end: Point, half: float, turned: bool) -> Strip:
 
 
 def _in_the_way(array: Array, rows: Sequence[Strip], spine: Sequence[Strip], own: bool) -> str:
-    """Return what rows or spine run into; "" for nothing. A row passes through its units, so does an `own` spine."""
+    """Return the name of the obstacle of rows or spine; "" for none.
+
+    A row passes through its units, so does an `own` spine.
+    """
     for strip in (*rows, *spine):
         through = own or strip in rows
         for place in array.places:
@@ -219,11 +222,11 @@ def _check_bend(array: Array, pads: Sequence[CircuitPad], thickness: float, tabl
                     f"between two pads {pitch:.4g} mm apart, which stay flat, the circuit would be bent to a radius of "
                     f"{bend:.3g} mm; {LEAST_BEND:g} times its thickness is {least:.3g} mm"
                 )
-                raise Refusal("body.radius_mm", array.radius_mm, limit, up(least * pitch / free) if free else None)
+                raise Refusal("limb.radius_mm", array.radius_mm, limit, up(least * pitch / free) if free else None)
 
 
 TRACK_MM = GAP_MM = 0.1
-"""Least width of a track, and of the gap beside it (assumed: 4 mil, what makers of flexible circuits usually offer)."""
+"""Least width of a track, and of the gap next to it (assumed: 4 mil, usual for flexible circuits)."""
 
 
 def width_needed(motors: int) -> float:
@@ -232,7 +235,7 @@ def width_needed(motors: int) -> float:
 
 
 def crowded_tracks(array: Array) -> list[str]:
-    """Return a sentence where spine and tail are too narrow for the tracks of all motors; else []."""
+    """Return a sentence if spine and tail are too narrow for the tracks of all motors; otherwise []."""
     width, motors = (array.circuit or CircuitTable()).row_width_mm, len(array.places)
     needed = width_needed(motors)
     if needed <= width + 1e-9:

@@ -1,1 +1,1 @@
-"""Constructions: ways to hold and cast the units of an array. Every file here that defines CONSTRUCTION is one."""
+"""Constructions: ways to fasten and cast the units of an array. Every file here that defines CONSTRUCTION is one."""

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 from unitcad.arrays.array import Array, Box
 from unitcad.arrays.circuit.wiring import Wiring, wiring
 from unitcad.arrays.construction import Construction, Level
+from unitcad.arrays.grooves import stopped_ring
 from unitcad.arrays.limb import bent_stretches
 from unitcad.arrays.piece_seams import (
     Strip,
@@ -28,7 +29,7 @@ from unitcad.arrays.tails import CLEAR
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, shipped
 from unitcad.designs.design import Fitting
 from unitcad.designs.limits import filament_groove
-from unitcad.designs.parts import BEYOND
+from unitcad.designs.parts import ADHESIVE, BEYOND, bond
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point, nearer
@@ -36,7 +37,7 @@ from unitcad.moulds import filament
 from unitcad.moulds.base import PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER, core, outline, plate_top, pry_floor, pry_slot
 from unitcad.moulds.blade import blade
 from unitcad.moulds.cuts import BESIDE, Feature, seams
-from unitcad.moulds.dovetails import Interval, Seam, Split, seen, split, strips
+from unitcad.moulds.dovetails import Interval, Seam, Split, split, strips, unseen
 from unitcad.moulds.labels import corner_labels, engraved, row_width, set_label
 from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, stub_pieces
@@ -46,15 +47,11 @@ from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import (
     Common,
     Extrude,
-    Profile,
     Shape,
     box,
     cut,
     cylinder,
     moved,
-    polygon,
-    ring,
-    turned,
     union,
 )
 from unitcad.shape.body import Body
@@ -63,14 +60,14 @@ from unitcad.spec import Spec
 from unitcad.text import number
 
 OFF_SQUARE = 4.0
-"""How far one pin stands off the rectangle of the others, mm: a cup goes on in one attitude only."""
+"""Offset of one pin from the rectangle of the others, mm: a cup goes on in one attitude only."""
 LABEL_MARGIN = 0.6
-"""From a label to the edges of the strip that it stands on, mm."""
+"""Distance of a label from the edges of its strip, mm."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """What all tools of an array are drawn to; where the base and the cups are cut that are larger than the bed."""
+    """Dimensions of all tools of an array, and the cuts of base and cups that are larger than the bed."""
 
     array: Array
     spec: Spec
@@ -89,7 +86,7 @@ class Drawing:
 
 
 def drawing_of(array: Array) -> Drawing:
-    """Return what the tools are drawn to. Raises Refusal for tools larger than the bed that can't be cut."""
+    """Return the dimensions of the tools. Raises Refusal for tools larger than the bed that can't be cut."""
     spec, moulds = array.unit, array.unit.moulds
     dims = replace(dimensions(spec), exit=None, sides=())
     height = min(dims.heights[0] - moulds.least_wall_mm - 0.4, 3.0)
@@ -113,7 +110,7 @@ def drawing_of(array: Array) -> Drawing:
 
 
 def _cut(drawn: Drawing) -> Drawing:
-    """Return the drawing with its seams, and with as many pins that the pieces of base and cups stand on two."""
+    """Return the drawing with its seams, and with enough pins that each piece of base and cups has two."""
     moulds, array, (x, y), plate = drawn.spec.moulds, drawn.array, drawn.lay.cup, drawn.lay.plate
     kept = [*of_sheet(array), *_beside(drawn)]
     slots = [_slot(drawn, fin) for fin in drawn.fins]
@@ -145,7 +142,7 @@ def _cut(drawn: Drawing) -> Drawing:
 
 
 def _beside(drawn: Drawing) -> list[Feature]:
-    """Return what stands beside the sheet: pins, the corners with their labels, pry slots."""
+    """Return the features next to the sheet: pins, the corners with their labels, pry slots."""
     (x, y), plate, stroke = drawn.lay.cup, drawn.lay.plate, drawn.spec.moulds.engraving_stroke_mm
     wide = row_width(["C1", "1"], stroke) + TEXT_MARGIN
     high = drawn.lay.label_height + TEXT_MARGIN
@@ -161,7 +158,7 @@ def _beside(drawn: Drawing) -> list[Feature]:
 
 
 def _more_pins(drawn: Drawing) -> tuple[tuple[float, float], ...]:
-    """Return pins for the pieces of base and cups that stand on fewer than two: on the sides that they have."""
+    """Return pins for pieces of base and cups with fewer than two: on their outer sides."""
     (x, y), units, cut_at = drawn.lay.cup, drawn.array.places, (*drawn.base_seams, *drawn.cup_seams)
     out_y = drawn.pins.places[-1][1]
     out_x = x - (y - out_y)
@@ -190,7 +187,7 @@ def _more_pins(drawn: Drawing) -> tuple[tuple[float, float], ...]:
 def _beside_slots(
     drawn: Drawing, side: Side, middles: Sequence[float], within: tuple[float, float], count: int
 ) -> list[float]:
-    """Return where pins stand on a side, as `_spots`, clear of its pry slots: at units' middles, else anywhere."""
+    """Return the places of pins on a side, as `_spots`, clear of its pry slots: at units' middles if possible."""
     by = PRY_HALF_WIDTH + drawn.hole + drawn.spec.moulds.least_wall_mm
     slots = [slot.middle for slot in drawn.pry if slot.side == side]
     steps = (within[0] + STEP * i for i in range(math.ceil((within[1] - within[0]) / STEP)))
@@ -210,7 +207,7 @@ def _spots(middles: Sequence[float], within: tuple[float, float], count: int) ->
 
 
 def _slot(drawn: Drawing, fin: Fin) -> Feature:
-    """Return what a fin's slot takes."""
+    """Return the space of a fin's slot."""
     clearance = drawn.spec.moulds.plinth_clearance_mm
     return box_feature(*fin.taken(drawn.array, fin.reach + clearance, clearance))
 
@@ -219,7 +216,7 @@ UP, DOWN = (0, 0, 1), (0, 0, -1)
 
 
 def core_top(spec: Spec) -> float:
-    """Return the height of cores and fins over the skin, mm: motor and circuit lie under it."""
+    """Return the height of cores and fins over the skin, mm: motor and circuit are under it."""
     return dimensions(spec).core_height
 
 
@@ -231,7 +228,7 @@ def slot_roof(spec: Spec) -> float:
 def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
     """Return tools and pours of an array whose silicone is drawn as `cast`, pour by pour.
 
-    Tools larger than the bed are cut. Raises Refusal where they can't be, and for lids.
+    Tools larger than the bed are cut. Raises Refusal if they can't be, and for lids.
     """
     if array.unit.moulds.pour == "injected":
         raise Refusal("moulds.pour", "injected", "a back sheet is struck off, its cups have no lids", "open")
@@ -239,7 +236,7 @@ def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
 
 
 def inner_tools(array: Array, cast: Sequence[tuple[Shape, ...]], label: str) -> Plan:
-    """Return flat tools and pours of the inner layers alone, drawn as `cast`: they are taken out and laid in elsewhere.
+    """Return flat tools and pours of only the inner layers, drawn as `cast`: they are taken out and inserted elsewhere.
 
     `label` is that of the whole set. Raises Refusal as `tools_plan`.
     """
@@ -258,7 +255,7 @@ def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: boo
     cups = []
     for pour, blank in zip(pours, blanks[1:], strict=True):
         cup = cup_piece(pour, engraved(blank, _cup_letters(drawing, pour, label)))
-        # The last cup is a tray for the sheet: printed as it stands, and the patch leaves it, not it the patch.
+        # The last cup is a tray for the sheet: printed as drawn, and the patch leaves it, not it the patch.
         cups.append(replace(cup, upside_down=False, removal=None) if sheets[pour - 1] else cup)
     stubs = stub_pieces([filament.stub(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
     steps = tuple(_step(drawing, cast, pour, base, cups[pour - 1], stubs, sheet=sheets[pour - 1]) for pour in pours)
@@ -286,7 +283,7 @@ def _splits(drawing: Drawing, base: Body, cups: Sequence[Body]) -> Iterator[Spli
 
 
 def _base_letters(drawing: Drawing, label: str) -> list[Shape]:
-    """Draw the base's label; on a base that is cut, on each piece with its number, or that alone."""
+    """Draw the base's label; on a base that is cut, on each piece with its number, or only the number."""
     spec, (x, y) = drawing.spec, drawing.lay.plate
     strip = Strip((-x, -y, x, y), LABEL_MARGIN, spec.moulds.engraving_stroke_mm, _engraving(spec, 0.0), "top")
     if all(slot.customary for slot in drawing.pry):
@@ -361,7 +358,7 @@ def _base(drawing: Drawing) -> Shape:
 
 
 def _cup(drawing: Drawing, layer: int, *, last: bool) -> Shape:
-    """Draw the cup of a pour (from 0); the last one holds the sheet."""
+    """Draw the cup of a pour (from 0); the last one contains the sheet."""
     spec, dims, lay, sheet = drawing.spec, drawing.dims, drawing.lay, drawing.array.sheet
     rim = dims.heights[layer]
     tools = [*_bores(drawing, layer, last=last), *_slots(drawing), *pin_holes(drawing.pins)]
@@ -375,7 +372,7 @@ def _cup(drawing: Drawing, layer: int, *, last: bool) -> Shape:
 
 
 def _bores(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
-    """Draw what the silicone of a pour takes from its cup: a bore a unit, the sheet round the straps' posts."""
+    """Draw the silicone's space in a pour's cup: a bore a unit, the sheet round the straps' posts."""
     dims, sheet = drawing.dims, drawing.array.sheet
     rim = dims.heights[layer]
     top = sheet.low + (rim - sheet.low) / 2 if last else rim + BEYOND
@@ -396,45 +393,44 @@ def _slots(drawing: Drawing) -> list[Shape]:
 
 
 def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
-    """Draw a groove round each bore; it stops at seams, over slots and beside its neighbours: walls would be thin."""
+    """Draw a groove round each bore; it stops at seams, over slots and near its neighbours: walls would be thin."""
     spec, dims, cells = drawing.spec, drawing.dims, drawing.lay.cells
     moulds, rim = spec.moulds, dims.heights[layer]
     inner = dims.radii[layer] + moulds.land_mm
     outer, depth = inner + moulds.groove_width_mm, groove_depth_of(spec, rim)
     low, high = rim - depth, rim + BEYOND
-    stops: list[list[Shape]] = [[] for _ in cells]
+    stops: list[list[Feature]] = [[] for _ in cells]
     for i, cell in enumerate(cells):
         for other in cells:
             apart = math.hypot(other.x - cell.x, other.y - cell.y)
             if other is not cell and apart < outer + inner:
-                stops[i].append(moved(cylinder(inner, low - BEYOND, high + BEYOND), other.x, other.y))
+                stops[i].append(Feature(((other.x, other.y),), inner))
             if other is not cell and apart < 2 * outer + moulds.least_wall_mm:
-                between = _halfway((cell.x, cell.y), (other.x, other.y), outer, moulds.least_wall_mm)
-                stops[i].append(Extrude(between, low - BEYOND, high + BEYOND))
+                stops[i].append(_halfway((cell.x, cell.y), (other.x, other.y), outer, moulds.least_wall_mm))
     for fin in drawing.fins if low - slot_roof(spec) < moulds.least_wall_mm else ():
         wider = moulds.plinth_clearance_mm + moulds.least_wall_mm
-        over = fin.drawn(drawing.array, outer + BEYOND, wider, low - BEYOND, high + BEYOND)
-        stops[fin.place].append(over)
+        stops[fin.place].append(box_feature(*fin.taken(drawing.array, outer + BEYOND, wider)))
     for seam in drawing.cup_seams:
         for strip in strips(seam, moulds.least_wall_mm + seam.play / 2):
-            over = Extrude(polygon(*strip), low - BEYOND, high + BEYOND)
+            corners = tuple(unseen(corner, seam.across) for corner in strip)
             for i, cell in enumerate(cells):
-                if nearer([seen((cell.x, cell.y), seam.across)], strip, outer):
-                    stops[i].append(over if seam.across == "x" else turned(over, "z", 1))
-    return [cut(moved(ring(inner, outer, low, high), c.x, c.y), stops[i]) for i, c in enumerate(cells)]
+                if nearer([(cell.x, cell.y)], corners, outer):
+                    stops[i].append(Feature(corners))
+    drawn = (stopped_ring((c.x, c.y), (inner, outer), (low, high), stops[i]) for i, c in enumerate(cells))
+    return [groove for groove in drawn if groove]
 
 
-def _halfway(a: Point, b: Point, half: float, width: float) -> Profile:
+def _halfway(a: Point, b: Point, half: float, width: float) -> Feature:
     """Return a strip across the middle of the way from a to b, `half` long to either side of it, mm."""
     apart = math.dist(a, b)
     way = (b[0] - a[0]) / apart, (b[1] - a[1]) / apart
     at = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
     sides = [(along * width / 2, across * half) for along, across in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    return polygon(*((at[0] + u * way[0] - v * way[1], at[1] + u * way[1] + v * way[0]) for u, v in sides))
+    return Feature(tuple((at[0] + u * way[0] - v * way[1], at[1] + u * way[1] + v * way[0]) for u, v in sides))
 
 
 def _seals(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
-    """Draw what silicone is kept from though no tool fills it: grease round the fins, the ring round a filament."""
+    """Draw the spaces without silicone that no tool fills: grease round the fins, the ring round a filament."""
     spec, dims, lay, rim = drawing.spec, drawing.dims, drawing.lay, drawing.dims.heights[layer]
     x, y = lay.cup
     wall = cut(box(-x, x, -y, y, -BEYOND, rim), _bores(drawing, layer, last=last))
@@ -444,7 +440,7 @@ def _seals(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:
 
 
 SEAL = 1.2
-"""How far a fin runs on in the wall of the outermost cup, mm: the slit beside it, greased, is the pour's seal."""
+"""Length of a fin in the wall of the outermost cup, mm: its greased slit is the pour's seal."""
 _EPS = 1e-6
 
 
@@ -465,7 +461,7 @@ class Fin(NamedTuple):
         return box(x0, x1, y0, y1, low, high)
 
     def taken(self, array: Array, reach: float, wider: float) -> Box:
-        """Return what that box takes in the plane, mm."""
+        """Return the box's extent in the plane, mm."""
         at, (x0, x1, y0, y1) = array.places[self.place], self._sides(reach, wider)
         return at.x + x0, at.y + y0, at.x + x1, at.y + y1
 
@@ -533,7 +529,7 @@ class PrySlot(NamedTuple):
         return self.side in _PAIRS[0] and self.middle == 0.0
 
     def taken(self, lay: Layout) -> Box:
-        """Return what it takes of the plate, from under the cup to beyond the edge, mm."""
+        """Return its extent on the plate, from under the cup to beyond the edge, mm."""
         axis = int(self.side in ("front", "back"))
         sign = 1 if self.side in ("right", "back") else -1
         low, high = sorted((sign * (lay.cup[axis] - PRY_UNDER), sign * (lay.plate[axis] + BEYOND)))
@@ -547,7 +543,7 @@ class PrySlot(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A piece of the base: its number, and from where to where it reaches between the teeth, along x and y (mm)."""
+    """A piece of the base: its number, and its extent between the teeth, along x and y (mm)."""
 
     number: int
     across: Interval
@@ -571,10 +567,10 @@ def pieces(lay: Layout, seams: Sequence[Seam]) -> list[Piece]:
 def pry_slots(
     spec: Spec, lay: Layout, seams: Sequence[Seam], pins: Sequence[Point], hole: float
 ) -> tuple[tuple[PrySlot, ...], str]:
-    """Return the slots of a base, and why a piece of it can't be freed, "" where all can.
+    """Return the slots of a base, and the reason why a piece can't be freed, "" if all can.
 
-    A slot stands in the middle of the left and of the right edge. A piece that has neither of the two gets its own:
-    at its left and right edge, or at the front and the back. `pins` that stand already have holes of the radius
+    There is a slot in the middle of the left and of the right edge. A piece that has neither of the two gets its own:
+    at its left and right edge, or at the front and the back. Existing `pins` have holes of the radius
     `hole` (mm).
     """
     depth = plate_top(spec) - pry_floor(spec)
@@ -589,10 +585,10 @@ def pry_slots(
         for pair in () if own else _PAIRS:
             own = own or [slot for side in pair if side in sides for slot in _at(spec, lay, piece, side, pins, hole)]
         if not own:
-            what = "has no edge of the base" if not sides else "has no room at its edges"
+            lack = "has no edge of the base" if not sides else "has no room at its edges"
             return tuple(
                 found
-            ), f"piece {piece.number} of the base {what} for a pry slot, and nothing would lever it off"
+            ), f"piece {piece.number} of the base {lack} for a pry slot, and nothing would lever it off"
         found += own
     return tuple(found), ""
 
@@ -600,7 +596,7 @@ def pry_slots(
 def _at(
     spec: Spec, lay: Layout, piece: Piece, side: Side, pins: Sequence[tuple[float, float]], hole: float
 ) -> Iterator[PrySlot]:
-    """Yield the slot at a piece's side, the nearest to its middle that leaves room for a pin beside it; or none."""
+    """Yield the slot at a piece's side, the nearest to its middle that leaves room for a pin next to it; or none."""
     axis = int(side in ("left", "right"))
     ends, edge = (piece.along if axis else piece.across), lay.plate[axis]
     low, high = (end + sign * (BESIDE if abs(end) < edge else MARK) for end, sign in zip(ends, (1, -1), strict=True))
@@ -618,7 +614,7 @@ def _at(
 
 
 def _depth(spec: Spec, lay: Layout, side: Side, middle: float) -> float:
-    """Return a slot's depth, mm: less where a filament's groove lies under it; 0 where it would be too little."""
+    """Return a slot's depth, mm: less over a filament's groove; 0 if it would be too little."""
     moulds, wall = spec.moulds, spec.moulds.least_wall_mm
     most = moulds.plate_mm
     if side == "front":
@@ -642,7 +638,7 @@ def apart(unit: Spec) -> tuple[float, str]:
 
 
 def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Level:
-    """Return where the sheet lies: flush with the units' backs, over the notches of the circuit.
+    """Return the sheet's place: flush with the units' backs, over the notches of the circuit.
 
     Raises Refusal for units that have no cap, or no flexible circuit.
     """
@@ -696,7 +692,7 @@ def plan(array: Array) -> Plan:
 
 
 def greased(array: Array, pour: int) -> str:
-    """Say where the slits beside the fins are sealed before the cup of a pour (from 1) is put on."""
+    """Return the places at which the slits of the fins are sealed before the cup of a pour (from 1) is put on."""
     ridges = fins(array, wiring(array))
     if not ridges:
         return ""
@@ -704,7 +700,7 @@ def greased(array: Array, pour: int) -> str:
     layer = "" if pour == 1 else f", none on Layer {pour - 1}"
     return (
         "every fin, the ridge that runs out from a core: both upright sides, the top and the end face, on its "
-        f"outermost {number(length, 3)} mm alone. None nearer the core, where silicone is cast against the fin"
+        f"outermost {number(length, 3)} mm only. None nearer the core, since silicone is cast against the fin"
         f"{layer}"
     )
 
@@ -716,12 +712,11 @@ def assembly(array: Array) -> tuple[Fitting, ...]:
         "patch on its back, the cavities up."
     )
     lay_in = (
-        "Put a smear of Layer 1's silicone on each pad, where the cap of Layer 1 will touch it (assumed: silicone "
-        "bonds poorly to bare metal and polyimide; a primer or a silicone adhesive holds better). Lay the circuit in "
-        "from the skin's side, motor by motor, its rows in the notches, and push each motor in until its pad lies "
-        "against that cap. The spine lies free between the units. The notches may be filled with the same silicone."
+        f"{bond('each pad', 'the cap of Layer 1')} Lay the circuit in from the skin's side, motor by motor, its rows "
+        "in the notches, and push each motor in until its pad touches that cap. The spine is free between the "
+        "units."
     )
-    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, silicone=1, mixed="smear")
+    return Fitting(solder, ("soldering iron and solder",)), Fitting(lay_in, (ADHESIVE,))
 
 
 CONSTRUCTION = Construction(

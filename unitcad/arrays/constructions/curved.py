@@ -62,8 +62,8 @@ def check_limb(array: Array, apart: float, middle: Callable[[float], float]) -> 
     radii = (tenth * _STEP for tenth in range(math.ceil(radius / _STEP + 1e-9), round(LARGEST / _STEP) + 1))
     fits = next((each for each in radii if not _too_small(array, each, apart, middle(each))), None)
     if fits is None or middle(fits) > _largest_middle(array) or array.layout["kind"] == "ring":
-        raise Refusal("body.cast", "curved", f"{why}; cast it flat and bend it", "flat")
-    raise Refusal("body.radius_mm", radius, why, round(fits, 1))
+        raise Refusal("limb.cast", "curved", f"{why}; cast it flat and bend it", "flat")
+    raise Refusal("limb.radius_mm", radius, why, round(fits, 1))
 
 
 def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) -> None:
@@ -82,16 +82,16 @@ def _check_vents(array: Array, radius: float, middle: Callable[[float], float]) 
     fits = math.floor(min(radius, largest) / _STEP)
     while middle(fits * _STEP) > largest:
         fits -= 1
-    raise Refusal("body.radius_mm", radius, why, round(fits * _STEP, 1))
+    raise Refusal("limb.radius_mm", radius, why, round(fits * _STEP, 1))
 
 
 def _largest_middle(array: Array) -> float:
-    """Return the radius of the sheet's middle with which its nearer end lies in the tilt from the top, mm."""
+    """Return the radius of the sheet's middle with which its nearer end is within the tilt from the top, mm."""
     return min(-array.sheet.outline[0], array.sheet.outline[2]) / math.radians(TILT_DEG)
 
 
 def _too_small(array: Array, radius: float, apart: float, middle: float) -> str:
-    """Return what speaks against a limb of a radius, where the sheet's middle has the radius `middle` (mm), or ""."""
+    """Return the objection to a limb of a radius, with the sheet's middle at the radius `middle` (mm), or ""."""
     sheet = array.sheet
     steepest = float(printer_of(array.unit).overhang_deg)
     places = [place.x for place in array.places] + [(slot[0] + slot[2]) / 2 for slot in sheet.strap_slots]
@@ -111,7 +111,7 @@ def _too_small(array: Array, radius: float, apart: float, middle: float) -> str:
         gap = distance - outer * math.hypot(math.cos(turn) * across, along) / distance
         if gap < apart - 2 / 1024:
             there = f"{gap:.3g}" if gap < apart - 0.05 else f"{gap:.5g}"
-            return f"at the skin {one.name} and {other.name} stand {there} mm apart and need {apart:.4g} mm"
+            return f"at the skin {one.name} and {other.name} are {there} mm apart and need {apart:.4g} mm"
     return ""
 
 
@@ -133,13 +133,13 @@ def parts_out(array: Array) -> Iterator[Removal]:
     between = [(a + b) / 2 for a, b in pairwise(middles)]
     bounds = [2 * sheet.outline[0] - middles[0], *between, 2 * sheet.outline[2] - middles[-1]]
     for i, (x, ends) in enumerate(zip(middles, pairwise(bounds), strict=True)):
-        # The last one takes what rounding leaves.
+        # The last one gets the remainder of rounding.
         space = slice_of(array, *ends) if i + 1 < len(middles) else None
         yield Removal(CAST, axis(array, x), f"between the units, {x:+.4g} mm round", space)
 
 
 LAND = 4.0
-"""Where base and lid bear on each other beside the sheet, mm."""
+"""Width of the face on which base and lid bear next to the sheet, mm."""
 PIN_HEIGHT = 3.0
 VENT_OFF_END = 1 / 8
 """From a vent to the sheet's end along the limb, mm."""
@@ -153,7 +153,7 @@ JOINT = 1 / 8
 
 @dataclass(frozen=True)
 class Former:
-    """What base and lid are drawn to, mm: half sizes, the seat beside the barrel, the base's lower face, pins on it."""
+    """Dimensions of base and lid, mm: half sizes, the seat next to the barrel, the base's lower face, pins on it."""
 
     array: Array
     spec: Spec
@@ -234,7 +234,7 @@ def _down(way: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 def _former(array: Array) -> Former:
-    """Return what base and lid are drawn to. Raises Refusal for plates beyond the bed."""
+    """Return the dimensions of base and lid. Raises Refusal for plates beyond the bed."""
     spec, moulds, sheet = array.unit, array.unit.moulds, array.sheet
     dims, radius = replace(dimensions(spec), exit=None, sides=()), array.radius_mm or 0.0
     back = array.back_radius_mm
@@ -244,7 +244,7 @@ def _former(array: Array) -> Former:
     hole = PIN_RADIUS + moulds.plinth_clearance_mm
     beside = 2 * hole + 2 * moulds.least_wall_mm
     edge = math.sqrt(back**2 - (radius + seat) ** 2)
-    # Between the pins at one end stands the label.
+    # The label is between the pins at one end.
     label = text_width("B2F055", moulds.engraving_stroke_mm) / 2 + 1.0 + beside
     half = mm(edge + beside), mm(max(max(-y0, y1) + LAND, label))
     lowest = min([seat - moulds.plate_mm, *(_lowest(array, place.x, dims.outer_radius) for place in array.places)])
@@ -253,13 +253,13 @@ def _former(array: Array) -> Former:
     x, y = edge + beside / 2, half[1] - hole - 2 * moulds.least_wall_mm
     places = (-x, -y), (x, -y), (-x, y), (x, y - OFF_SQUARE)
     size, height = f"the base of {2 * half[0]:.4g} x {2 * half[1]:.4g} mm", mm(sheet.high + THICKNESS - bottom)
-    for field, needed, what in (
+    for field, needed, part in (
         ("bed_x_mm", 2 * half[0], size),
         ("bed_y_mm", 2 * half[1], size),
         ("bed_z_mm", height, f"the mould, {height:.4g} mm high,"),
     ):
         if needed > getattr(moulds, field) + 1e-9:
-            limit = f"{what} exceeds the bed; curved tools are not cut"
+            limit = f"{part} exceeds the bed; curved tools are not cut"
             if field == "bed_y_mm" and (fewer := _rows_that_fit(array, needed)):
                 raise Refusal("layout.rows", array.layout["rows"], limit, fewer)
             raise Refusal(f"moulds.{field}", getattr(moulds, field), limit, math.ceil(needed * 10 - 1e-6) / 10)
@@ -267,9 +267,9 @@ def _former(array: Array) -> Former:
 
 
 def _rows_that_fit(array: Array, length: float) -> int:
-    """Return how many rows of a grid fit the printer's own bed along the limb, where its tools have a `length` beyond.
+    """Return how many rows of a grid fit the printer's own bed along the limb, which the tools exceed by a `length`.
 
-    0 where none do, for other layouts, and where the file itself asks for a smaller bed.
+    0 if none do, for other layouts, and if the file itself asks for a smaller bed.
     """
     bed = array.unit.moulds.bed_y_mm
     own = float(printers(array.unit.printers)[array.unit.moulds.printer].bed_y_mm)
@@ -298,7 +298,7 @@ def _base(former: Former) -> Shape:
 
 
 def _bed(former: Former) -> Shape:
-    """Draw what the sheet takes from the base."""
+    """Draw the sheet's space in the base."""
     array = former.array
     sheet = array.sheet
     posts = [strap_slot(array, slot, 2 * BEYOND) for slot in sheet.strap_slots]
@@ -307,7 +307,7 @@ def _bed(former: Former) -> Shape:
 
 
 def _moats(former: Former) -> list[Shape]:
-    """Draw what the units take from the base: open upwards, round core and fins."""
+    """Draw the units' space in the base: open upwards, round core and fins."""
     array, dims, top = former.array, former.dims, core_top(former.spec)
     ways = fins(array, wiring(array))
     drawn = []
@@ -358,14 +358,14 @@ def _channels(former: Former, low: float, top: float) -> list[Shape]:
     drawn = [sprue]
     for x in places:
         along = (sheet.outline[3] - sheet.outline[1]) / 2 - _vent_off_end(former, x) - vent
-        # A vent that stands aside begins lower, where the sheet's back does.
+        # A vent off the top begins lower, as the sheet's back does.
         back = math.sqrt(former.back**2 - (abs(x) + vent) ** 2) - (former.array.radius_mm or 0.0)
         drawn += [moved(cylinder(vent, min(low, back - INTO), top), x, middle + side * along) for side in (-1, 1)]
     return drawn
 
 
 def _vent_off_end(former: Former, x: float) -> float:
-    """Return how far from the sheet's end the edge of a vent stands, along the limb, at a place across its top, mm."""
+    """Return the distance of a vent's edge from the sheet's end, along the limb, at a place across its top, mm."""
     return _off_end(former, abs(x) + VENT / 2) + VENT_OFF_END
 
 
@@ -378,10 +378,10 @@ def _off_end(former: Former, x: float) -> float:
 
 
 def _vents(former: Former) -> list[float]:
-    """Return where across the top vents stand, mm: wherever a tilt brings the highest line, one is near to it."""
+    """Return the places of vents across the top, mm: one is near the highest line of any tilt."""
     count, places = 2, _spread(former, 2)
     limit = MESH_ROOM * deepest(former.spec, len(former.spec.layers) - 1)
-    # An odd number of vents puts one in the middle, where none stands nearer to the end.
+    # An odd number of vents puts one in the middle, if none is nearer to the end.
     at_end = max(limit, _kept_at_end(former, [0.0]))
     while _kept_between(former, count) > limit or _kept_at_end(former, places) > at_end:
         count += 1
@@ -401,7 +401,7 @@ def _kept_between(former: Former, count: int) -> float:
 
 
 def _kept_at_end(former: Former, places: list[float]) -> float:
-    """Return how deep the air is at an end that a tilt raises, mm: round corners hold vents off it that stand aside."""
+    """Return the depth of the air at an end that a tilt raises, mm: round corners keep outer vents away from it."""
     tilt = math.radians(TILT_DEG)
 
     def depth(x: float) -> float:
@@ -421,7 +421,7 @@ def _lid(former: Former) -> Shape:
 
 
 def _seals(former: Former) -> list[Shape]:
-    """Draw where silicone is kept from joints that meet but for a rounding: under and in what is laid in."""
+    """Draw seals at joints that meet only up to rounding: under and in the inserted layers."""
     array, dims = former.array, former.dims
     inner, height = (
         (dims.radii[-2], dims.heights[-2]) if len(dims.radii) > 1 else (dims.cavity_radius, dims.core_height)
@@ -431,7 +431,7 @@ def _seals(former: Former) -> list[Shape]:
 
 
 def _land_seals(former: Former) -> list[Shape]:
-    """Draw what the pressed joint of lid and base takes beside the sheet, round the limb and along it."""
+    """Draw the space of the pressed joint of lid and base next to the sheet, round the limb and along it."""
     array, (x, y) = former.array, former.half
     x0, y0, x1, y1 = array.sheet.outline
     joint = cut(barrel(array, former.back + JOINT), [barrel(array, former.back - JOINT)])
@@ -458,7 +458,7 @@ def _along(former: Former, label: str, top: float, edge: float) -> Shape:
 
 
 def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Level:
-    """Return where the sheet lies on top of a limb of a radius: its back as high as keeps the cap over Layer 1's edge.
+    """Return the sheet's place on a limb of a radius: its back is as high as the cap over Layer 1's edge needs.
 
     Raises Refusal as `back_sheet.level`.
     """
@@ -467,15 +467,15 @@ def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Le
     dims = dimensions(spec)
     if len(spec.layers) < 2:
         limit = "in a curved mould the inner layers are laid in; units of one layer are cast flat and bent"
-        raise Refusal("body.cast", "curved", limit, "flat")
+        raise Refusal("limb.cast", "curved", limit, "flat")
     top = math.hypot(limb + flat.high, dims.radii[-2]) - limb
-    # Beside its unit a notch stays under the sheet.
+    # Next to its unit a notch stays under the sheet.
     roof = math.hypot(limb + core_top(spec), dims.outer_radius + BEYOND) - limb
     return Level(top - thickness, top, top - roof)
 
 
 def laid_in(array: Array) -> tuple[tuple[Shape, ...], ...]:
-    """Draw the inner layers where they lie round the limb, pour by pour, a solid a unit."""
+    """Draw the inner layers at their places around the limb, pour by pour, a solid a unit."""
     drawn, count = _of_place(array), len(array.unit.layers) - 1
     return tuple(
         tuple(bent(array, drawn[n][i], place.x, place.y) for n, place in enumerate(array.places)) for i in range(count)
@@ -544,8 +544,8 @@ def assembly(array: Array) -> tuple[Fitting, ...]:
     """Write how the flat circuit is laid into the sleeve."""
     solder, lay_in = back_sheet.assembly(array)
     flat = (
-        "Open the sleeve until it lies flat and tape its ends down: the circuit is flat, as long as the sheet laid "
-        "flat, and bends with the sleeve when it is worn. It stays flat until the smear is cured."
+        "Open the sleeve until it is flat and tape its ends down: the circuit is flat, as long as the sheet laid "
+        "flat, and bends with the sleeve when it is worn. It stays flat until the adhesive is cured."
     )
     return replace(solder, text=f"{solder.text} {flat}"), lay_in
 

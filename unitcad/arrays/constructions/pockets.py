@@ -38,15 +38,15 @@ from unitcad.spec import Spec
 from unitcad.text import number
 
 BEYOND = 1.0
-"""How far a cutting tool reaches past what it cuts, and a core into the floor, mm."""
+"""Excess of a cutting tool over its cut, and of a core into the floor, mm."""
 MARGIN = 1.0
-"""From a label to the edge that it stands at, mm."""
+"""Distance of a label from its edge, mm."""
 
 
 def tray_plan(array: Array, cast: Shape) -> Plan:
     """Return tray, blade and the one pour of an array whose sheet is drawn as `cast`.
 
-    A tray that is longer than the printer's bed is cut. Raises Refusal where it can't be.
+    A tray that is longer than the printer's bed is cut. Raises Refusal if it can't be.
     """
     sheet, spec = array.sheet, array.unit
     outer = _outer(array)
@@ -120,7 +120,7 @@ def tray(array: Array) -> Shape:
 
 
 def _outer(array: Array) -> Box:
-    """Return the tray's outline: land, groove and a wall that holds the label."""
+    """Return the tray's outline: land, groove and a wall for the label."""
     moulds, box = array.unit.moulds, array.sheet.outline
     wall = max(moulds.skirt_wall_mm, HEIGHT * moulds.engraving_stroke_mm + 2 * MARGIN)
     by = moulds.land_mm + moulds.groove_width_mm + wall
@@ -128,7 +128,7 @@ def _outer(array: Array) -> Box:
 
 
 def _seams(array: Array, outer: Box) -> tuple[Seam, ...]:
-    """Return where the tray is cut. Raises Refusal for one that stays larger than the bed."""
+    """Return the cuts of the tray. Raises Refusal for one that stays larger than the bed."""
     kept = [*round_units(array, (place.radius - array.sheet.hold_mm for place in array.places)), *of_sheet(array)]
     what = f"the tray of {outer[2] - outer[0]:.4g} x {outer[3] - outer[1]:.4g} mm"
     plate, thickness = array.unit.moulds.plate_mm, array.sheet.thickness_mm
@@ -140,7 +140,7 @@ def _seams(array: Array, outer: Box) -> tuple[Seam, ...]:
 LEAST_WEB = 2.0
 """Silicone between two pockets, at least, mm (assumed): a narrower strip tears as a unit is pushed in."""
 OFF_ROUND = 0.05
-"""How far a unit's outline may lie off its disc, mm (assumed): a quarter of the usual hold."""
+"""Largest distance of a unit's outline from its disc, mm (assumed): a quarter of the usual hold."""
 
 
 def apart(unit: Spec) -> tuple[float, str]:
@@ -149,7 +149,7 @@ def apart(unit: Spec) -> tuple[float, str]:
 
 
 def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Level:
-    """Return where the sheet lies: over the tails, as near to the lowest unit's back as it can; else under them."""
+    """Return the sheet's place: over the tails, as near to the lowest unit's back as possible; otherwise under them."""
     lengths = [dimensions(unit) for unit in units]
     back = min(dims.heights[-1] for dims in lengths)
     over = max((dims.exit.high for dims in lengths if dims.exit), default=0.0)
@@ -160,13 +160,13 @@ def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Le
 
 
 def unfit(unit: Spec, sheet: Sheet) -> str:
-    """Return why a sheet's pocket can't hold a unit, "" where it can: the unit is a disc of its diameter there.
+    """Return the reason why a unit does not fit a pocket, "" if it does: it must be a disc of its diameter there.
 
     Nothing but tails reaches beyond that disc, they do so under or over the sheet, and at the sheet the silicone
-    fills the disc's edge. Where a design can't be drawn, that is said when it is drawn.
+    fills the disc's edge. A design that can't be drawn is refused when it is drawn.
     """
     if design_of(unit).tooling == "concentric":
-        return ""  # rings of these radii: their tails leave where `level` looks
+        return ""  # rings of these radii: their tails leave at the height that `level` checks
 
     try:
         bodies = unit_bodies(unit)
@@ -175,7 +175,7 @@ def unfit(unit: Spec, sheet: Sheet) -> str:
     radius, segments = unit.diameter_mm / 2, segment_count(unit.diameter_mm, unit.output.tolerance_mm)
     made = united(realise(body.shape, segments) for body in bodies if body.made != "bought")
     whole = united(realise(body.shape, segments) for body in bodies)
-    disc = f"a pocket holds a disc of diameter_mm = {unit.diameter_mm:g}"
+    disc = f"a pocket takes a disc of diameter_mm = {unit.diameter_mm:g}"
     low, high = made.bounding_box()[2::3]
     beyond = made - realise(cylinder(radius + OFF_ROUND, low - BEYOND, high + BEYOND), segments)
     if thick_pieces(beyond):
@@ -184,10 +184,10 @@ def unfit(unit: Spec, sheet: Sheet) -> str:
     at_sheet = realise(cylinder(radius + OFF_ROUND, sheet.low, sheet.high), segments)
     across = whole.trim_by_plane((0, 0, 1), sheet.low).trim_by_plane((0, 0, -1), -sheet.high) - at_sheet
     if thick_pieces(across):
-        return f"its circuit or wires leave where the sheet lies, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin"
+        return f"its circuit or wires leave at the sheet's height, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin"
     edge = ring(radius - OFF_ROUND - sheet.hold_mm, radius - OFF_ROUND, sheet.low, sheet.high)
     if thick_pieces(realise(edge, segments) - made):
-        return f"{disc}; where the sheet lies, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin, this unit is none"
+        return f"{disc}; at the sheet's height, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin, this unit is none"
     return ""
 
 
@@ -215,7 +215,7 @@ def plan(array: Array) -> Plan:
 
 CONSTRUCTION = Construction(
     name="pockets",
-    about="a sheet with holes that hold finished units, which can be tested alone and exchanged",
+    about="a sheet with holes for finished units, which can be tested first and exchanged",
     mixed=True,
     own_tails=True,
     thickness_mm=2.0,

@@ -1,4 +1,4 @@
-"""Layouts: where the units of an array stand. Every file here that defines LAYOUT is one."""
+"""Layouts: places of the units of an array. Every file here that defines LAYOUT is one."""
 
 from __future__ import annotations
 

@@ -20,9 +20,11 @@ class GridTable(Table, frozen=True, kw_only=True):
     """Columns and rows; `pitch_mm` along x and y, or one for both."""
 
     kind: Literal["grid"] = "grid"
-    columns: Count
-    rows: Count
-    pitch_mm: float | tuple[Pitch, Pitch]  # a Pitch beside the tuple crashes msgspec 0.22: `_OnePitch` has its limits
+    columns: Annotated[Count, Meta(description="number of columns")]
+    rows: Annotated[Count, Meta(description="number of rows")]
+    pitch_mm: Annotated[
+        float | tuple[Pitch, Pitch], Meta(description="distance between neighbours: one number, or [x, y]")
+    ]  # a Pitch next to the tuple crashes msgspec 0.22: `_OnePitch` has its limits
 
     @property
     def pitches(self) -> tuple[float, float]:

@@ -15,11 +15,13 @@ from unitcad.spec.asked import Table
 
 
 class HexTable(Table, frozen=True, kw_only=True):
-    """Rings round the middle unit; `pitch_mm` from each unit to its six neighbours. Rows lie along x."""
+    """Rings round the middle unit; `pitch_mm` from each unit to its six neighbours. Rows run along x."""
 
     kind: Literal["hex"] = "hex"
-    rings: Annotated[int, Meta(ge=1, le=18)] = 2
-    pitch_mm: Pitch
+    rings: Annotated[
+        int, Meta(ge=1, le=18, description="rings around the middle unit: 1 gives 7 units, 2 gives 19")
+    ] = 2
+    pitch_mm: Annotated[Pitch, Meta(description="distance between neighbours")]
 
 
 def points(table: HexTable, radius: float | None) -> tuple[Point, ...]:

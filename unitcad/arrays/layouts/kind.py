@@ -11,7 +11,7 @@ from unitcad.spec.asked import Table
 
 
 class Point(NamedTuple):
-    """A place's name and centre, mm; rows and columns are numbered from 0 where the kind has them."""
+    """A place's name and centre, mm; rows and columns are numbered from 0 if the kind has them."""
 
     name: str
     x: float
@@ -24,7 +24,7 @@ class Point(NamedTuple):
 class LayoutKind:
     """A kind by its name in a file.
 
-    points   from the table and the radius round which a ring is measured (mm, None where it is flat) to the points, the
+    points   from the table and the radius round which a ring is measured (mm, None if it is flat) to the points, the
              origin in their middle; raises Refusal for a table that gives none
     wider    from the table, the radius, the numbers of two points and the distance that they need (mm) to the refusal
              that names the value which would give it
@@ -55,7 +55,7 @@ def named(row: int, column: int) -> str:
 
 
 def needs(distance: float, pair: tuple[Point, Point]) -> str:
-    """Say how near two points are and what they need (mm)."""
+    """Return the distance of two points and the one that they need (mm), in words."""
     one, other = pair
     there = ((one.x - other.x) ** 2 + (one.y - other.y) ** 2) ** 0.5
-    return f"{one.name} and {other.name} stand {there:.4g} mm apart and need {distance:.4g} mm"
+    return f"{one.name} and {other.name} are {there:.4g} mm apart and need {distance:.4g} mm"

@@ -18,7 +18,10 @@ class ListTable(Table, frozen=True, kw_only=True):
     """The centres [x, y] of the units in their order, in any frame; they are named P1, P2 ... in it."""
 
     kind: Literal["list"] = "list"
-    points_mm: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Meta(min_length=1, max_length=1024)]
+    points_mm: Annotated[
+        tuple[tuple[Coordinate, Coordinate], ...],
+        Meta(min_length=1, max_length=1024, description="centres as [x, y], at least one; they are named P1, P2 ..."),
+    ]
 
 
 def points(table: ListTable, radius: float | None) -> tuple[Point, ...]:
@@ -29,7 +32,7 @@ def points(table: ListTable, radius: float | None) -> tuple[Point, ...]:
 
 
 def wider(table: ListTable, radius: float | None, pair: tuple[Point, Point], distance: float) -> Refusal:
-    """Refuse the later point; the nearest accepted one lies on the line from the other through it."""
+    """Refuse the later point; the nearest accepted one is on the line from the other through it."""
     one, other = sorted(pair, key=lambda point: point.column)
     away = math.hypot(other.x - one.x, other.y - one.y)
     ux, uy = ((other.x - one.x) / away, (other.y - one.y) / away) if away else (1.0, 0.0)

@@ -1,4 +1,4 @@
-"""Bands round a limb: units at equal distances round it, one band beside the other along it."""
+"""Bands round a limb: units at equal distances round it, one band next to the other along it."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from unitcad.spec.asked import Table
 
 
 class RingTable(Table, frozen=True, kw_only=True):
-    """`count` units round the limb whose radius `body.radius_mm` gives, in `bands`, `band_pitch_mm` along the limb."""
+    """`count` units round the limb whose radius `limb.radius_mm` gives, in `bands`, `band_pitch_mm` along the limb."""
 
     kind: Literal["ring"] = "ring"
-    count: Annotated[int, Meta(ge=2, le=200)]
-    bands: Annotated[int, Meta(ge=1, le=50)] = 1
-    band_pitch_mm: Pitch | None = None
+    count: Annotated[int, Meta(ge=2, le=200, description="units around the limb")]
+    bands: Annotated[int, Meta(ge=1, le=50, description="number of bands along the limb")] = 1
+    band_pitch_mm: Annotated[Pitch | None, Meta(description="distance between two bands")] = None
 
 
 def points(table: RingTable, radius: float | None) -> tuple[Point, ...]:
     """Return the points by bands from the top, unrolled: x is the way round, at the radius that keeps its length."""
     if radius is None:
-        raise Refusal("body.radius_mm", None, "a ring needs the radius of the limb that it goes round", 40.0)
+        raise Refusal("limb.radius_mm", None, "a ring needs the radius of the limb that it goes round", 40.0)
     if table.bands > 1 and table.band_pitch_mm is None:
         raise Refusal("layout.band_pitch_mm", None, f"{table.bands} bands need the distance between them", 40.0)
     pitch = 2 * math.pi * radius / table.count

@@ -17,6 +17,7 @@ from unitcad.attenuation.edge.models import BASELINE, COMPARED, MODELS, edge_lev
 from unitcad.attenuation.edge.nearest import COORDINATES
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
+from unitcad.text import some
 
 Positive = Annotated[float, Meta(ge=1e-9, le=1e9)]
 PERCENT = (10, 90)
@@ -105,7 +106,7 @@ def fault(fit: LabFit) -> tuple[str, Any, str] | None:
             return f"model.{model}", None, "is required"
         one = fit.model[model]
         if set(one.constants) != names:
-            return f"model.{model}.constants", sorted(one.constants), f"must be {' and '.join(sorted(names))}"
+            return f"model.{model}.constants", some(sorted(one.constants)), f"must be {' and '.join(sorted(names))}"
         matrix = one.covariance
         if [len(row) for row in matrix] != [len(names)] * len(names):
             return f"model.{model}.covariance", len(matrix), f"needs {len(names)} rows of as many numbers"

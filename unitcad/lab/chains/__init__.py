@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from unitcad.errors import Refusal, unknown_name
-from unitcad.lab.chains import line, paper
+from unitcad.lab.chains import bandpass, line
 from unitcad.lab.chains.chain import Chain, ChainTable
 
-CHAINS: dict[str, Callable[[ChainTable], Chain]] = {"line": line.chain, "paper": paper.chain}
+CHAINS: dict[str, Callable[[ChainTable], Chain]] = {"line": line.chain, "bandpass": bandpass.chain}
 
 
 def chains_of(table: ChainTable) -> tuple[Chain, ...]:

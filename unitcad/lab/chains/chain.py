@@ -1,4 +1,4 @@
-"""What a signal chain gives to a campaign: an amplitude of samples, and what people are told beside it."""
+"""A signal chain: an amplitude of samples, with its gain and assumptions."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class Line:
 class LineFit:
     """A record's line: amplitude (peak) with its standard uncertainty, in the signal's unit.
 
-    `u_noise` is the part of `u` that the noise beside the line gives, `u_mains` the part that every repeat shares.
+    `u_noise` is the part of `u` from the noise next to the line, `u_mains` the part that every repeat shares.
     `value` is the complex amplitude against `phase`. `drift` is the range of the frequency over its mean, `snr` the
     amplitude over the residual's standard deviation, `scatter` the standard deviation of the amplitude of blocks over
-    their mean. `masked` is the part of the samples left out by their residual, `dropped` the same where one of them
-    lies further off than noise does, else 0; `missing` the part that are no numbers. `clipped` is the level at which
-    the signal is cut off over its true amplitude, infinite if it is not cut off. `lines` are the lines of a record that
-    has several near each other, the strongest first: `amplitude` is then none of theirs.
+    their mean. `masked` is the fraction of samples excluded by their residual, `dropped` the same if one of them
+    exceeds noise, otherwise 0; `missing` the fraction without numbers. `clipped` is the level at which the signal is
+    cut off over its true amplitude, infinite if it is not cut off. `lines` are the lines of a record with several near
+    each other, the strongest first: `amplitude` is then none of theirs.
     """
 
     amplitude: float
@@ -73,7 +73,7 @@ class LineFit:
     missing: float = 0.0
     clipped: float = float("inf")
     mains_hz: float = 0.0
-    """The multiple of the mains' frequency that the record can't tell from the line; 0 where there is none."""
+    """The multiple of the mains' frequency that the record can't tell from the line; 0 if there is none."""
     lines: tuple[Line, ...] = ()
     phase: Phase | None = field(default=None, compare=False, repr=False)
     blocks: tuple[complex, ...] = field(default=(), repr=False)
@@ -85,25 +85,37 @@ ChainName = Annotated[str, Meta(min_length=1, max_length=40)]
 
 
 class ChainTable(Table, frozen=True, kw_only=True):
-    """The chains and their parameters; the first one's levels are the result. The paper's are assumed ones."""
+    """The signal chains and their parameters."""
 
-    use: Annotated[tuple[ChainName, ...], Meta(min_length=1, max_length=8)] = ("line",)
-    mains_hz: Annotated[float, Meta(ge=40, le=400)] = 50.0
-    band_hz: tuple[Hertz, Hertz] = (60.0, 250.0)
-    order: Annotated[int, Meta(ge=1, le=10)] = 4
-    q: Annotated[float, Meta(ge=1, le=1000)] = 30.0
-    zero_phase: bool = True
-    measure: Literal["rms", "peak"] = "rms"
-    trim_s: Annotated[float, Meta(ge=0, le=1000)] = 0.25
+    use: Annotated[
+        tuple[ChainName, ...],
+        Meta(
+            min_length=1,
+            max_length=8,
+            description="signal chains, line or bandpass; the first one's levels are the result",
+        ),
+    ] = ("line",)
+    mains_hz: Annotated[float, Meta(ge=40, le=400, description="frequency of the mains")] = 50.0
+    band_hz: Annotated[tuple[Hertz, Hertz], Meta(description="band in which the motor's line is searched")] = (
+        60.0,
+        250.0,
+    )
+    order: Annotated[int, Meta(ge=1, le=10, description="order of the band-pass (chain bandpass)")] = 4
+    q: Annotated[float, Meta(ge=1, le=1000, description="quality of the comb filter (chain bandpass)")] = 30.0
+    zero_phase: Annotated[bool, Meta(description="whether filters run forwards and backwards (chain bandpass)")] = True
+    measure: Annotated[Literal["rms", "peak"], Meta(description="amplitude as rms or peak (chain bandpass)")] = "rms"
+    trim_s: Annotated[
+        float, Meta(ge=0, le=1000, description="seconds cut from both ends after filtering (chain bandpass)")
+    ] = 0.25
 
 
 @dataclass(frozen=True)
 class Chain:
     """A chain with its parameters set.
 
-    `amplitude(x, rate, fit)` is the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit; `fit` is what
-    the chain `line` says of them. It raises Refusal for a record that it can't take. `unfit(fits)` says why a chain
-    gives no amplitude of a record with such lines, empty where it does. `gain(hz)` is the chain's gain of an amplitude,
+    `amplitude(x, rate, fit)` is the amplitude (peak) of samples x (n) at `rate` in Hz, in their unit; `fit` is the
+    result of the chain `line` for them. It raises Refusal for a record that it can't take. `unfit(fits)` is the reason
+    why a chain gives no amplitude for such lines, empty if it does. `gain(hz)` is the chain's gain of an amplitude,
     None for a chain without filters.
     """
 
@@ -119,7 +131,7 @@ class Chain:
 
     @property
     def assumed_text(self) -> str:
-        """What the chain assumes, as keys of [chain] with their values."""
+        """The chain's assumptions, as keys of [chain] with their values."""
         shown = {True: "true", False: "false"}
         return ", ".join(
             f"{key} {shown[value] if isinstance(value, bool) else f'{value:g}' if isinstance(value, float) else value}"

@@ -1,9 +1,9 @@
 """The chain `line`: a line of slowly varying phase, fitted with its harmonics, the mains, an offset and a slope.
 
 1. Coarse frequency by a spectrum. 2. Demodulate, cut the spin-up, smooth the phase. 3. Least squares on three
-harmonics, the lines of the mains that the record resolves, offset and slope, again without the samples that lie far
-off. Mains and outliers are then taken away and 2 and 3 repeated once. 4. The amplitude's uncertainty is that of the
-noise's density at the line over the record's length, of the scatter of blocks, and of mains that can't be told apart.
+harmonics, the lines of the mains that the record resolves, offset and slope, again without outliers. Mains and outliers
+are then removed and 2 and 3 repeated once. 4. The amplitude's uncertainty is that of the noise's density at the line
+over the record's length, of the scatter of blocks, and of mains that can't be separated.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ BAND_HZ = (60.0, 250.0)
 NO_MAINS = Mains()
 HARMONICS = 3
 FAR = 4.5
-"""Robust standard deviations of the residual beyond which a sample is left out, which noise exceeds here and there."""
+"""Robust standard deviations of the residual beyond which a sample is excluded; noise exceeds it now and then."""
 FALSE_ALARM = 1e-3
-"""Part of the records of normal noise alone in which a sample may be called a drop-out, at most."""
+"""Largest fraction of records of pure normal noise in which a sample may be called a drop-out."""
 ROUNDS = 6
 LEAST_SAMPLES = 16
 RESOLVED = 1.5
-"""Periods of the difference that a record must hold for two lines to be told apart."""
+"""Periods of the difference that a record needs to separate two lines."""
 
 
 def chain(table: ChainTable) -> Chain:
@@ -47,10 +47,10 @@ def fit_line(
     phase: Phase | None = None,
     span: tuple[float, float] | None = None,
 ) -> LineFit | None:
-    """Return the line of samples x (n) at `rate` in Hz; None where the band holds no line.
+    """Return the line of samples x (n) at `rate` in Hz; None if the band has no line.
 
-    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude. Where
-    the line is there for less than about two thirds of the samples, it is fitted to the longest stretch that has it.
+    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude. If
+    the line is there for less than about two thirds of the samples, the fit takes the longest stretch that has it.
     """
     good = np.isfinite(x)
     if span is not None:
@@ -83,9 +83,9 @@ class _Solution:
     line: Floats
     good: Bools
     widening: float
-    """How much wider the line's amplitude is than if all columns were orthogonal and no sample left out."""
+    """How much wider the line's amplitude is than if all columns were orthogonal and no sample excluded."""
     beyond_noise: bool
-    """Whether a sample that was left out lies further off than noise does."""
+    """Whether an excluded sample exceeds noise."""
 
 
 def _fit_running(
@@ -97,7 +97,7 @@ def _fit_running(
     phase: Phase | None,
     span: tuple[float, float] | None,
 ) -> LineFit | None:
-    """Return the line of samples that hold it for most of their length; see `fit_line`."""
+    """Return the line of samples that have it for most of their length; see `fit_line`."""
     good = np.isfinite(x)
     x = np.where(good, x, 0.0)
     if good.sum() < LEAST_SAMPLES or not np.ptp(x[good]) > 0:
@@ -178,7 +178,7 @@ def _fit_running(
 def _summary(found: _Solution, time: Floats, rate: float, mains: Mains) -> LineFit:
     """Return a solution's figures with their uncertainty.
 
-    Mains that the record can't tell from the line have any phase: their part in u is what a motor-off record has.
+    Mains that the record can't tell from the line have any phase: their part in u is that of a motor-off record.
     """
     span = found.span
     inside = (time >= span[0]) & (time <= span[1])
@@ -214,7 +214,7 @@ def _summary(found: _Solution, time: Floats, rate: float, mains: Mains) -> LineF
 
 
 def most_of_noise(count: int) -> float:
-    """Return how far, in robust standard deviations, the largest of `count` samples of normal noise lies at most.
+    """Return the largest of `count` samples of normal noise, in robust standard deviations.
 
     One record in 1 / FALSE_ALARM exceeds it at most, with the deviation estimated from the same samples: three standard
     errors of a median of absolute values, 1.17 over the root of the count, are added.
@@ -241,7 +241,7 @@ def _best_phase(
 
 
 def _within(time: Floats, span: tuple[float, float]) -> slice:
-    """Return the samples whose time lies in a span, ends included."""
+    """Return the samples with a time in a span, ends included."""
     return slice(int(np.searchsorted(time, span[0])), int(np.searchsorted(time, span[1], side="right")))
 
 
@@ -305,7 +305,7 @@ def trend_columns(time: Floats) -> Floats:
 NEAR = 0.02
 """Part of the peak below it in which samples are counted."""
 CROWD = 0.13
-"""Part of the samples within NEAR of a peak beyond which it is a plateau: twice what a sine has there."""
+"""Part of the samples within NEAR of a peak beyond which it is a plateau: twice that of a sine."""
 LEAST_VALUES = 8
 """Different values below which a channel shows its converter's steps and no motion that a limit could cut off."""
 
@@ -362,7 +362,7 @@ KNOTS_S = (0.5, 0.25)
 def coarse_frequency(x: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> float:
     """Return the frequency of the strongest line in a band, in Hz, by the peak of a spectrum with a Hann window.
 
-    A multiple of the mains' frequency is taken where it is more than three times as strong as any other line.
+    A multiple of the mains' frequency is chosen only if it is more than three times as strong as any other line.
     """
     frequency, size = spectrum(x, rate)
     inside = (frequency >= band[0]) & (frequency <= min(band[1], 0.45 * rate))
@@ -409,7 +409,7 @@ def envelope(x: Floats, good: Bools, rate: float, frequency: float) -> tuple[Flo
 
 
 def steady_span(time: Floats, line: Floats, length_s: float) -> tuple[float, float]:
-    """Return the span in s in which the line has spun up: the ends where it is below STEADY of its median are cut."""
+    """Return the span in s in which the line has spun up: ends below STEADY of its median are cut."""
     size = np.abs(line)
     enough = np.flatnonzero(size >= STEADY * np.median(size))
     first, last = int(enough[0]), int(enough[-1])
@@ -421,7 +421,7 @@ def steady_span(time: Floats, line: Floats, length_s: float) -> tuple[float, flo
 def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
     """Yield the line's phase, of rising flexibility: constant frequency, linear, cubic, splines.
 
-    None at all where fewer than three points have a line. A spline has a point between any two of its knots.
+    Nothing if fewer than three points have a line. A spline has a point between any two of its knots.
     """
 
     there = np.abs(line) > NO_LINE * np.abs(line).max(initial=0.0)
@@ -441,7 +441,7 @@ def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
         if pieces < 2 or pieces + 4 > len(time) / 2:
             continue
         ends = np.linspace(time[0], time[-1], pieces + 1)
-        if np.histogram(time, ends)[0].min() == 0:  # a gap: what the spline does there is not known
+        if np.histogram(time, ends)[0].min() == 0:  # a gap: the spline is unknown there
             continue
         inner = ends[1:-1]
         knots = np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4])
@@ -454,16 +454,16 @@ def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
         yield Phase(straight_beyond, pieces + 3)
 
 
-# The part of a record in which a motor runs, where it is silent for so long that medians are of the silence.
+# The part of a record in which a motor runs, for records with more silence than half, whose medians are of the silence.
 
 MOST_RUNNING = 0.65
-"""Part of a record up to which the running part is fitted alone: beyond, medians of all samples are of the line."""
+"""Fraction of a record up to which only the running part is fitted: beyond, medians of all samples are of the line."""
 ON = 0.5
 """Part of the envelope's largest value from which the motor runs."""
 SILENT = 0.2
 """Part of it below which the envelope stays in the silence, once it has had FALL_S to fall; a beat falls slowly."""
 QUIET = 0.4
-"""The same for what the silence holds beside the mains: a line that has only changed its frequency is louder."""
+"""The same for the rest of the silence without mains: a line that has only changed its frequency is louder."""
 LOWEST_HZ = 20.0
 FALL_S = 0.75 * WINDOW_S
 """How long the envelope of a line that ends takes to fall, with a margin."""
@@ -478,7 +478,7 @@ def running_part(
 ) -> tuple[int, int] | None:
     """Return the first sample of the longest stretch in which the line of a record runs, and the one after its last.
 
-    `x` has no offset; samples that are not `good` count for nothing. None where the line runs for most of the record,
+    `x` has no offset; samples that are not `good` count for nothing. None if the line runs for most of the record,
     or the rest is not silent.
     """
     most = BEYOND_LOUDEST * float(np.quantile(np.abs(x[good]), LOUDEST))
@@ -516,7 +516,7 @@ def _runs(on: Bools) -> list[tuple[int, int]]:
 def _loudest(x: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> float:
     """Return the amplitude of a line with all power of samples in a band, or of the strongest line outside, if more.
 
-    The mains and what is slower than LOWEST_HZ are left out.
+    The mains and frequencies below LOWEST_HZ are excluded.
     """
     if len(x) < 16:
         return 0.0
@@ -530,18 +530,18 @@ def _loudest(x: Floats, rate: float, band: tuple[float, float], mains_hz: float)
     return max(whole, strongest)
 
 
-# The standard uncertainty of a line's amplitude, from what its fit leaves.
+# The standard uncertainty of a line's amplitude, from the residual of its fit.
 
 NOISE_HZ = 15.0
-"""To either side of the line, where the noise's density is taken."""
+"""Distance from the line, to either side, at which the noise's density is taken."""
 BLOCK_S = 0.2
 LEAST_BLOCKS = 6
 
 
 def noise_beside(residual: Floats, good: Bools, rate: float) -> float:
-    """Return the standard deviation of the amplitude that the noise beside the line gives.
+    """Return the standard deviation of the amplitude from the noise next to the line.
 
-    `residual` (n) is what the fit leaves, turned back by the line's phase and 0 where a sample was left out. The noise
+    `residual` (n) is the residual of the fit, turned back by the line's phase and 0 for excluded samples. The noise
     N of the sum over n samples has the mean square of the sums at neighbouring frequencies; the amplitude is 2/n times
     its real part.
     """
@@ -580,23 +580,23 @@ def of_mean(values: Floats, noise_variance: float) -> tuple[float, float]:
 
 
 def block_means(value: complex, residual: Floats, good: Bools, rate: float) -> Floats:
-    """Return the line's complex amplitude in equal blocks: the whole record's and the mean of what is left there."""
+    """Return the line's complex amplitude in equal blocks: the whole record's and the mean of the residual there."""
     count = max(round(len(residual) / rate / BLOCK_S), LEAST_BLOCKS)
     edges = np.linspace(0, len(residual), count + 1).astype(int)[:-1]
     return value + 2 * np.add.reduceat(residual, edges) / np.maximum(np.add.reduceat(good.astype(float), edges), 1)
 
 
-# Other lines beside the strongest: another motor that runs.
+# Other lines next to the strongest: another motor that runs.
 
 BESIDE_HZ = 15.0
-"""To either side of the strongest line, where others are looked for."""
+"""Distance from the strongest line, to either side, within which others are searched."""
 LEAST_LINE = 0.05
 """Part of the strongest line's amplitude from which another one counts."""
 OVER_NOISE = 8
 """Standard deviations of noise from which a peak of the spectrum counts as a line."""
 MOST_LINES = 6
 MOST_LEFT = 0.5
-"""Part that steady lines must leave at most of the power beside a single line, beyond the noise, to be preferred."""
+"""Largest fraction of the residual power of a single line, beyond noise, that several steady lines may leave."""
 STEPS = 12
 SAME_PLACE, SAME_SIZE, SAME_PHASE = 0.4, 0.25, 0.4
 """How far lines to either side may be from a modulation's: periods of a record, logarithm of a ratio, rad."""
@@ -643,7 +643,7 @@ def _with_lines(x: Floats, residual: Floats, time: Floats, use: Bools, fit: Line
 
 
 def _modulation(hertz: Floats, values: Floats, length_s: float) -> float:
-    """Return the standard deviation of an amplitude whose modulation the lines are, over its mean; 0 where they aren't.
+    """Return the standard deviation of an amplitude whose modulation the lines are, over its mean; 0 if they aren't.
 
     `hertz` and `values` have the strongest line first. The others are then pairs of equal strength as far below it as
     above, in phase with each other about its phase: of lines that have nothing to do with each other few are.
@@ -663,7 +663,7 @@ def _modulation(hertz: Floats, values: Floats, length_s: float) -> float:
 
 
 def _refined(x: Floats, time: Floats, weight: Floats, hertz: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return frequencies (k), complex amplitudes at the middle and what is left, after Gauss-Newton steps over all."""
+    """Return frequencies (k), complex amplitudes at the middle and the residual, after Gauss-Newton steps over all."""
     omega, time = 2 * np.pi * hertz, time - time.mean()
     length = max(np.ptp(time), 1e-9)
     for step in range(STEPS + 1):

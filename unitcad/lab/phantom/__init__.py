@@ -20,6 +20,7 @@ from unitcad.kernels.mesh import bounds, realise
 from unitcad.lab.phantom.box import BoxLengths, cast, expect_apart, lengths, pieces
 from unitcad.lab.phantom.recipe import PhantomTable, Recipe, recipe, stiffening
 from unitcad.shape.body import Body
+from unitcad.text import some
 
 ACRYLIC = {"density_kg_m3": 1190.0, "youngs_modulus_kpa": 3e6, "poisson_ratio": 0.37, "loss_factor": 0.05}
 """Cast acrylic at room temperature (secondary: data sheets)."""
@@ -32,11 +33,11 @@ _RTOL, _DECIMALS = 1e-4, 6
 
 @dataclass(frozen=True)
 class Expected:
-    """The response: |u_z| over its value at the unit's edge at distances (mm) from it, and where it comes from.
+    """The response: |u_z| over its value at the unit's edge at distances (mm) from it, and its source.
 
     `low`, `high`: each kind of input by itself at both ends. `sensitivity`: relative change at the farthest point for a
     layer thinner by `THINNER_MM`. `wall_mm`: least distance of a wall from the unit's centre for the asked echo;
-    `echo_pct`: at the wall as it is, `soft_echo_pct`: there with the least loss factors. `forearm`: the body template's
+    `echo_pct`: at the actual wall, `soft_echo_pct`: there with the least loss factors. `forearm`: the body template's
     curve, `factor` the mean factor between the two.
     """
 
@@ -75,7 +76,7 @@ def _farthest(phantom: PhantomTable) -> float:
 def wall_distance(phantom: PhantomTable, recipes: Sequence[Recipe]) -> float:
     """Return the least distance (mm) of a wall from the unit's centre that keeps the echo at the farthest point small.
 
-    Beyond it no wall up to `FARTHEST_MM` echoes more. Infinite where that is not far enough.
+    Beyond it no wall up to `FARTHEST_MM` echoes more. Infinite if that is not far enough.
     """
     walls = np.arange(_farthest(phantom) + 1.0, FARTHEST_MM, 0.25)
     loud = np.flatnonzero(_echo(phantom, medium(phantom, recipes), walls) > phantom.most_echo_pct / 100)
@@ -167,7 +168,7 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
     """
     recipes = tuple(recipe(one, table.frequency_hz, f"layers.{i}") for i, one in enumerate(table.layers))
     if len({layer.name for layer in table.layers}) < len(table.layers):
-        raise Refusal("layers", ", ".join(layer.name for layer in table.layers), "each layer needs a name of its own")
+        raise Refusal("layers", some(layer.name for layer in table.layers), "each layer needs a name of its own")
     expect_apart(table.points_mm)
     printer = choose("printer", table.printer, printers())
     wall, farthest = wall_distance(table, recipes), f"at {max(table.points_mm):g} mm"
@@ -218,7 +219,7 @@ def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
     """Return the layers of [tissue.NAME] of a spec, skin first, the plate last."""
     found: dict[str, dict[str, object]] = {}
     hertz = phantom.table.frequency_hz
-    also = f"; high: also times {stiffening(hertz):.3g}, what {hertz:g} Hz may bring (assumed)"
+    also = f"; high: also times {stiffening(hertz):.3g}, which {hertz:g} Hz may add (assumed)"
 
     def ranged(value: float, low: float, high: float) -> dict[str, Any]:
         return rounded({"value": value, "low": low, "high": high}, 4)

@@ -151,7 +151,7 @@ def sheet_markdown(phantom: PhantomSet) -> str:
 
 
 def bill(phantom: PhantomSet) -> list[Item]:
-    """Return what is printed, cut, bought and weighed."""
+    """Return the pieces to print, cut, buy and weigh."""
     table, found = phantom.table, pours(phantom)
     items = [
         Item(
@@ -186,7 +186,7 @@ def bill(phantom: PhantomSet) -> list[Item]:
         ("tape or clips", "hold the frames down"),
         ("pen", "marks the skin through the lid"),
         ("thin blade", "loosens the slab from the wall"),
-        ("rubber band", "holds the tray in its holder"),
+        ("rubber band", "fixes the tray in its holder"),
         ("emery paper, fine", "roughens the plate"),
         ("silicone primer", "optional: bonds the lowest layer to the plate, in place of roughening it"),
     ):
@@ -196,7 +196,7 @@ def bill(phantom: PhantomSet) -> list[Item]:
 
 
 def _moduli(phantom: PhantomSet) -> Iterator[str]:
-    """Say where the moduli come from, the table of thinned silicones, and what the frequency adds."""
+    """Return the source of the moduli, the table of thinned silicones, and the effect of the frequency."""
     hertz = phantom.table.frequency_hz
     yield f"Moduli: {phantom.recipes[0].source}. They are quasi-static."
     yield "The range is two standard deviations of that table."
@@ -209,7 +209,7 @@ def _moduli(phantom: PhantomSet) -> Iterator[str]:
 def _preparation(phantom: PhantomSet, found: Sequence[PhantomPour]) -> Iterator[str]:
     table, size = phantom.table, phantom.size
     yield (
-        "Print the pieces as they lie in their files; the blade already lies edge up there, the lid flat. "
+        "Print the pieces in the orientation of their files: the blade edge up, the lid flat. "
         "Uncured resin and latex keep silicone from curing: wash and post-cure resin prints fully, cast a small trial "
         "on each, and wear nitrile gloves."
     )
@@ -272,11 +272,11 @@ def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
     if p.index > 1:
         yield (
             f"When the layer before is firm: trim the film off the rim below, put {frame} on the pegs and press it "
-            "down all round. Hold it with tape on the outside or clips at the ears: nothing may lie on the rim that "
-            "the blade runs on. A thin line of petroleum jelly between the rims keeps it tight; wipe off what comes "
+            "down all round. Hold it with tape on the outside or clips at the ears: nothing may be on the rim that "
+            "the blade runs on. A thin line of petroleum jelly between the rims keeps it tight; wipe off the excess "
             "out inside. No release agent on the silicone: the layers must bond."
         )
-    yield "Weigh the box with what is in it, and write that down."
+    yield "Weigh the box with its content, and write that down."
     yield (
         f"Weigh {p.part_a_g:.1f} g of {one.silicone.name} part A, {p.part_b_g:.1f} g of part B and {p.thinner_g:.1f} "
         f"g of thinner. Mix for {MIXING_MIN:g} min (assumed), scraping the walls; degas; the pot life runs from now, "
@@ -284,7 +284,7 @@ def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
     )
     rim = "the tray's rim" if p.index == 1 else f"the rim of {frame}"
     yield (
-        f"Pour in a thin thread at one corner until the silicone stands over {rim}, and prick the bubbles that rise."
+        f"Pour in a thin thread at one corner until the silicone rises above {rim}, and prick the bubbles that rise."
     )
     yield (
         f"Strike off with the blade: along x, its edge on {rim} at both sides, drawn once from one end to the other "
@@ -308,7 +308,7 @@ def _release(phantom: PhantomSet) -> Iterator[str]:
     x, y = bolts(phantom.table, phantom.size)
     yield (
         "Measure in the box: its walls count in the design. The holder is bolted to the table by four "
-        f"M{phantom.table.stage_bolt_mm:g} at {2 * x:g} x {2 * y:g} mm; the tray stands between its fences, held "
+        f"M{phantom.table.stage_bolt_mm:g} at {2 * x:g} x {2 * y:g} mm; the tray is between its fences, fixed "
         "down by a rubber band."
     )
     yield (
@@ -328,7 +328,7 @@ def _expectations(phantom: PhantomSet) -> Iterator[str]:
     yield (
         f"|u_z| of the skin at {table.frequency_hz:g} Hz over its value at the unit's edge, the motor's disc pressing "
         "evenly, by the layered solver with moduli from quasi-static compression. The range takes loss factors (half "
-        "to one and a half times, assumed), moduli (up to what the frequency may bring) and thicknesses each by itself."
+        "to one and a half times, assumed), moduli (up to the effect of the frequency) and thicknesses each by itself."
     )
     yield ""
     yield "| mm from the edge | expected | low | high | the forearm template |"
@@ -346,6 +346,6 @@ def _expectations(phantom: PhantomSet) -> Iterator[str]:
     yield ""
     yield (
         f"A wall sends back {e.echo_pct:.2g} % at {e.distances_mm[-1]:g} mm at most: {phantom.inside_mm / 2:g} mm "
-        f"from the unit's centre, where {e.wall_mm:g} mm would give {table.most_echo_pct:g} % (a mirror's estimate). "
+        f"from the unit's centre, and {e.wall_mm:g} mm would give {table.most_echo_pct:g} % (a mirror's estimate). "
         f"With the least loss factors it is {e.soft_echo_pct:.2g} %."
     )

@@ -44,10 +44,10 @@ def expect_apart(points_mm: Sequence[float]) -> None:
 
 
 WALL, FLOOR, LID, HOLDER = 4.0, 3.0, 4.0, 6.0
-"""Walls beside the cavity at its rim, the tray's floor, thickness of lid and holder, mm."""
+"""Walls around the cavity at its rim, the tray's floor, thickness of lid and holder, mm."""
 DRAFT_DEG = 1.0
 EAR, EAR_HALF, EAR_AT = 14.0, 9.0, 0.65
-"""How far an ear stands out, its half width, and its middle as a part of the half side, mm."""
+"""Length of an ear, its half width, and its middle as a part of the half side, mm."""
 PEG_RADIUS, PEG_FROM_WALL = 3.0, 8.0
 PUSH_RADIUS = 8.0
 PLATE_PLAY = 0.3
@@ -155,7 +155,7 @@ def _at_corners(shape: Shape, x: float, y: float) -> list[Shape]:
 
 
 def _tray(size: BoxLengths) -> Shape:
-    # The taper runs on above the rim, so that no face of the tool lies in the rim's.
+    # The taper runs on above the rim, so that no face of the tool is in the rim's plane.
     beyond = 1.0
     wide = size.rim + beyond * (size.rim - size.inner) / size.tray_rim
     cavity = Extrude(_square(size.inner), 0.0, size.tray_rim + beyond, top=_square(wide))
@@ -167,7 +167,7 @@ def _tray(size: BoxLengths) -> Shape:
 
 
 def _frame(size: BoxLengths, low: float, high: float, number: str, stroke: float, depth: float) -> Shape:
-    """Draw a frame; its pour's number is engraved on an ear, beyond the peg, where the blade does not run."""
+    """Draw a frame; its pour's number is engraved on an ear, beyond the peg, out of the blade's way."""
     y = size.ear_y + (size.hole + EAR_HALF - HEIGHT * stroke) / 2
     depth = min(depth, (high - low) / 2)
     figure = moved(engraving(number, stroke, high - depth, high + 1.0), size.peg_x - text_width(number, stroke) / 2, y)
@@ -195,7 +195,7 @@ def _lid(phantom: PhantomTable, size: BoxLengths) -> Shape:
 
 
 def _holder(phantom: PhantomTable, size: BoxLengths) -> Shape:
-    """Draw the plate that holds the tray on a table with threaded holes: fences at its corners, four bolt holes."""
+    """Draw the plate that fixes the tray on a table with threaded holes: fences at its corners, four bolt holes."""
     low, high = size.bottom - HOLDER, size.bottom
     x_bolt, y_bolt = bolts(phantom, size)
     face, beside = size.outer + 0.3, phantom.stage_bolt_mm + 4.0

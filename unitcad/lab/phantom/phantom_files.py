@@ -119,7 +119,7 @@ def casting_data(phantom: PhantomSet) -> dict[str, Any]:
 def write(folder: Path, found: Mapping[str, bytes], printer: str) -> list[str]:
     """Write the files into a folder, then check the meshes there; return the findings that are errors, as lines.
 
-    All are written under another name first; the procedure is put in place last. Raises OSError where that fails.
+    All are written under another name first; the procedure is put in place last. Raises OSError if that fails.
     """
     files.replace_all(folder, found, FINISHED)
     meshes = sorted(str(folder / name) for name in found if name.endswith((".stl", ".3mf")))

@@ -1,4 +1,4 @@
-"""What a phantom's TOML file may hold. Lengths in mm; layers from the skin down, on a stiff plate."""
+"""The TOML file of a phantom. Lengths in mm; layers from the skin down, on a stiff plate."""
 
 from __future__ import annotations
 
@@ -27,38 +27,41 @@ _NAME = "small letters a to z, digits and -, the first a letter or digit"
 
 
 class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One layer: a silicone of the table of thinned ones, its thinner in parts to 100 of A and B, and its thickness.
-
-    `loss_factor`: tan delta, assumed.
-    """
+    """One layer of the phantom, from the skin down."""
 
     name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[a-z][a-z0-9-]*$", description=_LAYER_NAME)]
-    silicone: str
-    thinner_pct: Annotated[float, Meta(ge=0, le=100)]
-    thickness_mm: Annotated[float, Meta(ge=LEAST_LAYER, le=60)]
-    loss_factor: Annotated[float, Meta(ge=0.01, le=1)] = 0.2
+    silicone: Annotated[str, Meta(description="tested silicone: ecoflex-00-10, ecoflex-00-30 or ecoflex-00-50")]
+    thinner_pct: Annotated[float, Meta(ge=0, le=100, description="thinner, in parts by weight to 100 of A and B")]
+    thickness_mm: Annotated[float, Meta(ge=LEAST_LAYER, le=60, description="thickness of the layer")]
+    loss_factor: Annotated[float, Meta(ge=0.01, le=1, description="tan delta (assumed)")] = 0.2
 
 
 class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A phantom; `inside_mm` is the box's inside, None for the least that keeps the echo below `most_echo_pct`."""
+    """A skin phantom: one box of silicone layers."""
 
     name: Annotated[str, Meta(min_length=1, max_length=60, pattern=r"^[a-z0-9][a-z0-9-]*$", description=_NAME)]
     layers: Annotated[tuple[PhantomLayer, ...], Meta(min_length=1, max_length=6)]
-    unit_diameter_mm: Annotated[float, Meta(ge=4, le=40)] = 14.0
-    motor_diameter_mm: Annotated[float, Meta(ge=2, le=40)] = 7.0
+    unit_diameter_mm: Annotated[float, Meta(ge=4, le=40, description="diameter of the unit to measure")] = 14.0
+    motor_diameter_mm: Annotated[float, Meta(ge=2, le=40, description="diameter of its motor")] = 7.0
     frequency_hz: kinds.Frequency = 125.0
-    points_mm: Annotated[tuple[Annotated[float, Meta(ge=0, le=60)], ...], Meta(min_length=2, max_length=13)] = (
-        0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0
-    )  # fmt: skip
-    inside_mm: Annotated[float, Meta(ge=40, le=400)] | None = None
-    most_echo_pct: Annotated[float, Meta(ge=0.5, le=50)] = 5.0
-    plate_thickness_mm: Annotated[float, Meta(ge=2, le=20, description="of the acrylic plate below")] = 5.0
-    stage_pitch_mm: Annotated[float, Meta(ge=5, le=50, description="of the table's threaded holes")] = 25.0
+    points_mm: Annotated[
+        tuple[Annotated[float, Meta(ge=0, le=60)], ...],
+        Meta(min_length=2, max_length=13, description="distances of the measuring points from the unit's edge"),
+    ] = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
+    inside_mm: Annotated[
+        Annotated[float, Meta(ge=40, le=400)] | None,
+        Meta(description="inner side of the box; default: the smallest with an echo below most_echo_pct"),
+    ] = None
+    most_echo_pct: Annotated[
+        float, Meta(ge=0.5, le=50, description="largest echo of the walls at the last point, in percent")
+    ] = 5.0
+    plate_thickness_mm: Annotated[float, Meta(ge=2, le=20, description="thickness of the acrylic plate below")] = 5.0
+    stage_pitch_mm: Annotated[float, Meta(ge=5, le=50, description="pitch of the table's threaded holes")] = 25.0
     stage_bolt_mm: Annotated[float, Meta(ge=2, le=12, description="thread of the table's holes")] = 6.0
-    printer: str = "fdm-0.4"
-    waste: Annotated[float, Meta(ge=0, le=2, description="extra mix as a fraction")] = 0.1
-    scale_resolution_g: Annotated[float, Meta(ge=1e-4, le=10)] = 0.1
-    room_c: Annotated[float, Meta(ge=5, le=45)] = 23.0
+    printer: Annotated[str, Meta(description="printer of the catalogue")] = "fdm-0.4"
+    waste: Annotated[float, Meta(ge=0, le=2, description="extra mix, as a fraction")] = 0.1
+    scale_resolution_g: Annotated[float, Meta(ge=1e-4, le=10, description="smallest step of the scale")] = 0.1
+    room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room")] = 23.0
 
     @property
     def depth_mm(self) -> float:
@@ -72,7 +75,7 @@ def phantoms() -> dict[str, Path]:
 
 
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
-    """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for what is not valid."""
+    """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for an invalid one."""
     path = named_file(os.fspath(source), phantoms(), "phantom", WrongArgument)
     return convert(read_toml(path), PhantomTable)
 
@@ -80,7 +83,7 @@ def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
 THINNER_DENSITY = 0.97
 """g/cm3 (assumed: a silicone oil)."""
 LOSS_RANGE = (0.5, 1.5)
-"""Range of an assumed loss factor, as factors: 0.1 to 0.3 where it is 0.2."""
+"""Range of an assumed loss factor, as factors: 0.1 to 0.3 for 0.2."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +147,7 @@ def modulus_by_table(silicone: str, thinner_pct: float, field: str) -> tuple[flo
 def stiffening(frequency_hz: float) -> float:
     """Return how much stiffer silicone may be at a frequency than at rest: the catalogue's fractional law of Ecoflex.
 
-    That the law holds with thinner is assumed; the moduli of the table were measured slowly.
+    The law is assumed to be valid with thinner; the moduli of the table were measured slowly.
     """
     material = materials()["ecoflex-00-30"]
     assert material.fractional_tau_us

@@ -19,6 +19,7 @@ from unitcad import files
 from unitcad.errors import Refusal, UnitcadError, missing_extra
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.units import TIMES, plain
+from unitcad.text import some
 from unitcad.workers import Pool, TimedOut, WorkerEnded
 
 LARGEST = 250_000_000
@@ -36,17 +37,15 @@ OTHER_PROGRAMS = {
     **dict.fromkeys((".xls", ".xlsx", ".ods"), "a spreadsheet: save the sheet with the numbers as CSV"),
 }
 """Endings that no reader has, and the way to a file that one reads."""
-MOST_SHOWN = 10
-"""Channels that a message lists."""
 _MOST = 1e30
 """Beyond it, and beyond its inverse, a number is none that was measured."""
 _EXTRA = {"pyuff": "pyuff", "nptdms": "npTDMS", "h5py": "h5py"}
 
 
 def expect_held(path: Path, name: str, stated: int, held: int, size: int = 1) -> None:
-    """Raise Unreadable if a file states more numbers than it holds or than are read; `size` is a number's in bytes.
+    """Raise Unreadable if a file states more numbers than it contains or than unitcad reads; `size`: bytes of one.
 
-    `held`: the most bytes that its stored data can stand for.
+    `held`: the largest number of bytes that its stored data can expand to.
     """
     if stated > MOST_NUMBERS:
         limit = f"{name} states {stated} numbers; at most {MOST_NUMBERS} are read: cut the record"
@@ -85,7 +84,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Recording:
-    """Channels of a file; `time` is the one that holds time by its name and unit."""
+    """Channels of a file; `time` is the time by its name and unit."""
 
     path: Path
     channels: Sequence[Channel]
@@ -103,8 +102,7 @@ class Recording:
     def numbered(self, indices: Iterable[int] | None = None) -> str:
         """Return the first channels' numbers and names, of some or of all."""
         shown = list(range(len(self.channels)) if indices is None else indices)
-        more = f" and {len(shown) - MOST_SHOWN} more" if len(shown) > MOST_SHOWN else ""
-        return ", ".join(f"{i + 1} {self.channels[i].name}" for i in shown[:MOST_SHOWN]) + more
+        return some(f"{i + 1} {self.channels[i].name}" for i in shown)
 
     def index(self, wanted: str | int, field: str) -> int:
         """Return the index of a channel by its name or its number, which counts from 1. Raises Refusal.
@@ -132,8 +130,8 @@ class Recording:
         chosen = [self.channels[i] for i in indices]
         counts = [len(channel.samples) for channel in chosen]
         if len(set(counts)) > 1:
-            listed = ", ".join(f"{c.name} {count}" for c, count in zip(chosen[:MOST_SHOWN], counts, strict=False))
-            raise Refusal("channel", self.path.name, f"its channels have different counts of samples: {listed}")
+            each = some((f"{c.name} {count}" for c, count in zip(chosen, counts, strict=True)))
+            raise Refusal("channel", self.path.name, f"its channels have different counts of samples: {each}")
         table = np.column_stack([np.asarray(channel.samples, float) for channel in chosen])
         size = np.abs(table)
         absurd = (size > _MOST) | ((size > 0) & (size < 1 / _MOST))

@@ -14,23 +14,23 @@ ENDINGS = (".h5", ".hdf5")
 LIBRARY = "h5py"
 MOST_COLUMNS = 4096
 MOST_PACKED = 1100
-"""Bytes that a compressed byte stands for at most (deflate: 1,032)."""
+"""Largest expansion of a compressed byte (deflate: 1,032)."""
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
     """Return the numeric data sets of one or two dimensions; those of two give a channel per line of the shorter side.
 
-    Data that lies in other files is refused. Raises Unreadable.
+    Data in other files is refused. Raises Unreadable.
     """
     _expect_whole(path)
     found = channels(path)
     if not found:
-        raise Unreadable(str(path), None, "holds no data set of numbers")
+        raise Unreadable(str(path), None, "has no data set of numbers")
     return found
 
 
 def channels(path: Path) -> list[Channel]:
-    """Return a file's columns. Data that lies in other files is refused."""
+    """Return a file's columns. Data in other files is refused."""
     import h5py
 
     sizes = [("STD_I", bits) for bits in (8, 16, 32, 64)] + [("STD_U", bits) for bits in (8, 16, 32, 64)]
@@ -45,7 +45,7 @@ def channels(path: Path) -> list[Channel]:
         if node.dtype.kind not in "fiu" or not node.shape or max(node.shape) < 2:
             return
         if node.is_virtual or node.external:
-            raise Unreadable(str(path), None, f"{name} lies in another file")
+            raise Unreadable(str(path), None, f"{name} is in another file")
         _expect_stored(path, name, node)
         if not any(node.id.get_type() == kind for kind in plain):
             raise Unreadable(str(path), None, f"the numbers of {name} have no standard layout: it is damaged")
@@ -65,7 +65,7 @@ def channels(path: Path) -> list[Channel]:
 
 
 def _expect_whole(path: Path) -> None:
-    """Raise Unreadable where the file does not end where its superblock states."""
+    """Raise Unreadable if the file does not end at the byte that its superblock states."""
     size = path.stat().st_size
     with open(path, "rb") as file:
         base = 0
@@ -83,7 +83,7 @@ def _expect_whole(path: Path) -> None:
 
 
 def _expect_stored(path: Path, name: str, node: Any) -> None:
-    """Raise Unreadable if a data set states more than its stored bytes can stand for, or has chunks beyond memory."""
+    """Raise Unreadable if a data set states more than its stored bytes can expand to, or has chunks beyond memory."""
     stored = node.id.get_storage_size()
     if not stored:
         raise Unreadable(str(path), None, f"{name} has no samples stored")

@@ -18,7 +18,7 @@ from unitcad.lab.readers import Channel, Layout, Unreadable, expect_held
 ENDINGS = (".mat",)
 LIBRARY = "scipy"
 MOST_BYTES = 2**27
-"""Bytes of the decompressed file; a byte may stand for a number of eight."""
+"""Bytes of the decompressed file; a byte may expand to a number of eight."""
 DEEPEST = 3
 """Structs in structs that are looked into."""
 
@@ -38,7 +38,7 @@ def read(path: Path, layout: Layout) -> list[Channel]:
         data = loadmat(str(path), variable_names=names, struct_as_record=False, squeeze_me=False)
     found = [channel for name in names if name in data for channel in _columns(name, data[name], 0)]
     if not found:
-        raise Unreadable(str(path), None, "holds no vector and no matrix of numbers")
+        raise Unreadable(str(path), None, "has no vector and no matrix of numbers")
     return found
 
 

@@ -18,7 +18,7 @@ MOST_SCALES = 100
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
-    """Return the channels of a TDMS file, named group/channel. Raises Unreadable where it holds no numbers."""
+    """Return the channels of a TDMS file, named group/channel. Raises Unreadable if it has no numbers."""
     from nptdms import TdmsFile
     from nptdms.log import log_manager
 
@@ -35,7 +35,7 @@ def read(path: Path, layout: Layout) -> list[Channel]:
             if held != stated:
                 raise Unreadable(str(path), None, f"its channels state {held} bytes of samples, its segments {stated}")
         if file.file_status.channel_statuses is not None:
-            raise Unreadable(str(path), None, "its last segment holds fewer samples than it states: it is damaged")
+            raise Unreadable(str(path), None, "its last segment has fewer samples than it states: it is damaged")
         for place in (file, *file.groups(), *everything):  # a channel has its own scales, or its group's, or the file's
             scales = place.properties.get("NI_Number_Of_Scales", 0)
             if not isinstance(scales, int | np.integer) or scales > MOST_SCALES:
@@ -53,14 +53,15 @@ def read(path: Path, layout: Layout) -> list[Channel]:
                 Channel(channel[:], name, unit if isinstance(unit, str) else "", float(step) if known else None)
             )
     if not found:
-        raise Unreadable(str(path), None, "holds no channel of numbers")
+        raise Unreadable(str(path), None, "has no channel of numbers")
     return found
 
 
 def _raw_bytes(path: Path, size: int) -> int | None:
     """Walk the segments' lead-ins; return the bytes of their raw data, None for raw data of DAQmx.
 
-    Raises Unreadable where a segment does not begin where the one before ends, or the last one ends elsewhere.
+    Raises Unreadable if a segment does not begin at the end of the one before, or the last one does not end with the
+    file.
     """
     raw, at, plain = 0, 0, True
     with open(path, "rb") as file:
@@ -68,7 +69,7 @@ def _raw_bytes(path: Path, size: int) -> int | None:
             file.seek(at)
             lead = file.read(_LEAD)
             if len(lead) < _LEAD or not lead.startswith(b"TDSm"):
-                raise Unreadable(str(path), None, f"has no segment at byte {at}, where one is stated")
+                raise Unreadable(str(path), None, f"has no segment at byte {at}, although it states one")
             (contents,) = struct.unpack("<I", lead[4:8])
             _, following, before = struct.unpack(f"{'>' if contents & _BIG_ENDIAN else '<'}IQQ", lead[8:])
             plain = plain and not contents & _DAQMX

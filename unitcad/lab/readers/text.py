@@ -1,7 +1,7 @@
 """Text of numbers in columns: the longest run of lines with the same columns of numbers is the data.
 
-A guess is refused: a line of another width among the numbers, two delimiters that both fit. Columns of words beside the
-numbers are left out. An empty cell, and the sign that an instrument writes for a value beyond its range, are no number.
+A guess is refused: a line of another width among the numbers, two delimiters that both fit. Columns of words among the
+numbers are skipped. An empty cell, and the sign that an instrument writes for a value beyond its range, are no number.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _CLOCK = re.compile(r"(?:\d[\d/.-]*[ T])?(\d{1,2}):(\d\d):(\d\d(?:\.\d+)?)", re.
 """A time of day, perhaps after a date."""
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?(?:[eE][+-]?\d+)?", re.ASCII)
 _DIALECTS = (("\t", "."), (";", "."), (",", "."), (" ", "."), ("\t", ","), (";", ","), (" ", ","), (",", ","))
-"""Delimiter and decimal sign; the same sign for both only where quotes tell them apart."""
+"""Delimiter and decimal sign; the same sign for both only if quotes separate them."""
 _UNIT_ALONE = re.compile(r"[\[(][^\[\]()]*[\])]")
 _NAMED_UNIT = re.compile(r"(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*")
 _END_OF_HEADER = "***End_of_Header***"
@@ -66,7 +66,7 @@ class Block:
     def row(self, line: str, width: int = 0) -> tuple[list[str], tuple[str, ...]]:
         """Return a line's fields with a point for the decimal sign, and their kinds; none without a number.
 
-        A delimiter at the end of a line of `width` - 1 fields stands before an empty one.
+        A delimiter at the end of a line of `width` - 1 fields precedes an empty field.
         """
         fields = self.split(line)
         if len(fields) == width - 1 and self.delimiter != " " and line.endswith(self.delimiter):
@@ -121,7 +121,7 @@ def _text(path: Path) -> str:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16", "replace")
     if b"\0" in content:
-        raise Unreadable(str(path), None, "holds zero bytes: it is no text")
+        raise Unreadable(str(path), None, "has zero bytes: it is no text")
     for encoding in ("utf-8-sig", "gb2312"):
         # Latin-1 text has single bytes above ASCII, such as its sign of micro; Chinese characters are pairs.
         if encoding == "gb2312" and any(len(run) % 2 for run in re.findall(rb"[\x80-\xff]+", content)):
@@ -134,7 +134,7 @@ def _text(path: Path) -> str:
 
 
 def _beside(lines: list[str]) -> list[str]:
-    """Return the lines of an oscilloscope that writes its header beside the data (Tektronix) with the header above."""
+    """Return the lines of an oscilloscope that writes its header next to the data (Tektronix) with the header above."""
     if not re.match(r'"?Record Length"?,', lines[0]):
         return lines
     rows = [[cell.strip(' "') for cell in line.split(",")] for line in lines if line.strip(" ,")]
@@ -167,7 +167,7 @@ def _block(path: Path, lines: list[str], layout: Layout) -> Block:
     longest = max(runs, key=lambda run: run.lines, default=None)
     best = whole if whole and longest and 2 * whole.lines >= longest.lines else longest
     if best is None or best.lines < 2:
-        raise Unreadable(str(path), None, "holds no block of lines with the same count of numbers")
+        raise Unreadable(str(path), None, "has no block of lines with the same count of numbers")
     if not layout.decimal:
         quoted = [_quoted(line.strip(" "), best.delimiter) for line in lines[best.start :] if '"' in line]
         fields = [field.strip() for line in quoted for field in line if "," in field]

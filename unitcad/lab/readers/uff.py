@@ -1,4 +1,4 @@
-"""Universal files (.uff, .unv): data sets 58 and 58b that are time records, by pyuff. What Polytec exports too."""
+"""Universal files (.uff, .unv): data sets 58 and 58b that are time records, by pyuff. Polytec exports them too."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def read(path: Path, layout: Layout) -> list[Channel]:
     records = [one for one in sets if int(one["func_type"]) in TIME_RESPONSE]
     if not records:
         listed = ", ".join(map(str, kinds)) or "none"
-        raise Unreadable(str(path), None, f"holds no time record (its data sets: {listed})")
+        raise Unreadable(str(path), None, f"has no time record (its data sets: {listed})")
     return [_record(path, one) for one in records]
 
 
 def _expect_binary_whole(path: Path) -> None:
-    """Raise Unreadable where a binary data set does not end as many bytes behind its header as that states."""
+    """Raise Unreadable if a binary data set does not end as many bytes behind its header as that states."""
     content = path.read_bytes()
     for head in _BINARY.finditer(content):
         at = head.end()
@@ -47,7 +47,7 @@ def _expect_binary_whole(path: Path) -> None:
             at = content.find(b"\n", at) + 1 or len(content)
         end = content[at + int(head[2]) :]
         if not re.match(rb"\s{0,2}    -1\s", end[:16]):
-            raise Unreadable(str(path), None, f"does not hold the {int(head[2])} bytes that a data set states")
+            raise Unreadable(str(path), None, f"lacks some of the {int(head[2])} bytes that a data set states")
 
 
 _BINARY = re.compile(rb"^ {4}58b[ \d]{12}([ \d]{12})([ \d]{12})[^\n]*\n", re.MULTILINE)
@@ -55,7 +55,7 @@ _BINARY = re.compile(rb"^ {4}58b[ \d]{12}([ \d]{12})([ \d]{12})[^\n]*\n", re.MUL
 
 
 def _record(path: Path, one: dict[str, Any]) -> Channel:
-    """Return a data set's channel and samples. Raises Unreadable where its header and its data disagree."""
+    """Return a data set's channel and samples. Raises Unreadable if its header and its data disagree."""
     name = _label(one["ordinate_axis_lab"]) or _label(one["rsp_ent_name"]) or _label(one["id1"]) or "record"
     data = np.asarray(one["data"])
     where = f"{path.name}: data set {name!r}"

@@ -16,7 +16,7 @@ LIBRARY = "scipy"
 
 
 def read(path: Path, layout: Layout) -> list[Channel]:
-    """Return the channels of a WAV file. Raises Unreadable where its header contradicts itself or its length."""
+    """Return the channels of a WAV file. Raises Unreadable if its header contradicts itself or its length."""
 
     _expect_consistent(path)
     with warnings.catch_warnings():
@@ -24,7 +24,7 @@ def read(path: Path, layout: Layout) -> list[Channel]:
         rate, data = wavfile.read(path)
     data = data.reshape(len(data), -1)
     if rate <= 0 or len(data) < 2:
-        raise Unreadable(str(path), None, "holds no samples, or states no rate")
+        raise Unreadable(str(path), None, "has no samples, or states no rate")
     unit = ""
     if data.dtype.kind in "iu":  # parts of the largest number
         unit, small = "FS", data.dtype == np.uint8
@@ -33,7 +33,7 @@ def read(path: Path, layout: Layout) -> list[Channel]:
 
 
 def _expect_consistent(path: Path) -> None:
-    """Raise Unreadable where the header contradicts itself or the file."""
+    """Raise Unreadable if the header contradicts itself or the file."""
     with open(path, "rb") as file:
         head = file.read(12)
         if head[:4] not in (b"RIFF", b"RIFX", b"RF64") or head[8:] != b"WAVE":

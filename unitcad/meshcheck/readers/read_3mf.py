@@ -19,6 +19,7 @@ from unitcad.meshcheck.rules.f_file import F003, F011, Limits, OutOfTime, Unread
 from unitcad.meshcheck.rules.p_package import P001, P002, P003, P009, P012, P014, P019, P020
 from unitcad.meshcheck.rules.registry import Rule
 from unitcad.meshcheck.rules.s_scale import UNITS_MM
+from unitcad.text import some
 
 Key = tuple[str, int]
 """A part of the package and the id of an object in it."""
@@ -114,7 +115,7 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
             findings.append(P012.finding(f"a build item names object {key[1]} of {item.path}, which is not there"))
         place(key, item.matrix)
     if made and "model" not in made:
-        types = ", ".join(sorted(made))
+        types = some(sorted(made))
         findings.append(P014.finding(f"the build has no object of type model, only of type {types}"))
     return instances
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.errors import Unfinished, UnitcadError
+from unitcad.errors import Unfinished, UnitcadError, install_command
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Point
 from unitcad.meshcheck.rules.f_file import F003, F011, F012
@@ -121,12 +121,10 @@ def triangles_of(solid: Any, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
 _LEAST_MM, _PART = 0.01, 5e-5
 """A mesh lies within the larger of _LEAST_MM and _PART of the diagonal from its surface."""
 
-NEEDS = "STEP needs the extra step: in a clone, pip install '.[step]'"
 
-
-def installed() -> bool:
-    """Return whether STEP can be read here."""
-    return find_spec("OCP") is not None
+def missing() -> str:
+    """Return the advice to install the reader of STEP; "" if STEP can be read here."""
+    return "" if find_spec("OCP") else f"STEP needs the extra step: {install_command('step')}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +147,8 @@ def measured(path: Path, data: memoryview, seconds: float) -> Measured:
     """Return what OCCT measures of a STEP file. Raises `Unreadable` for a damaged file, and without OCP."""
     if b"END-ISO-10303-21" not in bytes(data[-2000:]):  # OCCT must not be handed a fragment
         raise F003.unreadable("the text ends before END-ISO-10303-21")
-    if not installed():
-        raise F012.unreadable(NEEDS)
+    if lacking := missing():
+        raise F012.unreadable(lacking)
     found = _from_child(path, seconds)
     if found is None:
         raise F003.unreadable("the STEP file holds no shape that can be read")
@@ -169,7 +167,7 @@ def _from_child(path: Path, seconds: float) -> Measured | None:
             raise F011.unreadable(str(error)) from error
         raise F003.unreadable(f"the STEP reader died of the file ({error})") from error
     except ImportError as error:
-        raise F012.unreadable(f"{NEEDS} ({error})"[:200]) from error
+        raise F012.unreadable(f"the kernel for STEP does not load ({str(error)[:200]})") from error
 
 
 def measure(path: str) -> Measured | None:

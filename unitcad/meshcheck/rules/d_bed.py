@@ -25,10 +25,9 @@ D004 = Rule("""
 
 D005 = Rule("""
     D005 warning: not on the bed
-    The lowest point floats above z = 0, reaches below it, or no flat of the part lies there to stand on; the message
-    says which.
-    Example: The underside of a part lies at z = 5 mm.
-    Fix: Place the part with a flat on z = 0.
+    A part rests on an edge or a point, or reaches below z = 0. A part above z = 0 is none: slicers drop it to the bed.
+    Example: A sphere rests on a point.
+    Fix: Turn the part so that a flat lies down, or cut one.
 """)
 
 ON_BED = 0.02  # mm; an STL rounds to less, a layer is ten times more
@@ -43,17 +42,25 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 
 
 def _stands(topology: Topology) -> Iterator[Finding]:
-    """Apply D005: lowest point at z = 0, and a flat there that faces down."""
-    vertices, faces = topology.mesh.vertices, topology.mesh.faces
-    low = float(vertices[np.unique(faces), 2].min())
-    if abs(low) > ON_BED:
-        what = "floats above the bed, which a slicer corrects" if low > 0 else "reaches below the bed"
-        yield D005.finding(f"{what}: lowest point at z = {number(low, 4)} mm")
+    """Apply D005 to the shells that reach the lowest point of the mesh."""
+    if not topology.n_shells:
+        return
+    vertices, faces, bottoms = topology.mesh.vertices, topology.mesh.faces, topology.low[:, 2]
+    low = float(bottoms.min())
+    if low < -ON_BED:
+        yield D005.finding(f"reaches below the bed: lowest point at z = {number(low, 4)} mm")
         return
     lying = (vertices[faces, 2] < low + ON_BED).all(axis=1) & (topology.areas[:, 2] < 0)
-    flat = float(np.abs(topology.areas[lying, 2]).sum()) / 2
-    if flat < STAND:
-        yield D005.finding(f"only {number(flat, 3)} mm2 of flat on the bed")
+    flat = np.bincount(topology.shells[lying], -topology.areas[lying, 2] / 2, topology.n_shells)
+    places, least = [], STAND
+    for i in np.flatnonzero((bottoms < low + ON_BED) & (flat < STAND)).tolist():
+        own = np.flatnonzero(topology.shells == i)
+        lowest = vertices[faces[own]].reshape(-1, 3)
+        places.append(at_region(topology.kept[own], lowest[np.argmin(lowest[:, 2])]))
+        least = min(least, float(flat[i]))
+    if places:
+        message = f"{counted(len(places), 'part')} on an edge or a point: {number(least, 3)} mm2 of flat on the bed"
+        yield D005.finding(message, len(places), places)
 
 
 def _trapped(topology: Topology) -> Iterator[Finding]:

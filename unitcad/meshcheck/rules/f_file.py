@@ -104,7 +104,7 @@ F012 = Rule("""
     where a folder was named). A warning if a solid of a STEP file has no closed mesh: its overlap and print are not
     judged.
     Example: `unitcad check prat.stl` where the file is part.stl.
-    Fix: Check the path and its permissions; for STEP, in a clone, pip install '.[step]'.
+    Fix: Check the path and its permissions; for STEP, install the extra step.
 """)
 
 F013 = Rule("""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from unitcad.meshcheck.findings import FileReport, Finding, counted, number
 from unitcad.meshcheck.rules.registry import Rule
+from unitcad.text import some
 
 M001 = Rule("""
     M001 error: volume differs from the manifest's
@@ -64,7 +65,7 @@ def check_listed(part: ListedFile, report: FileReport) -> Iterator[Finding]:
     """Apply M001 to M004 to one file."""
     path = Path(report.path)
     if not os.path.isfile(path):
-        yield M004.finding(f"listed for {', '.join(part.names)}")
+        yield M004.finding(f"listed for {some(part.names)}")
         return
     if part.sha256 is not None:
         import hashlib  # most files are in no manifest

@@ -1,4 +1,4 @@
-"""Rules by their texts, found in the files of this folder: for --explain, docs/checks.md and SARIF's list."""
+"""Rules by their texts, found in the files of this folder: for --explain, the page of the rules and SARIF's list."""
 
 from __future__ import annotations
 

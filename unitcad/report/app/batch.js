@@ -63,7 +63,7 @@
     let rows = [];
     const at = (name) => table.columns.indexOf(name) + 1;
     // A model's level is plotted against what it reads: a level that stays the same is no result of the sweep.
-    const { not_read: unread = {}, typical_error: errors = {}, not_measured: alone = {} } = data.estimate || {};
+    const { insensitive: unread = {}, typical_error: errors = {}, not_measured: alone = {} } = data.estimate || {};
     const blind = (x, y) => {
       const keys = unread[U.modelOf(y)] || [];
       const reads = [...table.swept].some((name) => varying.includes(name) && !keys.includes(name));

@@ -4,8 +4,8 @@
   const { el, clear, duration, number, section, table, theme } = window.unitcad;
   const page = document.getElementById("page");
   const MINUTE = 60000;
-  // Of two printed pages in mm²: all, a letter, a step's title, a pour's lines to write on, a unit's, head and schedule; and widths in mm.
-  const PAPER = { mm2: 2 * 190 * 277 * 0.84, letter: 5, title: 220, pour: 1500, unit: 900, page: 5000, most: 36, least: 17 };
+  // Of two printed pages in mm²: all, a letter, a step's title, a pour's lines to write on, a unit's, head and schedule; and in mm a column and pictures' widths.
+  const PAPER = { mm2: 2 * 190 * 277 * 0.84, letter: 5, title: 220, pour: 1500, unit: 900, page: 5000, column: 60, most: 58, least: 20 };
   const LIMITS = { grams: [1e-4, 1e5], mm: [0.01, 1000] };
   // How far from what is asked a measured length or mass may lie: beyond it a digit or a point is wrong.
   const FACTOR = 3;
@@ -67,6 +67,9 @@
     return `must be ${number(least, 3)} to ${number(most, 3)} ${unit}${near ? `: ${number(near, 3)} ${unit} is asked` : ""}`;
   }
 
+  // As the scale shows them.
+  const grams = (mass) => mass.toFixed(Math.max(0, Math.min(4, Math.ceil(-Math.log10(data.scale_g || 0.01) - 1e-9))));
+
   function field(name, label, unit, kind) {
     const said = el("span", { className: "limit" });
     const judge = () => {
@@ -113,8 +116,14 @@
   function card(step, at, pour) {
     const own = [];
     if (step.kind === "weigh") {
-      own.push(el("div", { className: "fields" }, field(`p${pour.index}.a`, `Part A weighed (${number(pour.part_a_g, 3)} g asked)`, "g", "grams"),
-        field(`p${pour.index}.b`, `Part B weighed (${number(pour.part_b_g, 3)} g asked)`, "g", "grams")));
+      const partB = el("p", { className: "part-b", role: "status" });
+      const weigh = () => {
+        const weighed = value(`p${pour.index}.a`, "grams");
+        partB.textContent = weighed ? `A is ${grams(weighed)} g: weigh B to ${grams(weighed * pour.part_b_g / pour.part_a_g)} g.` : "";
+      };
+      own.push(el("div", { className: "fields", oninput: weigh }, field(`p${pour.index}.a`, `Part A weighed (${number(pour.part_a_g, 3)} g asked)`, "g", "grams"),
+        field(`p${pour.index}.b`, `Part B weighed (${number(pour.part_b_g, 3)} g asked)`, "g", "grams")), partB);
+      weigh();
     }
     if (step.kind === "mix") own.push(timer(`p${pour.index}.mix`, "pot life", pour.pot_life_min));
     if (step.kind === "rest" && step.wait_min) own.push(timer(`s${at}`, "wait", step.minutes + step.wait_min));
@@ -133,10 +142,10 @@
       paintTimers();
     } });
     const picture = data.pictures[step.picture];
-    return el("li", { className: `bench-step${data.repeated.has(at) ? " repeated" : ""}`, value: at + 1, "data-step": String(at) },
+    return el("li", { className: `bench-step${step.short ? " repeated" : ""}`, value: at + 1, "data-step": String(at) },
       el("h3", {}, el("label", {}, ticked, el("span", { className: "count" }, `${at + 1}`), ` ${step.title}`)),
       picture && el("img", { className: again(at) ? "again" : undefined, src: picture, alt: step.title, width: "540" }),
-      el("p", { className: "whole" }, step.text), data.repeated.has(at) && el("p", { className: "as" }, data.repeated.get(at)), own);
+      el("p", { className: "whole" }, step.text), step.short && el("p", { className: "as" }, step.short), own);
   }
 
   // The first step that is not done is the one to do.
@@ -178,18 +187,44 @@
         casting.assembly.length > 0 && el("label", { className: "field" }, motor, el("span", {}, casting.makes === "unit" ? "with the motor in" : `with ${casting.time_line.at(-1).name}`))), out);
   }
 
+  // Step 0: the lengths of bought parts, and the command that builds with those that were measured.
+  function first() {
+    const { sizes, source } = data.casting.printing;
+    const command = el("code", {});
+    const draw = () => {
+      const off = sizes.filter((size) => Math.abs((value(size.key, "mm") || size.value_mm) - size.value_mm) > data.measured_mm);
+      const sets = (list) => list.map((size) => ` --set ${size.key}=${number(value(size.key, "mm") || size.value_mm, 4)}`).join("");
+      clear(said, off.length > 0 && `${off.map((size) => size.what).join(", ")} differ${off.length > 1 ? "" : "s"}: build again in this folder before you print.`);
+      command.textContent = `unitcad build ${source}${sets(off.length ? off : sizes)}`;
+    };
+    const said = el("p", { className: "verdict bad", role: "status" });
+    const rows = sizes.map((size) => field(size.key, `${size.what}: ${number(size.value_mm, 3)} mm${size.assumed ? ` (assumed; ${size.assumed})` : ""}`, "mm", "mm"));
+    const single = data.casting.makes === "unit";
+    const paper = sizes.map((size) => `${size.what} ${number(size.value_mm, 3)} mm${size.assumed ? " (assumed)" : ""}: ______ mm`).join("; ");
+    const node = section("first", "0. Measure first", el("div", { className: "fields", oninput: draw }, rows), el("p", { className: "paper" }, paper), said,
+      el("p", {}, `A size that differs by more than ${data.measured_mm} mm needs other moulds: `, single ? command : `put it into ${source} and build again.`));
+    draw();
+    return node;
+  }
+
   function printing() {
     const { casting, slicer } = data;
     const sliced = slicer && `${slicer.slicer}: ${duration(slicer.print_s / 60)}, ${number(slicer.filament_cm3, 3)} cm³ of filament.`;
-    return section("print", "Print", el("ul", {}, casting.printing.map((text) => el("li", {}, text)), sliced && el("li", {}, sliced)));
+    return section("print", "Print", el("ul", {}, casting.printing.how.map((text) => el("li", {}, text)), sliced && el("li", {}, sliced)));
   }
 
-  // What paper lists without its note: the print's or the mix's own words have it.
-  const plain = (item) => item.made.startsWith("printed") || / part [AB]$/.test(item.item);
+  const GROUPS = { Buy: (item) => item.made === "bought", Have: (item) => item.made !== "bought" && !item.made.startsWith("printed") };
 
   function needed() {
-    const rows = data.casting.bill.map((item) => ({ className: plain(item) ? "plain" : undefined, cells: [item.item, `${number(item.quantity, 3)} ${item.unit}`, item.note] }));
-    return section("needed", "Needed", table(["Item", "How much", "Note"], rows, { label: "What is needed" }));
+    return Object.entries(GROUPS).map(([title, belongs]) => {
+      const rows = data.casting.bill.filter(belongs).map((item) => [item.item, `${number(item.quantity, 3)} ${item.unit}`, item.note]);
+      return rows.length > 0 && section(title.toLowerCase(), title, table(["Item", "How much", "Note"], rows, { label: title }));
+    });
+  }
+
+  function troubles() {
+    const rows = data.casting.troubles.map((each) => [each.sign, each.cause, each.now, each.spec]);
+    return section("troubles", "Troubleshooting", table(["Sign", "Cause", "Now", "In the spec"], rows, { label: "Troubleshooting" }));
   }
 
   const engraved = (cavity) => (data.casting.cells > 1 ? ` ${cavity.toString(16).toUpperCase()}` : "");
@@ -294,13 +329,14 @@
     const cells = casting.makes === "patch" ? `${casting.cells} units in one patch` : cavities;
     clear(page,
       el("header", { className: "top" }, el("div", {}, el("h1", {}, casting.name), el("p", { className: "line" }, `Mould set ${casting.label}, ${cells} · ${data.hash}`)), el("div", { className: "chips" }, theme.button())),
-      plan(), needed(), printing(),
+      casting.warnings.map((text) => el("p", { className: "verdict bad" }, `Warning: ${text}.`)),
+      plan(), first(), printing(), needed(),
       list("preparation", "Before the first pour", casting.preparation, null),
       casting.pours.map((pour) => list(`pour${pour.index}`, `Pour ${pour.index}: ${(pour.layer || `layer${pour.index}`).replace(/(\d+)$/, " $1")}, ${pour.material}`, pour.steps, pour,
         el("div", { className: "screen" }, el("label", { className: "field" }, el("span", {}, "Lot on the bottles"), lot(pour)), words(`p${pour.index}.notes`, "Notes on this pour")))),
       list("release", "Out of the mould", casting.release, null),
       list("assembly", casting.last, casting.assembly, null),
-      measure(), written(), saving(),
+      measure(), written(), troubles(), saving(),
       el("footer", {}, el("p", {}, `Made by unitcad ${data.version}. This page contacts nothing; what you enter stays in this browser.`)));
     mark();
     paintTimers();
@@ -314,15 +350,16 @@
 
   // The printed sheet has letters of 8 pt; what two pages of A4 leave beside them, the pictures get.
   function paperSize() {
-    const words = data.steps.map((each, at) => data.repeated.get(at) ?? each.step.text);
-    const letters = [...words, ...data.casting.printing, ...data.casting.measure].join(" ").length
-      + data.casting.bill.reduce((sum, item) => sum + item.item.length + (plain(item) ? 0 : item.note.length) + 12, 0);
-    const high = data.steps.filter((each, at) => data.pictures[each.step.picture] && !data.repeated.has(at) && !again(at))
+    const { casting } = data, { how, sizes } = casting.printing;
+    const words = [...data.steps.map(({ step }) => step.short || step.text), ...how, ...casting.measure, ...casting.troubles.flatMap((each) => [each.sign, each.now])];
+    const listed = [...casting.bill.map((item) => `${item.item} ${item.note}`), ...sizes.map((size) => size.what + size.assumed)];
+    const letters = words.join(" ").length + listed.join("").length + 12 * listed.length;
+    const high = data.steps.filter((each, at) => data.pictures[each.step.picture] && !each.step.short && !again(at))
       .reduce((sum, each) => sum + shape(data.pictures[each.step.picture]), 0);
-    const fixed = PAPER.page + data.steps.length * PAPER.title + data.casting.pours.length * PAPER.pour + data.casting.cells * PAPER.unit;
+    const fixed = PAPER.page + data.steps.length * PAPER.title + casting.pours.length * PAPER.pour + casting.cells * PAPER.unit;
     const room = PAPER.mm2 - letters * PAPER.letter - fixed;
-    const wide = Math.max(PAPER.least, Math.min(PAPER.most, Math.sqrt(Math.max(room, 0) / Math.max(high, 1))));
-    document.documentElement.style.setProperty("--paper-picture", `${wide.toFixed(1)}mm`);
+    const tall = Math.max(PAPER.least, Math.min(PAPER.most, room / PAPER.column / Math.max(high, 1)));
+    document.documentElement.style.setProperty("--paper-picture", `${tall.toFixed(1)}mm`);
   }
 
   // Whether a step has the picture of the one before: paper shows it once.
@@ -335,30 +372,11 @@
     return header.getUint32(20) / header.getUint32(16);
   }
 
-  // On paper a step that an earlier pour had too refers to it, and says only what differs. Returns those words by step.
-  function repeated(steps) {
-    const sentences = (text) => text.split(/(?<=[.!?]) (?=[A-Z])/);
-    const alike = (text) => text.replace(/\b(cup|lid|layer|pour) \d+/gi, "$1");
-    const before = new Map(), said = new Map();
-    steps.forEach(({ step }, at) => {
-      const title = alike(step.title), earlier = before.get(title) || [];
-      before.set(title, [...earlier, at]);
-      const differs = earlier.map((first) => {
-        const known = new Set(sentences(steps[first].step.text).map(alike));
-        return [sentences(step.text).filter((sentence) => !known.has(alike(sentence))).join(" "), first];
-      });
-      const [own, first] = differs.reduce((least, each) => (each[0].length < least[0].length ? each : least), [step.text, at]);
-      if (own.length < 0.8 * step.text.length) said.set(at, `As step ${first + 1}${own ? `, but: ${own}` : "."}`);
-    });
-    return said;
-  }
-
   async function start() {
     data = JSON.parse(new TextDecoder().decode(await window.unitcad.unpacked(document.getElementById("data").textContent)));
     const { casting } = data;
     const of = (steps, pour) => steps.map((step) => ({ step, pour }));
     data.steps = [...of(casting.preparation, null), ...casting.pours.flatMap((pour) => of(pour.steps, pour)), ...of(casting.release, null), ...of(casting.assembly, null)];
-    data.repeated = repeated(data.steps);
     key = `unitcad bench ${data.hash} ${casting.label}`;
     state = restore();
     paperSize();

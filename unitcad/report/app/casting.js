@@ -52,6 +52,27 @@
       cast.notes.map((note) => el("p", {}, note))]));
   }
 
+  // What a maker does with this result, in four lines.
+  function make(variant) {
+    const data = variant.casting, { warnings } = variant.manifest;
+    if (!data) return null;
+    const { plates, minutes, cm3, of, sizes } = data.printing, sliced = variant.slicer;
+    const grams = new Map();
+    for (const item of data.bill.filter((each) => each.unit === "g")) {
+      const name = item.item.replace(/ part [AB]$/, "");
+      grams.set(name, (grams.get(name) || 0) + item.quantity);
+    }
+    const link = (path) => el("a", { href: besides(variant.folder, path) }, path);
+    const takes = sliced ? `${duration(sliced.print_s / 60)}, ${number(sliced.filament_cm3, 3)} cm³` : `about ${duration(minutes)}, at most ${number(cm3, 2)} cm³`;
+    const assumed = sizes.filter((size) => size.assumed).map((size) => `${size.what} ${number(size.value_mm, 3)} mm (${size.assumed})`);
+    return section("make", "Make it",
+      (warnings || []).map((text) => el("p", { className: "verdict bad" }, `Warning: ${text}.`)),
+      el("ol", {}, assumed.length > 0 && el("li", {}, `Measure first. Assumed: ${assumed.join("; ")}.`),
+        el("li", {}, "Print ", plates.map((path, i) => [i ? ", " : "", link(path)]), `: ${takes} of ${of}.`),
+        el("li", {}, `Mix ${[...grams].map(([name, mass]) => `${number(mass, 3)} g of ${name}`).join(", ")}.`),
+        el("li", {}, "Cast by ", link("bench.html"), `: ready ${duration(data.earliest_finish_min)} after the print, of which ${duration(data.bench_min)} at the bench.`)));
+  }
+
   const besides = (folder, name) => [folder, name].filter(Boolean).join("/").split("/").map(encodeURIComponent).join("/");
 
   function procedure(variant) {
@@ -62,7 +83,7 @@
       if (!list || !list.length) return null;
       const node = el("ol", { start: String(next) }, list.map((step) => {
         const picture = (variant.pictures || {})[step.picture];
-        return el("li", {}, el("strong", {}, `${step.title}. `), step.text, picture && el("img", { className: "state", src: picture, alt: step.title, width: "540" }));
+        return el("li", {}, el("strong", {}, `${step.title}. `), step.short || step.text, picture && el("img", { className: "state", src: picture, alt: step.title, width: "540" }));
       }));
       next += list.length;
       return node;
@@ -82,7 +103,7 @@
       casts(variant),
       el("p", {}, "At the bench: ", el("a", { href: besides(variant.folder, "bench.html") }, "bench.html"), ", with timers, and fields for the cast record."),
       times(data),
-      titled("Print", data.printing && el("ul", {}, data.printing.map((text) => el("li", {}, text)))),
+      titled("Print", data.printing && el("ul", {}, data.printing.how.map((text) => el("li", {}, text)))),
       titled("Before the first pour", steps(data.preparation)),
       offGrid.length > 0 && el("details", {}, el("summary", {}, `${offGrid.length} edges fall between two of the printer's layers`),
         table(["Piece", "Edge", "Height as printed (mm)", "Moved by (mm)"], offGrid.map((row) => [partName(row.piece), row.edge, shown(row.height_mm), number(row.nearest_mm - row.height_mm, 2)]), { label: "Edges off the layer grid" })),
@@ -104,5 +125,5 @@
     for (const fold of opened) fold.open = false;
   });
 
-  Object.assign(window.unitcad, { procedure });
+  Object.assign(window.unitcad, { make, procedure });
 })();

@@ -235,10 +235,10 @@
   function estimate(variant) {
     const data = variant.estimate;
     if (!data) {
-      const left = (variant.manifest.left_out || []).find((entry) => entry.what === "estimate");
-      const ask = !left || left.why === "not asked for (--only)";
+      const left = (variant.manifest.skipped || []).find((entry) => entry.output === "estimate");
+      const ask = !left || left.reason === "not asked for (--only)";
       return section("estimate", "Attenuation estimate", el("p", { className: "absent" },
-        ask ? ["No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.why}.`));
+        ask ? ["No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.reason}.`));
     }
     return section("estimate", "Attenuation estimate", lead(data.answer), elements(data.fem),
       el("details", {}, el("summary", {}, "How sure?"), el("ul", { className: "lead-notes" }, data.answer.details.map((line) => el("li", {}, line))), levels(data), el("h3", {}, "Outwards from the edge"), curves(data.layered)),

@@ -51,6 +51,7 @@
     const name = manifest.name || variant.folder || data.title;
     const view = stage(variant, variant.model && data.models[variant.model]);
     const sections = [
+      guarded("make", "Make it", () => U.make(variant)),
       view.node,
       guarded("section", "Section", () => U.parts.sectionDrawing(variant)),
       guarded("estimate", "Attenuation estimate", () => U.estimate(variant)),
@@ -59,7 +60,7 @@
       guarded("parts", "Parts", () => U.parts.parts(variant)),
       guarded("files", "Files", () => U.parts.files(variant)),
       guarded("spec", "Spec", () => U.parts.spec(variant)),
-    ];
+    ].filter(Boolean);
     if (variant.damaged.length) sections.push(section("damaged", "Damaged", el("ul", {}, variant.damaged.map((line) => el("li", {}, line)))));
     const { state, text } = U.verdict(manifest);
     const layers = ((variant.spec || {}).layers || []).map((layer) => layer.material).join(" / ");

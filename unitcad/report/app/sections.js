@@ -20,7 +20,7 @@
   const link = (folder, path) => [folder, path].filter(Boolean).join("/").split("/").map(encodeURIComponent).join("/");
 
   function verdict(manifest) {
-    const checks = manifest.laws || [];
+    const checks = manifest.mould_checks || [];
     const failed = checks.filter((check) => !check.ok).length;
     const errors = manifest.check ? manifest.check.errors : 0;
     if (!checks.length) return { state: "unknown", text: "mould checks not run" };
@@ -38,7 +38,7 @@
 
   function checks(variant) {
     const { manifest } = variant;
-    const all = manifest.laws || [];
+    const all = manifest.mould_checks || [];
     const row = (check) => ({ className: check.ok ? undefined : "bad", cells: [check.code, check.where, check.value, check.limit, check.unit || "", check.ok ? "passed" : "failed"] });
     const head = ["Check", "Where", "Value", "Limit", "Unit", ""];
     const failed = all.filter((check) => !check.ok);
@@ -52,7 +52,7 @@
       : manifest.check && el("p", {}, all.length ? "The rules for files found no fault." : ""));
     const lines = (title, list) => list.length > 0 && [el("h3", {}, title), el("ul", {}, list.map((text) => el("li", {}, text)))];
     content.push(lines("Warnings", manifest.warnings || []));
-    content.push(lines("Left out", (manifest.left_out || []).map((entry) => `${entry.what}: ${entry.why}`)));
+    content.push(lines("Skipped", (manifest.skipped || []).map((entry) => `${entry.output}: ${entry.reason}`)));
     return section("checks", "Mould checks and mesh checks", content);
   }
 

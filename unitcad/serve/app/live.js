@@ -282,7 +282,7 @@
     async function showMoulds(answer) {
       const faults = answer.faults || [];
       const failed = (answer.checks || []).filter((check) => !check.ok);
-      const manifest = { laws: answer.checks || [], warnings: state.unit.warnings || [] };
+      const manifest = { mould_checks: answer.checks || [], warnings: state.unit.warnings || [] };
       if (answer.checks) {
         const list = U.parts.checks({ manifest });
         clear(judged, (answer.lines || []).map((line) => el("p", {}, line)), [...list.childNodes].slice(1));
@@ -303,7 +303,7 @@
         clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, `This ${noun()} has no moulds; the view keeps it alone.`));
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
-      } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.laws.length} mould checks failed` : `${manifest.laws.length} mould checks passed`);
+      } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.mould_checks.length} mould checks failed` : `${manifest.mould_checks.length} mould checks passed`);
     }
 
     function toForm() { page.querySelector("#spec").focus({ preventScroll: true }); }

@@ -1,0 +1,82 @@
+"""The examples of README.md and docs/: where they are, and how a page's commands are run."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+BLOCK = re.compile(r"^```(\w+(?: \w+)?)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+FILE = "# file: "
+
+
+def pages(root: Path = ROOT) -> list[Path]:
+    """Return README.md and the pages of docs/ and of its folders."""
+    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """Return the fenced blocks of one language."""
+    return [text for found, text in BLOCK.findall(page.read_text("utf-8")) if found == language]
+
+
+def missing(shown: list[str], output: list[str]) -> str | None:
+    """Return the first line of `shown` that `output` lacks at its place, or a line that is not shown.
+
+    The line "..." stands for any lines, "..." within a line for any words.
+    """
+    at, anywhere = 0, False
+    for line in shown:
+        if line == "...":
+            anywhere = True
+            continue
+        found = next((i for i in range(at, len(output)) if _fits(line, output[i])), None)
+        if found is None or (found > at and not anywhere):
+            return line
+        at, anywhere = found + 1, False
+    return None if anywhere or at == len(output) else output[at]
+
+
+def _fits(shown: str, line: str) -> bool:
+    return re.fullmatch(re.escape(shown).replace(re.escape("..."), ".*"), line) is not None
+
+
+def run_console(page: Path, folder: Path) -> int:
+    """Run the commands of a page's console blocks in their order in one folder; return how many ran.
+
+    A block that begins with "# file: NAME" is written as that file first.
+    A command that ends in "# exit 2" must exit with 2, others with 0; "# not run: REASON" is left out. Lines below a
+    command are its output; if there are none, the output is not compared.
+    """
+    here, count = Path(sys.executable).parent, 0
+    environment = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
+    parts: list[str] = []
+    for language, text in BLOCK.findall(page.read_text("utf-8")):
+        parts += re.split(r"(?m)^\$ ", text)[1:] if language == "console" else []
+        if text.startswith(FILE):
+            (folder / text.partition("\n")[0].removeprefix(FILE)).write_text(text, "utf-8")
+    for part in parts:
+        line, *shown = part.splitlines()
+        if "# not run: " in line:
+            continue
+        command, _, code = line.partition("# exit ")
+        words = shlex.split(command, comments=True)
+        words[0] = sys.executable if words[0] == "python" else shutil.which(words[0], path=str(here)) or words[0]
+        done = subprocess.run(
+            words, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            timeout=600, check=False,
+        )  # fmt: skip
+        where = f"{page.name}: {line}\n{done.stdout}"
+        assert done.returncode == int(code or 0), where
+        assert "Traceback" not in done.stdout, where
+        if shown:
+            lost = missing([text.rstrip() for text in shown], [text.rstrip() for text in done.stdout.splitlines()])
+            assert lost is None, f"not in the output: {lost!r}\n{where}"
+        count += 1
+    return count

@@ -1,0 +1,176 @@
+"""Which swept keys do not enter a model of the edge level, and which no measurement supports.
+
+Levels that stay the same are no result of the sweep. If all measured units had the same length, only the model says how
+the level changes with it.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from unitcad.attenuation.edge.answer import left_out
+from unitcad.attenuation.edge.models import edge_levels, stored
+from unitcad.attenuation.edge.variant_units import nominal
+from unitcad.attenuation.inputs import EstimateInput
+from unitcad.catalogue import measurements
+from unitcad.errors import UnitcadError
+from unitcad.estimating import closed_forms, estimate_input, fit_of
+from unitcad.spec import Spec
+from unitcad.sweeps.sweep import Sweep
+from unitcad.text import listed
+from unitcad.validation import from_data, put
+
+_OF_THE_UNIT = re.compile(
+    r"(design|diameter_mm|layers|motor|fpcb|wires|materials|motors|tissue|parameters"
+    r"|estimate\.(frequency_hz|tissue|moduli))(\.|$)"
+)
+"""Keys that a person may expect a level to depend on: not those of tooling, casting and files."""
+_LENGTH = re.compile(r"diameter_mm|layers\.\d+\.(wall|cap)_mm")
+"""Lengths that every measured unit of one number of layers had alike."""
+_STARTS, _VALUES = 4, 8
+"""Number of variants from which only one key is changed, and number of values that are tried."""
+_SAME = 1e-9
+
+
+class SweptEstimate(Struct, frozen=True):
+    """Reliability of a batch's levels: each model's typical error, a factor, the best first, and the keys not read.
+
+    `not_measured`: swept lengths in mm with values that no measured unit had, each with the one that all of them had.
+    """
+
+    typical_error: dict[str, float]
+    insensitive: dict[str, list[str]]
+    not_measured: dict[str, float]
+
+
+def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
+    """Return the models' errors and the keys that each does not read; None if no variant has an estimate.
+
+    Each key is changed by itself, from several variants, through several of its values, since a rule by name would have
+    to know every model. A key that can't be changed by itself, or whose levels are not known, is taken for read.
+    """
+    if sweep.of_compounds:
+        return None
+    starts = [(index, spec) for index in _spread(count, _STARTS) if (spec := _spec(sweep, index))]
+    if not starts:
+        return None
+    models = closed_forms(starts[0][1].estimate.models)
+    unread: dict[str, list[str]] = {model: [] for model in models}
+    for path in sweep.paths:
+        if not _OF_THE_UNIT.match(path):
+            continue
+        groups = [_levels(sweep, index, path, models) for index, _ in starts]
+        for model in models:
+            told = [group[model] for group in groups if len(group[model]) > 1]
+            if told and all(np.ptp(np.log(levels)) < _SAME for levels in told):
+                unread[model].append(path)
+    fit = fit_of(starts[0][1])
+    errors = left_out(starts[0][1].estimate.moduli, fit)
+    ordered = sorted(models, key=lambda model: errors[model])
+    return SweptEstimate(
+        {model: float(f"{errors[model]:.6g}") for model in ordered},
+        {model: unread[model] for model in ordered},
+        {} if fit else _not_measured(sweep, [spec for _, spec in starts]),  # a lab's units may have other lengths
+    )
+
+
+def _not_measured(sweep: Sweep, specs: Sequence[Spec]) -> dict[str, float]:
+    """Return the swept lengths with values that no measured unit of as many layers had, and the one that these had."""
+    shared, found = measurements().unit, dict[str, float]()
+    counts = {len(spec.layers) for spec in specs}
+    walls = [2 * shared.wall_mm / count for count in sorted(counts) if count <= 2]
+    for path in sweep.paths:
+        if not _LENGTH.fullmatch(path) or not walls:
+            continue
+        measured = [shared.diameter_mm] if path == "diameter_mm" else walls
+        values = [value for value in _values(sweep, path) if isinstance(value, int | float)]
+        if any(all(abs(value - one) > _SAME for one in measured) for value in values):
+            found[path] = measured[-1]
+    return found
+
+
+def warnings(found: SweptEstimate | None) -> list[str]:
+    """Say which models do not read which swept keys."""
+    if found is None:
+        return []
+    by_keys: dict[tuple[str, ...], list[str]] = {}
+    for model, paths in found.insensitive.items():
+        if paths:
+            by_keys.setdefault(tuple(paths), []).append(model)
+    lines = []
+    for paths, models in by_keys.items():
+        every = len(models) == len(found.insensitive) and len(models) > 1
+        who = "no model of the edge level reads" if every else f"{listed(models)} {_do(models)} not read"
+        lines.append(
+            f"{who} {listed(paths)}: {'the' if every else 'their' if len(models) > 1 else 'its'} level stays the same"
+        )
+    for length in dict.fromkeys(found.not_measured.values()):
+        same = [path for path, one in found.not_measured.items() if one == length]
+        lines.append(
+            f"every measured unit had {length:g} mm for {listed(same)}: no measurement supports how a level changes "
+            f"with {'it' if len(same) == 1 else 'them'}, and the error there is not known"
+        )
+    return lines
+
+
+def _do(models: Sequence[str]) -> str:
+    return "does" if len(models) == 1 else "do"
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """Return indices from 0 to count - 1, both ends among them."""
+    return sorted({round(i * (count - 1) / max(1, most - 1)) for i in range(most)})
+
+
+def _spec(sweep: Sweep, index: int) -> Spec | None:
+    """Return a variant's spec; None if it is refused or has no estimate."""
+    try:
+        spec = sweep.spec(index)
+        assert isinstance(spec, Spec)
+        estimate_input(spec)
+    except UnitcadError:
+        return None
+    return spec
+
+
+def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[str, list[float]]:
+    """Return levels by model while only the value at a path goes through those of the sweep, from variant `index`."""
+    base, values = sweep.values(index)
+    data, levels = sweep.base_data(base), {model: list[float]() for model in models}
+    for own, value in values.items():
+        put(data, own, value)
+    for value in _values(sweep, path):
+        variant = _changed(data, path, value)
+        for model in models if variant else ():
+            assert variant is not None
+            level = float(edge_levels(nominal(variant), model, stored(variant.moduli)[model])[0])
+            if np.isfinite(level) and level > 0:
+                levels[model].append(level)
+    return levels
+
+
+def _changed(data: dict[str, Any], path: str, value: Any) -> EstimateInput | None:
+    changed = copy.deepcopy(data)
+    try:
+        put(changed, path, value)
+        return estimate_input(from_data(changed, Path()))
+    except UnitcadError:
+        return None
+
+
+def _values(sweep: Sweep, path: str) -> Iterator[Any]:
+    """Yield different values of a path, spread over those that it has."""
+    if sweep.mode == "cases":
+        every: Sequence[Any] = [values[path] for _, values in sweep.cases if path in values]
+        every = [value for i, value in enumerate(every) if value not in every[:i]]
+    else:
+        axis = next(axis for axis in sweep.axes if axis.path == path)
+        every = [axis.values[i] for i in _spread(len(axis), _VALUES)]
+    yield from (every[i] for i in _spread(len(every), _VALUES))
