@@ -93,7 +93,7 @@ def estimate_arrays(
     for one in compared:
         screen.print(ratio_line(one), soft_wrap=True)
     if not details:
-        typer.echo("--details prints what each unit gets, the pairs, the band and the assumptions")
+        typer.echo("--details prints the sum at each unit, the pairs, the band and the assumptions")
 
 
 def _print_details(data: Mapping[str, Any]) -> None:

@@ -42,14 +42,9 @@ class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_u
 
 
 class MotorTable(Table, frozen=True, kw_only=True):
-    """The motor: a `part` of the catalogue, or its size, or both: a size then overrides the part's.
+    """The motor: a catalogue `part`, or its size; a size given beside a part overrides the catalogue's.
 
-    Examples
-    --------
-    >>> import unitcad
-    >>> motor = unitcad.Motor(part="LCM0720A3463F", thickness_mm=2.3)
-    >>> unitcad.load("encapsulating", set={"motor": motor}).motor.thickness_mm
-    2.3
+    Without either it is `DEFAULT_MOTOR`.
     """
 
     part: Annotated[
@@ -68,14 +63,7 @@ class MotorTable(Table, frozen=True, kw_only=True):
 
 
 class FpcbTable(Table, frozen=True, kw_only=True):
-    """The flexible circuit: a round pad on the motor and a straight tail to one side or to both.
-
-    Examples
-    --------
-    >>> import unitcad
-    >>> unitcad.load("encapsulating", set={"fpcb": unitcad.Fpcb(tail="both")}).fpcb.tail
-    'both'
-    """
+    """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
 
     tail: Annotated[
         Literal["one", "both"], Meta(description="sides on which the circuit leaves: one (+x), or both")
@@ -95,14 +83,7 @@ class FpcbTable(Table, frozen=True, kw_only=True):
 
 
 class WiresTable(Table, frozen=True, kw_only=True):
-    """Wires in place of a circuit: side by side, out along +x through one slot or notch.
-
-    Examples
-    --------
-    >>> import unitcad
-    >>> unitcad.load("no-fpcb", set={"wires": unitcad.Wires(diameter_mm=0.4)}).wires.count
-    2
-    """
+    """Wires instead of a circuit: side by side, from the motor's side out along +x, through one exit."""
 
     diameter_mm: Annotated[float, Meta(ge=0.05, le=20, description="diameter of one wire with its insulation")]
     count: Annotated[int, Meta(ge=1, le=8, description="number of wires")] = 2
@@ -110,15 +91,7 @@ class WiresTable(Table, frozen=True, kw_only=True):
 
 
 class LayerTable(Table, frozen=True, kw_only=True):
-    """One silicone layer: a wall and, in a design that has caps, a cap.
-
-    Examples
-    --------
-    >>> import unitcad
-    >>> layers = [unitcad.Layer(material="ecoflex-00-30", wall_mm=2.5)]
-    >>> unitcad.load("single-embedded", set={"layers": layers}).layers[0].wall_mm
-    2.5
-    """
+    """One silicone layer: a wall and, in a design of closed layers, a cap."""
 
     material: Annotated[
         str,
@@ -132,14 +105,7 @@ class LayerTable(Table, frozen=True, kw_only=True):
 
 
 class MouldsTable(Table, frozen=True, kw_only=True):
-    """The moulds. Lengths of the printer override those of its catalogue entry.
-
-    Examples
-    --------
-    >>> import unitcad
-    >>> unitcad.load("embedded", set={"moulds": unitcad.Moulds(printer="sla")}).moulds.layer_mm
-    0.05
-    """
+    """The tooling. Whatever the printer's catalogue entry gives can be given here instead."""
 
     printer: Annotated[
         str, Meta(description="printer of the catalogue (unitcad list printers), or of the spec's own [printers.NAME]")
@@ -194,14 +160,7 @@ class MouldsTable(Table, frozen=True, kw_only=True):
 
 
 class CastingTable(Table, frozen=True, kw_only=True):
-    """The bench: scale, mixing, room, and the margin on a silicone's elongation.
-
-    Examples
-    --------
-    >>> import unitcad
-    >>> unitcad.load("embedded", set={"casting": unitcad.Casting(vacuum=False)}).casting.vacuum
-    False
-    """
+    """The lab: scale, mixing, room and the margin on a silicone's elongation."""
 
     scale_resolution_g: Annotated[float, Meta(ge=1e-6, le=1000, description="smallest step of the scale")] = 0.01
     minimum_mix_g: Annotated[float, Meta(ge=0.001, le=1e6, description="smallest batch to mix")] = 2.0
@@ -217,14 +176,7 @@ class CastingTable(Table, frozen=True, kw_only=True):
 
 
 class EstimateTable(Table, frozen=True, kw_only=True):
-    """Inputs of the estimate.
-
-    Examples
-    --------
-    >>> import unitcad
-    >>> unitcad.load("embedded", set={"estimate": unitcad.Estimate(frequency_hz=150)}).estimate.frequency_hz
-    150.0
-    """
+    """Inputs of the attenuation estimate; what is left out is the motor's."""
 
     frequency_hz: Annotated[
         kinds.Frequency | None, Meta(description="frequency of the drive; default: the motor's")
@@ -240,9 +192,7 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     ] = ("rule", "published", "corrected", "divider")
     moduli: Annotated[
         Moduli,
-        Meta(
-            description="youngs_modulus_kpa (small-strain) or quasistatic_modulus_kpa of the silicones"
-        ),
+        Meta(description="modulus of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa"),
     ] = "small-strain"
     fit: Annotated[
         str | None, Meta(description="lab-fit.toml of unitcad fit next to the spec: the lab's own constants and ranges")
@@ -251,14 +201,7 @@ class EstimateTable(Table, frozen=True, kw_only=True):
 
 
 class OutputTable(Table, frozen=True, kw_only=True):
-    """File formats and the tolerance of meshes.
-
-    Examples
-    --------
-    >>> import unitcad
-    >>> unitcad.load("embedded", set={"output": unitcad.Output(formats=("stl",))}).output.formats
-    ('stl',)
-    """
+    """Formats, and the largest distance of a mesh from the true surface."""
 
     formats: Annotated[
         tuple[Format, ...] | None,
@@ -270,7 +213,7 @@ class OutputTable(Table, frozen=True, kw_only=True):
 
 
 class AskedSpec(Table, frozen=True, kw_only=True):
-    """A haptic unit. Required: name, design, diameter_mm and [[layers]]."""
+    """A haptic unit as asked for; `layers` run from the inside out, one entry being a single-layer control."""
 
     name: Annotated[
         str, Meta(min_length=1, max_length=120, description="a name of the variant; the result's folder begins with it")
