@@ -158,7 +158,7 @@ def test_the_command_writes_four_files_and_prints_the_null(tmp_path: Path) -> No
 
 
 def test_units_that_do_not_determine_q_are_named(tmp_path: Path) -> None:
-    """Controls alone: nothing says what a softer inside does, and the fit says so."""
+    """Controls alone: nothing states a softer inside does, and the fit says so."""
     names = ("ecoflex-00-10", "dragon-skin-30")
     units = [
         {

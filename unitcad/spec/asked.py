@@ -42,9 +42,14 @@ class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_u
 
 
 class MotorTable(Table, frozen=True, kw_only=True):
-    """The motor: a catalogue `part`, or its size; a size given beside a part overrides the catalogue's.
+    """The motor: a `part` of the catalogue, or its size, or both: a size then overrides the part's.
 
-    Without either it is `DEFAULT_MOTOR`.
+    Examples
+    --------
+    >>> import unitcad
+    >>> motor = unitcad.Motor(part="LCM0720A3463F", thickness_mm=2.3)
+    >>> unitcad.load("encapsulating", set={"motor": motor}).motor.thickness_mm
+    2.3
     """
 
     part: Annotated[
@@ -63,7 +68,14 @@ class MotorTable(Table, frozen=True, kw_only=True):
 
 
 class FpcbTable(Table, frozen=True, kw_only=True):
-    """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
+    """The flexible circuit: a round pad on the motor and a straight tail to one side or to both.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("encapsulating", set={"fpcb": unitcad.Fpcb(tail="both")}).fpcb.tail
+    'both'
+    """
 
     tail: Annotated[
         Literal["one", "both"], Meta(description="sides on which the circuit leaves: one (+x), or both")
@@ -83,7 +95,14 @@ class FpcbTable(Table, frozen=True, kw_only=True):
 
 
 class WiresTable(Table, frozen=True, kw_only=True):
-    """Wires instead of a circuit: side by side, from the motor's side out along +x, through one exit."""
+    """Wires in place of a circuit: side by side, out along +x through one slot or notch.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("no-fpcb", set={"wires": unitcad.Wires(diameter_mm=0.4)}).wires.count
+    2
+    """
 
     diameter_mm: Annotated[float, Meta(ge=0.05, le=20, description="diameter of one wire with its insulation")]
     count: Annotated[int, Meta(ge=1, le=8, description="number of wires")] = 2
@@ -91,7 +110,15 @@ class WiresTable(Table, frozen=True, kw_only=True):
 
 
 class LayerTable(Table, frozen=True, kw_only=True):
-    """One silicone layer: a wall and, in a design of closed layers, a cap."""
+    """One silicone layer: a wall and, in a design that has caps, a cap.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> layers = [unitcad.Layer(material="ecoflex-00-30", wall_mm=2.5)]
+    >>> unitcad.load("single-embedded", set={"layers": layers}).layers[0].wall_mm
+    2.5
+    """
 
     material: Annotated[
         str,
@@ -105,7 +132,14 @@ class LayerTable(Table, frozen=True, kw_only=True):
 
 
 class MouldsTable(Table, frozen=True, kw_only=True):
-    """The tooling. Whatever the printer's catalogue entry gives can be given here instead."""
+    """The moulds. Lengths of the printer override those of its catalogue entry.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("embedded", set={"moulds": unitcad.Moulds(printer="sla")}).moulds.layer_mm
+    0.05
+    """
 
     printer: Annotated[
         str, Meta(description="printer of the catalogue (unitcad list printers), or of the spec's own [printers.NAME]")
@@ -160,7 +194,14 @@ class MouldsTable(Table, frozen=True, kw_only=True):
 
 
 class CastingTable(Table, frozen=True, kw_only=True):
-    """The lab: scale, mixing, room and the margin on a silicone's elongation."""
+    """The bench: scale, mixing, room, and the margin on a silicone's elongation.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("embedded", set={"casting": unitcad.Casting(vacuum=False)}).casting.vacuum
+    False
+    """
 
     scale_resolution_g: Annotated[float, Meta(ge=1e-6, le=1000, description="smallest step of the scale")] = 0.01
     minimum_mix_g: Annotated[float, Meta(ge=0.001, le=1e6, description="smallest batch to mix")] = 2.0
@@ -176,7 +217,14 @@ class CastingTable(Table, frozen=True, kw_only=True):
 
 
 class EstimateTable(Table, frozen=True, kw_only=True):
-    """Inputs of the attenuation estimate; what is left out is the motor's."""
+    """Inputs of the estimate.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("embedded", set={"estimate": unitcad.Estimate(frequency_hz=150)}).estimate.frequency_hz
+    150.0
+    """
 
     frequency_hz: Annotated[
         kinds.Frequency | None, Meta(description="frequency of the drive; default: the motor's")
@@ -201,7 +249,14 @@ class EstimateTable(Table, frozen=True, kw_only=True):
 
 
 class OutputTable(Table, frozen=True, kw_only=True):
-    """Formats, and the largest distance of a mesh from the true surface."""
+    """File formats and the tolerance of meshes.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("embedded", set={"output": unitcad.Output(formats=("stl",))}).output.formats
+    ('stl',)
+    """
 
     formats: Annotated[
         tuple[Format, ...] | None,
@@ -213,7 +268,7 @@ class OutputTable(Table, frozen=True, kw_only=True):
 
 
 class AskedSpec(Table, frozen=True, kw_only=True):
-    """A haptic unit as asked for; `layers` run from the inside out, one entry being a single-layer control."""
+    """A haptic unit. Required: name, design, diameter_mm and [[layers]]."""
 
     name: Annotated[
         str, Meta(min_length=1, max_length=120, description="a name of the variant; the result's folder begins with it")
