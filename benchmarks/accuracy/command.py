@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from benchmarks.accuracy import runner
-from benchmarks.accuracy.result import markdown
+from benchmarks.accuracy.pages import markdown
 from unitcad.cli.output import form_of, print_json, progress, say_error
 from unitcad.errors import Missing, Refusal, UnitcadError
 
