@@ -13,12 +13,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-
-from benchmarks.accuracy.plot import svg
-from benchmarks.accuracy.result import Plot
-from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.bush import bush
-from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import (
     MODELS,
     assessments,
@@ -32,6 +27,11 @@ from unitcad.attenuation.edge.fitted_models import (
     pairwise,
     stored,
 )
+
+from benchmarks.accuracy.plot import svg
+from benchmarks.accuracy.result import Plot
+from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.edge.scores import assess, left_out_errors
 from unitcad.attenuation.inputs import Drive, body
@@ -278,7 +278,7 @@ def table_of_receivers() -> str:
 
 
 def _elements() -> dict:
-    return json.loads((HERE / "mechanics.json").read_text("utf-8"))
+    return json.loads((HERE / "fem.json").read_text("utf-8"))
 
 
 def table_of_elements() -> str:

@@ -385,7 +385,7 @@ def test_arguments_of_another_type_are_refused_in_one_sentence(
 def test_a_single_text_is_a_list_of_one(tmp_path: Path) -> None:
     built = unitcad.build("encapsulating", tmp_path, formats="stl", only="unit", check=False)
     assert list(built.volumes) == ["layer1", "layer2", "motor", "fpcb"]
-    assert list(unitcad.estimate("encapsulating", models="paper").edge) == ["paper"]
+    assert list(unitcad.estimate("encapsulating", models="published").edge) == ["published"]
 
 
 def test_tab_completion_offers_the_public_names_alone() -> None:

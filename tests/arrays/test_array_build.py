@@ -78,21 +78,21 @@ def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:
 
 
 def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
-    """Nine units in two cavities: five castings of two pours and a smear each, then the sheet's pour."""
+    """Nine units in two cavities: five castings of two pours each, then the sheet's pour."""
     array = load_array("forearm-pockets", ["moulds.cavities=[2, 1]"])
     moulds, spec = patch_moulds(array), MouldSet(array.unit)
     unit = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
     made = pocket_procedure(moulds, 6000.0, 1000.0, {"units/encapsulating": unit})
     used = {item.item: item.quantity for item in made.bill}
-    assert (used["gloves"], used["mixing cups and sticks"]) == (5 * 2 + 1, 5 * (2 + 1) + 1)
+    assert (used["gloves"], used["mixing cups and sticks"]) == (5 * 2 + 1, 5 * 2 + 1)
     strips = next(item.quantity for item in unit.bill if item.item == "adhesive tape")
     assert used["adhesive tape"] == 5 * strips
     (container,) = [item for item in made.bill if "degassing" in item.item]
     asked = [
-        float(re.findall(r"at least ([0-9.]+) ml", step.text)[0])
+        figure.value
         for pour in (*unit.pours, *made.pours)
-        for step in pour.steps
-        if step.title == "Degas"
+        for figure in pour.figures
+        if figure.name == "degassing container, at least"
     ]
     assert (container.quantity, container.made) == (1, "tool")
     assert container.least_ml == pytest.approx(max(asked), rel=0.05)
@@ -186,7 +186,7 @@ def test_the_procedure_names_every_place_and_weighs_all_units(folder: Path) -> N
     assert bill[motor] == bill["flexible circuit"] == 2
     unit = json.loads((folder / "units/encapsulating/casting.json").read_text())
     inner = sum(p["part_a_g"] for p in unit["pours"] if p["material"] == "ecoflex-00-10")
-    assert bill["ecoflex-00-10 part A"] == pytest.approx(2 * (inner + 1.0))  # each casting's pour and smear
+    assert bill["ecoflex-00-10 part A"] == pytest.approx(2 * inner)
     assert casting["earliest_finish_min"] > 2 * unit["earliest_finish_min"]
 
 

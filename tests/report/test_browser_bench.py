@@ -49,6 +49,56 @@ def test_a_printed_sheet_fits_two_pages(name, running, tmp_path):
     assert 1 <= len(re.findall(rb"/Type\s*/Page[^s]", pdf)) <= 2
 
 
+def test_on_paper_no_text_stands_beside_a_picture(running, page_of_one):
+    """Every line of a step has the width of its column, 60 mm: some forty letters of 8 pt."""
+    visit = Visit(running, page_of_one)
+    visit.page.emulate_media(media="print")
+    widths = visit.page.evaluate(
+        """() => [...document.querySelectorAll("li.bench-step")].map((step) => {
+          const image = step.querySelector("img"), text = step.querySelector("p.whole");
+          if (!image || !image.checkVisibility() || !text.checkVisibility()) return null;
+          const range = document.createRange();
+          range.selectNodeContents(text);
+          const over = image.getBoundingClientRect().bottom - range.getBoundingClientRect().top;
+          return [over, getComputedStyle(image).float];
+        }).filter(Boolean)"""
+    )
+    assert len(widths) > 10
+    assert all(over < 1 and float == "none" for over, float in widths)
+    visit.close()
+
+
+def test_a_measured_length_changes_the_command_and_a_weighed_part_the_other(running, page_of_one):
+    """1.40 g of A at 1 to 1 ask for 1.40 g of B; a motor of 2.3 mm asks for other moulds, one of 2.03 does not."""
+    visit = Visit(running, page_of_one)
+    page, code = visit.page, visit.page.locator("#first code")
+    asked = code.inner_text()
+    assert asked == (
+        "unitcad build spec.toml --set motor.diameter_mm=7 --set motor.thickness_mm=2 "
+        "--set fpcb.thickness_mm=0.11 --set moulds.filament_mm=1.75"
+    )
+    page.locator('[name="motor.thickness_mm"]').fill("2,03")
+    assert code.inner_text() == asked.replace("thickness_mm=2 ", "thickness_mm=2.03 ")
+    assert page.locator("#first .verdict").inner_text() == ""
+    page.locator('[name="motor.thickness_mm"]').fill("2.3")
+    assert code.inner_text() == "unitcad build spec.toml --set motor.thickness_mm=2.3"
+    assert "build again" in page.locator("#first .verdict").inner_text()
+    page.locator('[name="p1.a"]').fill("1.4")
+    assert page.locator("#pour1 .part-b").inner_text() == "A is 1.40 g: weigh B to 1.40 g."
+    assert page.locator("#pour2 .part-b").inner_text() == ""
+    page.locator('[name="p1.a"]').fill("much")
+    assert page.locator("#pour1 .part-b").inner_text() == ""
+    visit.close()
+
+
+def test_the_sheet_has_what_goes_wrong(running, page_of_one):
+    visit = Visit(running, page_of_one)
+    rows = visit.page.locator("#troubles tbody tr").count()
+    said = (page_of_one.parent / "troubleshooting.md").read_text("utf-8")
+    assert rows == said.count("\n## ") == len(json.loads((page_of_one.parent / "casting.json").read_text())["troubles"])
+    visit.close()
+
+
 @pytest.mark.parametrize(("width", "dark"), [(390, False), (390, True), (1280, False)])
 def test_it_contacts_nothing_and_fits_its_window(width, dark, running, page_of_one):
     visit = Visit(running, page_of_one, width=width, dark=dark)

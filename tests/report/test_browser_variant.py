@@ -54,6 +54,7 @@ def test_loads_from_a_file_and_asks_for_nothing(visit):
     assert visit.page.inner_text("h1") == "encapsulating"
     heads = visit.page.locator("section > h2").all_inner_texts()
     assert heads == [
+        "Make it",
         "3D",
         "Section",
         "Attenuation estimate",
@@ -178,14 +179,15 @@ def test_links_lead_to_files_that_are_there(visit, built):
 
 def test_the_estimate_shows_models_and_the_measured_value(visit):
     lead = visit.page.inner_text("#estimate .lead")
-    assert lead.startswith("5.17 % of the motor's amplitude at the edge, measured in the paper")
-    assert "does not read" in visit.page.inner_text("#estimate .lead-notes")
+    assert lead.startswith("5.2 % of the motor's amplitude at the edge (measured in the paper). Expect 3.1 to 6.8 %.")
+    visit.page.get_by_text("How sure?").click()
+    assert "each left out: x 1.3 typical" in visit.page.inner_text("#estimate .lead-notes")
     visit.page.click("#estimate summary:has-text('Tables')")
     text = visit.page.inner_text("#estimate")
     for words in (
-        "Paper, as printed",
-        "Fitted divider",
-        "(fitted)",
+        "Paper, as published",
+        "Fitted rule",
+        "(rule)",
         "Measured: 5.17",
         "Also printed: 4.58",
         "12 of 12",
@@ -250,7 +252,7 @@ def test_the_procedure_is_all_there(visit, built):
     items = visit.page.locator("#procedure ol > li").all_inner_texts()
     pours = [step for pour in casting["pours"] for step in pour["steps"]]
     steps = [*casting["preparation"], *pours, *casting["release"], *casting["assembly"]]
-    assert items == [f"{step['title']}. {step['text']}" for step in steps]
+    assert items == [f"{step['title']}. {step['short'] or step['text']}" for step in steps]
     assert "of which" in visit.page.locator("#procedure").inner_text()
     starts = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.start)")
     lengths = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.children.length)")

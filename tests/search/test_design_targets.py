@@ -42,10 +42,9 @@ from unitcad.search.target_file import load_target, shipped, target_of
         ({"vary": {"layers": [1, 9]}}, "vary.layers.1", "at most 2", 2),
         ({"vary": {"layers": [2, 2]}}, "vary.layers.1", "is there twice", None),
         ({"vary": {"layers": [2], "step_mm": 0.01}}, "vary.step_mm", "more than 20000 sets of lengths", 0.02),
-        ({"estimate": {"models": ["bushes"]}}, "estimate.models.0", "not known; closest: bush", "bush"),
         ({"estimate": {"fit": "none.toml"}}, "estimate.fit", "none.toml", None),
         ({"spec": {"layers": {}}}, "spec.layers", "not known", None),
-        ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "stands in at_hand.motors", None),
+        ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "is in at_hand.motors", None),
     ],
 )
 def test_what_is_refused(data: dict[str, Any], field: str, limit: str, nearest: object) -> None:
@@ -64,7 +63,7 @@ def test_a_fault_of_a_table_for_every_spec_is_named() -> None:
 
 
 def test_shipped_targets_load_and_are_listed(run: Any) -> None:
-    assert set(shipped()) == {"amplify", "published", "quiet-edge"}
+    assert set(shipped()) == {"amplify", "measured-lengths", "quiet-edge"}
     for name in shipped():
         assert load_target(name).name == name
         assert name in run("list", "targets").stdout

@@ -45,8 +45,8 @@ class EdgeEstimate:
 
     @property
     def answer(self) -> str:
-        """The sentence that leads the estimate: the measurement, the best model's level in per cent, its error."""
-        return summary(self.data)["answer"]
+        """The two lines that lead the estimate: what is measured or expected, and the paper's analytic model."""
+        return "\n".join(summary(self.data)["lines"])
 
     @property
     def edge(self) -> dict[str, float | None]:
@@ -98,7 +98,8 @@ def estimate(
     set : dict or sequence of str, optional
         Changes by dotted path: ``{"layers.0.wall_mm": 1.2}`` or ``["layers.0.wall_mm=1.2"]``. Lengths in mm.
     models : str or sequence of str, optional
-        Models of the level. Default: those of the spec.
+        Models of the level: "rule", "published", "corrected", "divider"; "fem" needs scikit-fem and seconds.
+        Default: those of the spec.
     frequency_hz : float, optional
         Frequency of the drive, Hz, 1 to 5000. Default: that of the spec or the motor.
 

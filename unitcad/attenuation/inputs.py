@@ -134,7 +134,7 @@ class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
     frequency: Quantity
     amplitude: float | None = None
     drive: Drive = "flat"
-    moduli: Literal["dynamic", "quasi-static"] = "dynamic"
+    moduli: Literal["small-strain", "quasi-static"] = "small-strain"
 
     @property
     def motor_diameter(self) -> float:

@@ -46,7 +46,7 @@ GOOD_DEG = {"a phone": 0.2, "a spirit level of 0.5 mm/m": 0.03}
 
 @dataclass(frozen=True)
 class Size:
-    """A length to measure before printing: its name and key, as drawn in mm, and what is assumed of it."""
+    """A length to measure before printing: its name and key, as drawn in mm, and the assumption about it."""
 
     what: str
     key: str
@@ -56,7 +56,7 @@ class Size:
 
 @dataclass(frozen=True)
 class Printing:
-    """What to measure and to print: the lengths of bought parts, and the file in which others may be asked for.
+    """The lengths to measure and the plates to print; `source` is the file in which others may be asked for.
 
     `plates` are the files; `minutes` and `cm3` (solid, so at most) are those of all; `how` has a sentence or two each.
     """
@@ -71,7 +71,7 @@ class Printing:
 
 
 def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Printing:
-    """Return what to print and how. `solid_mm3`: volume of all printed pieces, solid.
+    """Return the plates to print, and how. `solid_mm3`: volume of all printed pieces, solid.
 
     `tallest_mm`: height of a piece that may stand higher than core and blade.
     """

@@ -1,4 +1,4 @@
-"""What goes wrong at the bench: its cause, what to do now, and what to change in the spec."""
+"""Faults at the bench, each with its cause, a remedy for now and a change of the spec."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _Part = Literal["cup", "tongue", "stub", "fpcb", "motor"]
 
 @dataclass(frozen=True)
 class Trouble:
-    """A sign, its cause, what to do now and what to change in the spec."""
+    """A fault: its sign and cause, a remedy for now and a change of the spec."""
 
     sign: str
     cause: str
@@ -82,8 +82,8 @@ _KNOWN: tuple[tuple[Trouble, _Part | None], ...] = (
     ),
     (
         Trouble(
-            "A cup rocks or stands high",
-            "The first layer bulges, a string lies in between, or ribs are too tight.",
+            "A cup rocks or sits high",
+            "The first layer bulges, a string is in between, or ribs are too tight.",
             "Cut the bulge off, scrape both faces, press the cup on again.",
             "moulds.rib_interference_mm smaller or moulds.plinth_clearance_mm larger: the fit coupon shows which.",
         ),
@@ -100,7 +100,7 @@ _KNOWN: tuple[tuple[Trouble, _Part | None], ...] = (
     ),
     (
         Trouble(
-            "The motor stands out of the skin",
+            "The motor juts out of the skin",
             "It is thicker than the spec says.",
             "Nothing helps this unit: the cavity is too shallow.",
             "motor.thickness_mm as the caliper shows it; then print again.",

@@ -38,7 +38,7 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
     if level := manifest["estimate"]:
-        yield level["answer"]
+        yield from level["lines"]
     for name, use in ((BENCH, " to cast"), (PAGE, "")):
         if (built.folder / name).is_file():
             yield f"open {shlex.quote(str(built.folder / name))}{use}"

@@ -88,12 +88,12 @@ class ModelLevel(TypedDict):
 class EstimateSummary(TypedDict):
     """The summary of the estimate; `measured` is the paper's level of this unit, None if there is none.
 
-    `answer` leads the estimate; `model` has the least error of those that give a level.
+    `lines` are the two that lead the estimate; `model` is the one behind the first.
     """
 
     models: dict[str, ModelLevel]
     model: str | None
-    answer: str
+    lines: list[str]
     measured: float | None
     frequency_hz: float | None
 

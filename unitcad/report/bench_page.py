@@ -88,7 +88,7 @@ class ListedSize(msgspec.Struct):
 
 
 class ListedPrinting(msgspec.Struct):
-    """What to measure and to print."""
+    """The lengths to measure and the plates to print."""
 
     sizes: list[ListedSize]
     source: str
@@ -96,7 +96,7 @@ class ListedPrinting(msgspec.Struct):
 
 
 class ListedTrouble(msgspec.Struct):
-    """What goes wrong, and what to do."""
+    """A fault and its remedies."""
 
     sign: str
     cause: str

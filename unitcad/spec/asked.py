@@ -33,9 +33,8 @@ Output = Literal["unit", "moulds", "estimate", "casting"]
 OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
 _LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
 _TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
-Moduli = Literal["dynamic", "quasi-static"]
-Stacked = Literal["bush", "fitted", "paper", "consistent", "crossings"]
-Model = Literal["bush", "fitted", "paper", "consistent", "mechanics"]
+Moduli = Literal["small-strain", "quasi-static"]
+Model = Literal["rule", "published", "corrected", "divider", "fem"]
 
 
 class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_unknown_fields=True):
@@ -237,16 +236,14 @@ class EstimateTable(Table, frozen=True, kw_only=True):
         str, Meta(description="body under the unit, of the catalogue or of the spec's own [tissue.NAME.LAYER]")
     ] = "forearm"
     models: Annotated[
-        tuple[Model, ...], Meta(min_length=1, description="models of the level; mechanics are the finite elements")
-    ] = ("bush", "fitted", "paper", "consistent")
-    stack: Annotated[
-        Annotated[tuple[Stacked, ...], Meta(min_length=1)] | None,
-        Meta(description="closed forms behind the range; default: the models"),
-    ] = None
+        tuple[Model, ...], Meta(min_length=1, description="models of the level; fem are the finite elements")
+    ] = ("rule", "published", "corrected", "divider")
     moduli: Annotated[
         Moduli,
-        Meta(description="youngs_modulus_kpa (dynamic) or quasistatic_modulus_kpa (quasi-static) of the silicones"),
-    ] = "dynamic"
+        Meta(
+            description="youngs_modulus_kpa (small-strain) or quasistatic_modulus_kpa of the silicones"
+        ),
+    ] = "small-strain"
     fit: Annotated[
         str | None, Meta(description="lab-fit.toml of unitcad fit next to the spec: the lab's own constants and ranges")
     ] = None

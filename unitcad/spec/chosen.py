@@ -38,7 +38,7 @@ def motor_of(spec: Spec) -> catalogue.Motor | None:
 
 
 def assumed_lengths(spec: Spec) -> dict[str, str]:
-    """Return the assumed lengths, which nobody has measured, by their keys."""
+    """Return the assumption about each length that nobody has measured, by its key."""
     motor = motor_of(spec)
     sizes = [(size, getattr(motor, size)) for size in MOTOR_SIZES] if motor else []
     found = {

@@ -28,7 +28,6 @@ from unitcad.spec.asked import (
     MotorTable,
     MouldsTable,
     OutputTable,
-    Stacked,
     Table,
     WiresTable,
 )
@@ -104,16 +103,14 @@ class Moulds(Table, frozen=True, kw_only=True):
 class Estimate(Table, frozen=True, kw_only=True):
     """Inputs of the attenuation estimate: frequency in Hz, amplitude in um, the body, the models, which moduli.
 
-    `stack`: the closed forms behind the range, None for the models. `fit` names a lab's fit, `fit_source` is the text
-    of that file.
+    `fit` names a lab's fit, `fit_source` is the text of that file.
     """
 
     frequency_hz: float
     amplitude_um: float
     tissue: str
     models: tuple[Model, ...]
-    stack: tuple[Stacked, ...] | None = None
-    moduli: Moduli = "dynamic"
+    moduli: Moduli = "small-strain"
     fit: str | None = None
     fit_source: str | None = None
 

@@ -44,7 +44,7 @@ def _leads(spec: Spec) -> list[str]:
 
 
 def _roof(spec: Spec) -> list[str]:
-    """Say where the roof spans too much air, and where the motor hangs in too wide a ring of it."""
+    """Warn of a roof that spans too much air, and of too wide a ring of it round the motor."""
     if not design_of(spec).caps or spec.motor.fill:
         return []
     dims, close, found = design_of(spec).dimensions(spec), "motor.fill = true closes the ring", list[str]()
@@ -64,8 +64,8 @@ def _roof(spec: Spec) -> list[str]:
 def roof(spec: Spec) -> tuple[float, float]:
     """Return how far a unit's caps sag (mm), and the resonance of the motor that hangs on them (Hz).
 
-    A laminated plate clamped at the cavity's wall, pulled by its own weight and by a stiff disc of the motor's size in
-    its middle (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 1959, chapter 3); moduli are static.
+    A laminated plate is clamped at the cavity's wall. Its own weight and a stiff disc of the motor's size pull it down.
+    Source: Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 1959, chapter 3. Moduli are static.
     """
     dims, known = design_of(spec).dimensions(spec), catalogue.materials(spec.materials)
     silicones = [known[layer.material] for layer in spec.layers]

@@ -163,7 +163,6 @@ def _estimate(asked: AskedSpec, part: catalogue.Motor | None) -> Estimate:
     return Estimate(
         tissue=chosen.tissue,
         models=chosen.models,
-        stack=chosen.stack,
         moduli=chosen.moduli,
         fit=chosen.fit,
         fit_source=chosen.fit_source,

@@ -217,7 +217,7 @@
 
   function needed() {
     return Object.entries(GROUPS).map(([title, belongs]) => {
-      const rows = data.casting.bill.filter(belongs).map((item) => [item.item, `${number(item.quantity, 3)} ${item.unit}`, item.note]);
+      const rows = data.casting.bill.filter(belongs).map((item) => ({ className: / part [AB]$/.test(item.item) ? "plain" : undefined, cells: [item.item, `${number(item.quantity, 3)} ${item.unit}`, item.note] }));
       return rows.length > 0 && section(title.toLowerCase(), title, table(["Item", "How much", "Note"], rows, { label: title }));
     });
   }

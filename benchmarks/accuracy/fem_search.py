@@ -15,8 +15,8 @@ from typing import Any, get_args
 import numpy as np
 
 from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
-from unitcad.attenuation.mechanics.motor_level import Drive, Reading, Setting, amplitude, motion
-from unitcad.attenuation.mechanics.unknowns import Draw, drawn
+from unitcad.attenuation.fem.motor_level import Drive, Reading, Setting, amplitude, motion
+from unitcad.attenuation.fem.unknowns import Draw, drawn
 from unitcad.catalogue import measurements
 from unitcad.designs import shipped
 from unitcad.estimating import estimate_input

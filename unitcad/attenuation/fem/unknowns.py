@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from unitcad.attenuation.even_draws import position, positions
+from unitcad.attenuation.fem.harmonic_response import Contact
 from unitcad.attenuation.inputs import EstimateInput, Geometry, Quantity
-from unitcad.attenuation.mechanics.harmonic_response import Contact
 
 MODULUS_FACTOR = 1.5
 """A modulus that is given without a range is drawn from its value over this to its value times this: assumed."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.attenuation.mechanics.harmonic_mesh import HarmonicMesh
+from unitcad.attenuation.fem.harmonic_mesh import HarmonicMesh
 
 FIELDS = {0: ("u_r", "u_z"), 1: ("q", "p", "u_z")}
 """The unknown fields of each harmonic."""

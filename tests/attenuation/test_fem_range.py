@@ -1,4 +1,4 @@
-"""The range of model `mechanics`: seeded, the same for a material in every unit, made only when it is asked for."""
+"""The range of model `fem`: seeded, the same for a material in every unit, made only when it is asked for."""
 
 import itertools
 import json
@@ -14,11 +14,11 @@ from msgspec.structs import replace
 
 pytest.importorskip("skfem")
 
+from unitcad.attenuation.fem import prior_range
+from unitcad.attenuation.fem.motor_level import Setting, level, motion
+from unitcad.attenuation.fem.prior_range import DRAWS, range_block
+from unitcad.attenuation.fem.unknowns import CHOICES, Draw, drawn
 from unitcad.attenuation.inputs import Quantity
-from unitcad.attenuation.mechanics import prior_range
-from unitcad.attenuation.mechanics.motor_level import Setting, level, motion
-from unitcad.attenuation.mechanics.prior_range import DRAWS, range_block
-from unitcad.attenuation.mechanics.unknowns import CHOICES, Draw, drawn
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.validation import load
@@ -106,7 +106,7 @@ def test_draws_are_spread_evenly():
 
 
 def test_the_default_draws_agree_with_256():
-    data = json.loads((Path(__file__).parents[2] / "docs/mechanics.json").read_text("utf-8"))
+    data = json.loads((Path(__file__).parents[2] / "docs/fem.json").read_text("utf-8"))
     known = np.array(data["draws"])[:, data["units"].index("encapsulating E10/D30")]
     bonded = np.array([Draw(data["seed"], index, len(known)).either("contact") for index in range(len(known))])
     for one in range_block(UNIT)["levels"]:
@@ -119,7 +119,7 @@ def test_the_default_draws_agree_with_256():
 def test_a_unit_of_unknown_modulus_has_a_reason():
     unknown = replace(UNIT, layers=(replace(UNIT.layers[0], youngs_modulus=Quantity(None, note="nobody knows")),) * 2)
     assert range_block(unknown, draws=1)["levels"] == []
-    assert range_block(unknown, draws=1)["reason"] == "nobody knows"
+    assert range_block(unknown, draws=1)["reason"].endswith("nobody knows")
     with pytest.raises(UnitcadError, match="nobody knows"):
         level(unknown, 125.0, "flat", "edge")
 
@@ -131,14 +131,14 @@ def test_an_unknown_drive_or_reading_is_refused():
 
 
 def test_it_is_made_only_when_it_is_asked_for(monkeypatch):
-    from unitcad.attenuation.mechanics import sensitivities
+    from unitcad.attenuation.fem import sensitivities
 
     monkeypatch.setattr(prior_range, "range_block", lambda variant, say: {"draws": 0})
-    monkeypatch.setattr(sensitivities, "mechanics_inputs", lambda variant, say: [])
-    assert "mechanics" not in estimate_spec(load("encapsulating"))
-    data = estimate_spec(load("encapsulating"), models=("paper", "mechanics"))
-    assert data["mechanics"] == {"draws": 0, "inputs_seen": []}
-    assert list(data["models"]) == ["paper"]
+    monkeypatch.setattr(sensitivities, "fem_inputs", lambda variant, say: [])
+    assert "fem" not in estimate_spec(load("encapsulating"))
+    data = estimate_spec(load("encapsulating"), models=("published", "fem"))
+    assert data["fem"] == {"draws": 0, "inputs_seen": []}
+    assert list(data["models"]) == ["published"]
 
 
 def test_without_scikit_fem_the_message_says_what_to_install():
@@ -147,12 +147,12 @@ def test_without_scikit_fem_the_message_says_what_to_install():
         "from unitcad.cli import main; sys.argv = ['unitcad', 'estimate', 'encapsulating', *sys.argv[1:]]; main()"
     )
     asked = [sys.executable, "-c", code]
-    done = subprocess.run([*asked, "--model", "mechanics"], capture_output=True, text=True, check=False)
+    done = subprocess.run([*asked, "--model", "fem"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "[fem]" in done.stderr
     assert "Traceback" not in done.stderr
     plain = subprocess.run([*asked, "--json"], capture_output=True, text=True, check=True)
-    assert "mechanics" not in json.loads(plain.stdout)
+    assert "fem" not in json.loads(plain.stdout)
 
 
 def test_the_change_over_frequency_is_as_the_page_on_what_to_measure_says() -> None:

@@ -17,12 +17,12 @@ from typing import Literal, get_args
 import numpy as np
 from msgspec.structs import replace
 
+from unitcad.attenuation.fem.harmonic_mesh import harmonic_mesh
+from unitcad.attenuation.fem.harmonic_response import Fields, disc_response, motor_response
+from unitcad.attenuation.fem.unit_blocks import medium_blocks, unit_blocks
+from unitcad.attenuation.fem.unknowns import Draw, Setting, drawn
 from unitcad.attenuation.inputs import EstimateInput, Quantity, body
 from unitcad.attenuation.layered.response import LayeredMedium
-from unitcad.attenuation.mechanics.harmonic_mesh import harmonic_mesh
-from unitcad.attenuation.mechanics.harmonic_response import Fields, disc_response, motor_response
-from unitcad.attenuation.mechanics.unit_blocks import medium_blocks, unit_blocks
-from unitcad.attenuation.mechanics.unknowns import Draw, Setting, drawn
 from unitcad.errors import unknown_name
 
 Drive = Literal["flat", "axial"]
@@ -63,7 +63,7 @@ def level(
     reading         "skin" or "edge"
     draw            `Draw(seed, index)` of all that is not known; None: nominal values, bonded, the unit as drawn
     fineness        of the mesh: at 1 one core needs about 0.1 s and bonded levels are within 1 %; at 0.5 0.02 s and
-                    2 %, but 25 % where a resting unit is near a resonance (docs/accuracy/mechanics.md)
+                    2 %, but 25 % where a resting unit is near a resonance (docs/accuracy/fem.md)
 
     Both readings of one call come from one solution, which is kept: ask for the second one next. Plain arguments and
     results: a process pool can call it. Raises Refusal for an unknown drive or reading, UnitcadError for a material

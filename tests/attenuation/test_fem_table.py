@@ -1,4 +1,4 @@
-"""docs/mechanics.json holds what the finite elements give: one of its rows is made again."""
+"""docs/fem.json holds what the finite elements give: one of its rows is made again."""
 
 import json
 from pathlib import Path
@@ -8,11 +8,11 @@ import pytest
 
 pytest.importorskip("skfem")
 
-from benchmarks.accuracy.mechanics_search import COMPONENTS, unit_levels
+from benchmarks.accuracy.fem_search import COMPONENTS, unit_levels
 from unitcad.attenuation.edge.measured_levels import measured_table
-from unitcad.attenuation.mechanics.unknowns import Draw
+from unitcad.attenuation.fem.unknowns import Draw
 
-DATA = json.loads((Path(__file__).parents[2] / "docs" / "mechanics.json").read_text("utf-8"))
+DATA = json.loads((Path(__file__).parents[2] / "docs" / "fem.json").read_text("utf-8"))
 
 
 @pytest.mark.parametrize("index", [None, 0])

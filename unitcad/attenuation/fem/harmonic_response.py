@@ -14,8 +14,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
-from unitcad.attenuation.mechanics.harmonic_elements import FIELDS, element_matrices
-from unitcad.attenuation.mechanics.harmonic_mesh import TINY, Block, HarmonicMesh, one_thread
+from unitcad.attenuation.fem.harmonic_elements import FIELDS, element_matrices
+from unitcad.attenuation.fem.harmonic_mesh import TINY, Block, HarmonicMesh, one_thread
 
 Contact = Literal["bonded", "resting"]
 """How skin carries unit and motor: it sticks, or slides without friction and does not lift off."""

@@ -7,8 +7,8 @@ import pytest
 pytest.importorskip("skfem")
 
 from unitcad.attenuation.edge.inputs_seen import changed, inputs_seen
-from unitcad.attenuation.mechanics.motor_level import level
-from unitcad.attenuation.mechanics.sensitivities import STEP, mechanics_inputs
+from unitcad.attenuation.fem.motor_level import level
+from unitcad.attenuation.fem.sensitivities import STEP, fem_inputs
 from unitcad.estimating import estimate_input
 from unitcad.validation import load
 
@@ -16,7 +16,7 @@ from unitcad.validation import load
 def test_slopes_of_both_readings_are_those_of_specs_that_were_changed() -> None:
     variant = estimate_input(load("embedded"))
     lines: list[str] = []
-    found = {one["reading"]: one for one in mechanics_inputs(variant, lines.append)}
+    found = {one["reading"]: one for one in fem_inputs(variant, lines.append)}
     assert set(found) == {"skin", "edge"}
     assert len(set(lines)) == len(changed(variant))
     for path, value in (("layers.0.wall_mm", 1.25), ("motor.thickness_mm", 2.0), ("estimate.frequency_hz", 125.0)):
@@ -28,7 +28,7 @@ def test_slopes_of_both_readings_are_those_of_specs_that_were_changed() -> None:
 
 
 def test_a_unit_without_a_modulus_has_no_slopes() -> None:
-    assert mechanics_inputs(estimate_input(load("embedded", ["layers.0.material=ecoflex-00-50"]))) == []
+    assert fem_inputs(estimate_input(load("embedded", ["layers.0.material=ecoflex-00-50"]))) == []
 
 
 def test_no_poisson_s_ratio_above_one_half_is_asked_for() -> None:

@@ -1,6 +1,6 @@
-"""Writes docs/mechanics.json: the nine units by finite elements, at nominal values and over seeded draws.
+"""Writes docs/fem.json: the nine units by finite elements, at nominal values and over seeded draws.
 
-python docs/make_mechanics.py [DRAWS]    some three seconds a draw, 24 levels; then run make_model.py for the tables
+python docs/make_fem.py [DRAWS]    some three seconds a draw, 24 levels; then run make_model.py for the tables
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.accuracy.mechanics_search import as_data, drawn_levels, unit_levels
+from benchmarks.accuracy.fem_search import as_data, drawn_levels, unit_levels
 from unitcad.attenuation.edge.measured_levels import measured_table
 
-FILE = Path(__file__).parent / "mechanics.json"
+FILE = Path(__file__).parent / "fem.json"
 SEED, DRAWS, FINENESS = 1, 256, 1.0
 
 if __name__ == "__main__":

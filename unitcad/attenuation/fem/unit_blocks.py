@@ -6,10 +6,10 @@ out. What touches within the unit is bonded.
 
 from __future__ import annotations
 
+from unitcad.attenuation.fem.harmonic_mesh import Block, Solid
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LossFactor, complex_shear_modulus
 from unitcad.attenuation.layered.response import LayeredMedium
-from unitcad.attenuation.mechanics.harmonic_mesh import Block, Solid
 from unitcad.errors import UnitcadError
 
 CIRCUIT_DENSITY, CIRCUIT_POISSON = 1900.0, 0.34

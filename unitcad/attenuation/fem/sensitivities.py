@@ -8,23 +8,26 @@ from typing import Any, get_args
 import numpy as np
 
 from unitcad.attenuation.edge.inputs_seen import inputs_seen
-from unitcad.attenuation.edge.variant_units import no_level
+from unitcad.attenuation.edge.level import unknown
+from unitcad.attenuation.edge.variant_units import merged
+from unitcad.attenuation.fem.motor_level import Reading, amplitude, motion
+from unitcad.attenuation.fem.prior_range import ALIKE
+from unitcad.attenuation.fem.unknowns import Setting
 from unitcad.attenuation.inputs import EstimateInput
-from unitcad.attenuation.mechanics.motor_level import Reading, amplitude, motion
-from unitcad.attenuation.mechanics.unknowns import Setting
 
 STEP, FINENESS = 0.01, 0.5
 """The step is wide enough that the mesh's own changes do not show; differences are off by about 1 % of a slope."""
 
 
-def mechanics_inputs(
+def fem_inputs(
     variant: EstimateInput, say: Callable[[str], None] = lambda line: None, step: float = STEP
 ) -> list[dict[str, Any]]:
     """Return `inputs_seen` of each reading, of the unit as drawn, bonded, all values nominal; [] without a level.
 
     One finite-element solution for each end of each input serves both readings.
     """
-    if no_level(variant):
+    variant = merged(variant, ALIKE)
+    if unknown(variant):
         return []
     drive = variant.drive
     levels: dict[Reading, list[float]] = {reading: [] for reading in get_args(Reading)}

@@ -9,15 +9,18 @@ from typing import Any, get_args
 import numpy as np
 from scipy.stats import binom
 
-from unitcad.attenuation.edge.variant_units import no_level
+from unitcad.attenuation.edge.level import unknown
+from unitcad.attenuation.edge.variant_units import merged
+from unitcad.attenuation.fem.harmonic_response import Contact
+from unitcad.attenuation.fem.motor_level import Drive, Reading, level
+from unitcad.attenuation.fem.unknowns import Draw, drawn
 from unitcad.attenuation.inputs import EstimateInput
-from unitcad.attenuation.mechanics.harmonic_response import Contact
-from unitcad.attenuation.mechanics.motor_level import Drive, Reading, level
-from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 
 SEED, DRAWS, FINENESS = 1, 32, 1.0
 """Twice every combination of the choices."""
 PERCENT = (5, 50, 95)
+ALIKE = 0.01
+"""Layers whose properties differ by less are one layer: the mesh's own error is as large."""
 WITHIN = NormalDist().cdf(1.0) - NormalDist().cdf(-1.0)
 """How often a value lies within one standard error."""
 MEDIAN_ERROR = (
@@ -42,8 +45,9 @@ def range_block(
 
     The draws are spread evenly (`Draw.of`). low, median and high are percentiles; `by_contact` has them for bonded and
     for resting skin apart. median_error: `MEDIAN_ERROR`; None below three draws. `drawn_as`: the level of the unit as
-    its spec draws it, bonded, all values nominal: one of many, not the estimate. A unit with a silicone of unknown
-    modulus, or with more than two layers, has an empty `levels` and a `reason`.
+    its spec draws it, bonded, all values nominal: one of many, not the estimate. `skin_over_edge`: the level on the
+    skin over that of the unit's own edge, both as drawn, by drive. A unit with a silicone of unknown modulus has an
+    empty `levels` and a `reason`.
     """
     data: dict[str, Any] = {
         "kind": KIND,
@@ -54,7 +58,8 @@ def range_block(
         "percent": list(PERCENT),
         "median_error": MEDIAN_ERROR,
     }
-    if reason := no_level(variant):
+    variant = merged(variant, ALIKE)
+    if reason := unknown(variant):
         return {**data, "levels": [], "reason": reason}
     cases: list[tuple[Drive, Reading]] = [(drive, at) for drive in get_args(Drive) for at in get_args(Reading)]
     found: dict[tuple[Drive, Reading], list[float]] = {case: [] for case in cases}
@@ -80,7 +85,9 @@ def range_block(
         }
         for (drive, at), values in found.items()
     ]
-    return {**data, "levels": levels}
+    drawn_as = {(one["drive"], one["reading"]): one["drawn_as"] for one in levels}
+    ratios = {drive: drawn_as[drive, "skin"] / drawn_as[drive, "edge"] for drive in get_args(Drive)}
+    return {**data, "levels": levels, "skin_over_edge": ratios}
 
 
 def spread(values: Sequence[float]) -> dict[str, float | None]:
