@@ -53,8 +53,11 @@ def _moulds(result: Result) -> str:
 
 
 def _hankel(result: Result) -> str:
-    (wanted, *_) = [pick for pick in result.summary.picks if " damped" in pick[0] and pick[1] == "1e-06"] or [()]
-    return f"An error of 1e-6 takes {wanted[2].partition(': ')[2].partition(' (')[0]} for 13 radii on the forearm."
+    for case, error, pick in result.summary.picks:
+        if " damped" in case and error == "1e-06":
+            time = pick.partition(": ")[2].partition(" (")[0]
+            return f"An error of 1e-6 takes {time} for 13 radii on the forearm."
+    raise LookupError("damped, 1e-06")
 
 
 def _stability(result: Result) -> str:
@@ -62,6 +65,31 @@ def _stability(result: Result) -> str:
     over = max(float(value) for value in _column(classes, "largest error over its bound") if value is not None)
     broken = sum(_column(classes, "bounds broken"))
     return f"{broken} bounds were broken; the largest true error is {shown(over)} of its bound."
+
+
+def _models(result: Result) -> str:
+    scores = _table(result, "Scores with a unit left out")
+    names = _column(scores, "model")
+    off = {name: float(score) for name, score in zip(names, _column(scores, "left out"), strict=True)}
+    rule, means = off["rule"], off["baseline"]
+    return f"The rule is off by a factor of {rule:.2f} on a unit that it was not fitted to; class means by {means:.2f}."
+
+
+def _fem(result: Result) -> str:
+    for promise in result.promises:
+        if promise.what.startswith("bonded units at fineness 1:"):
+            return f"At the default mesh a level of a bonded unit is within {shown(promise.value)} of its limit."
+    raise LookupError("bonded units at fineness 1")
+
+
+def _skin(result: Result) -> str:
+    inside = _column(_table(result, "Published measurements"), "in range")
+    return f"{inside.count('yes')} of {len(inside)} published figures lie in the range of the forearm template."
+
+
+def _design(result: Result) -> str:
+    held = {row[0]: row[1] for row in _table(result, "Are 80 % ranges").rows}
+    return f"The 80 % range of the rule held for {held['rule']} measured units."
 
 
 def _extremes(result: Result) -> str:
@@ -89,6 +117,10 @@ _QUESTIONS: dict[str, tuple[str, Callable[[Result], str]]] = {
     "moulds": ("Do the moulds of random specs pass their checks?", _moulds),
     "hankel": ("How long does a response take for a wanted error?", _hankel),
     "stability": ("Does the error bound of a response hold for extreme media?", _stability),
+    "models": ("How far is the estimate from measured units?", _models),
+    "fem": ("How exact are the finite elements of a unit?", _fem),
+    "skin": ("Does the curve on the skin agree with published measurements?", _skin),
+    "design": ("How often does the range of a proposal hold?", _design),
     "extremes": ("How many specs end in anything but a build or a refusal?", _extremes),
     "left-out": ("How much time do fewer outputs save?", _left_out),
     "measure": ("How exact is an amplitude from a record?", _measure),
