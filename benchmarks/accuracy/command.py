@@ -29,7 +29,7 @@ def accuracy(
     out: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--out", help="Folder of accuracy.md, its pages and accuracy.json; default: docs, none if quick."
+            "-o", "--out", help="Folder of accuracy.md, its pages and accuracy.json; default: docs/evidence, none if quick."
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
@@ -51,7 +51,7 @@ def accuracy(
         raise Refusal("--quick", "set", f"does not go with {option}, which says how many; leave one out")
     results = []
     left_out: dict[str, str] = {}
-    folder = out if out is not None or quick else Path("docs")
+    folder = out if out is not None or quick else Path("docs") / "evidence"
     if folder is not None:
         runner.ready(folder)
     for name in suites or ():

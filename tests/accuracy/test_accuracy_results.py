@@ -91,13 +91,13 @@ def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
 
 
 def test_the_stored_results_are_read_and_a_cell_of_another_type_is_not_written(tmp_path: Path):
-    assert len(runner.read(Path(__file__).parents[2] / "docs")) > 5
+    assert len(runner.read(Path(__file__).parents[2] / "docs" / "evidence")) > 5
     with pytest.raises(TypeError, match="Table t"):
         replace(RESULT, tables=(Table("t", ("a",), ((True,),)),)).as_dict()
 
 
 def test_the_front_page_is_one_screen_with_a_line_for_every_suite():
-    stored = runner.read(Path(__file__).parents[2] / "docs")
+    stored = runner.read(Path(__file__).parents[2] / "docs" / "evidence")
     text = front(stored)
     assert text.count("](accuracy/") == len(stored)
     assert len(text.split()) < 500
@@ -105,7 +105,7 @@ def test_the_front_page_is_one_screen_with_a_line_for_every_suite():
 
 
 def test_a_page_shows_question_answer_plot_and_table_and_folds_the_rest():
-    for result in runner.read(Path(__file__).parents[2] / "docs"):
+    for result in runner.read(Path(__file__).parents[2] / "docs" / "evidence"):
         names = [f"{i}.svg" for i in range(len(result.plots))]
         text = markdown(result, names)
         shown_part, _, folded = text.partition('<details markdown="1">')
@@ -121,7 +121,7 @@ def test_a_page_shows_question_answer_plot_and_table_and_folds_the_rest():
 
 def test_the_worst_case_on_the_front_page_is_that_of_every_table_of_its_page():
     """The Hankel line once said 0.20 of a bound where its page had 0.306."""
-    results = {result.suite: result for result in runner.read(Path(__file__).parents[2] / "docs")}
+    results = {result.suite: result for result in runner.read(Path(__file__).parents[2] / "docs" / "evidence")}
     hankel = results["hankel"]
     over = [
         float(row[table.columns.index("over its bound")])

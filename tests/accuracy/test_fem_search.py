@@ -78,7 +78,7 @@ def test_a_search_names_its_hypothesis():
 
 
 def test_the_page_has_error_against_time_of_a_unit_under_both_drives():
-    (page,) = [one for one in runner.read(Path(__file__).parents[2] / "docs") if one.suite == "fem"]
+    (page,) = [one for one in runner.read(Path(__file__).parents[2] / "docs" / "evidence") if one.suite == "fem"]
     table = page.tables[0]
     assert {row[0].rpartition(", ")[2] for row in table.rows} == {"axial", "flat"}
     assert {"fineness", "unknowns", "time", "error, skin", "error, own edge"} <= set(table.columns)
