@@ -29,7 +29,7 @@ def accuracy(
     out: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--out", help="Folder of accuracy.md, its pages and accuracy.json; default: docs/evidence, none if quick."
+            "-o", "--out", help="Folder of the pages and accuracy.json; default: docs/evidence, none if quick."
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
