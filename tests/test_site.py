@@ -43,7 +43,7 @@ def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path: Path)
         assert (tmp_path / "site" / page.relative_to(ROOT / "docs").with_suffix(".html")).is_file(), page
         relative = page.relative_to(ROOT / "docs").as_posix()
         assert (
-            relative.startswith("accuracy/")
+            relative.startswith("evidence/accuracy/")
             or relative == "index.md"
             or f"]({relative})" in (ROOT / "docs" / "index.md").read_text("utf-8")
         ), f"the index of the docs lacks {relative}"

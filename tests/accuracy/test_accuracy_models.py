@@ -66,5 +66,5 @@ def test_the_estimates_page_says_how_often_the_range_misses():
 
 
 def test_the_page_says_what_fills_the_space_of_a_left_out_circuit():
-    page = (Path(__file__).parents[2] / "docs" / "accuracy" / "models.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "evidence" / "accuracy" / "models.md").read_text("utf-8")
     assert re.search(r"Without the circuit Layer 1 (now )?fills the space between motor and cap", page)

@@ -10,7 +10,8 @@ import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
-from benchmarks.accuracy.result import Plot, Result, markdown
+from benchmarks.accuracy.pages import markdown
+from benchmarks.accuracy.result import Plot, Result
 from unitcad.attenuation.curve import NO_RATIO
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.estimate_summary import summary

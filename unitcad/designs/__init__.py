@@ -80,7 +80,7 @@ def no_estimate() -> str:
 
 
 def default_design() -> Design:
-    """Return the design to start from where none is named."""
+    """Return the default design."""
     return next(design for design in shipped().values() if design.default)
 
 
@@ -92,8 +92,8 @@ def layer_colour(index: int) -> tuple[float, float, float]:
 def unit_bodies(spec: Spec) -> tuple[Body, ...]:
     """Return the bodies of the unit as assembled on the skin z = 0: layers inside out, motor, circuit or wires.
 
-    "layer1" ... are cast. Motor ("motor"), circuit ("fpcb") and wires ("wire1" ...) are bought, and added where the
-    design draws none. Whatever else it names is printed.
+    "layer1" ... are cast. Motor ("motor"), circuit ("fpcb") and wires ("wire1" ...) are bought, and added if the design
+    draws none. Bodies of other names are printed.
 
     Raises Refusal for a layer, circuit or wire that the spec lacks.
     """
@@ -133,9 +133,9 @@ def widths(spec: Spec, boxes: Sequence[Sequence[float]]) -> tuple[float, ...]:
 
 
 def inserts(spec: Spec) -> tuple[Body, ...]:
-    """Return the bodies that are laid into the mould before the pour `Design.laid_in`, to stay; () where it is 0.
+    """Return the bodies that are laid into the mould before the pour `Design.laid_in`, to stay; () if it is 0.
 
-    Raises UnitcadError where the spec has fewer pours.
+    Raises UnitcadError if the spec has fewer pours.
     """
     laid_in, pours = design_of(spec).laid_in, len(spec.layers)
     if laid_in > pours:
@@ -144,7 +144,7 @@ def inserts(spec: Spec) -> tuple[Body, ...]:
 
 
 def _inside(spec: Spec, dims: Dimensions) -> tuple[Body, ...]:
-    """Return what is bought and goes into the silicone."""
+    """Return the bought bodies that go into the silicone."""
     bodies = [Body("motor", "unit", "motor", parts.motor(dims), _MOTOR_COLOUR, made="bought")]
     if spec.fpcb and dims.pad:
         drawn = parts.circuit(spec.fpcb, dims.pad, dims)

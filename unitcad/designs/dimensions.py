@@ -10,7 +10,7 @@ from unitcad.spec import Spec
 MOTOR_CLEARANCE = 0.1
 """Least ring of air between the motor and Layer 1, mm, unless `motor.fill` closes it."""
 WIRE_GAP = 0.1
-"""Between wires side by side, and between them and what is next to them, mm."""
+"""Between wires side by side, and between them and their neighbours, mm."""
 
 
 EPS = 1e-9
@@ -20,8 +20,7 @@ EPS = 1e-9
 class Exit:
     """The passage of tails or wires through the silicone, from `low` to `high` (z, mm) and `width` wide.
 
-    A slot has silicone over it; a notch ends at the layers' top and is open there. `wires_y` is where the wires' axes
-    lie across it.
+    A slot has silicone over it; a notch ends at the layers' top and is open there. `wires_y`: y of the wires' axes.
     """
 
     low: float
@@ -49,13 +48,13 @@ class Dimensions:
     """A unit's radii and heights; z = 0 is the skin.
 
     cavity_radius   r of the cavity and so of the core; Layer 1 begins there
-    radii[i]        outer radius of layer i, in the section at y = 0 where it is not round
+    radii[i]        outer radius of layer i, in the section at y = 0 if it is not round
     core_height     top of the core
     heights[i]      top of layer i
     pad             the circuit's pad; None without a circuit
-    exit            slot or notch of tails or wires; None where nothing leaves through the silicone
-    ledge_radius    where the tongue's tip stops in the core
-    sides           where the tail leaves: +1 along +x, -1 along -x
+    exit            slot or notch of tails or wires; None if nothing leaves through the silicone
+    ledge_radius    radius at which the tongue's tip ends in the core
+    sides           exits of the tail: +1 along +x, -1 along -x
     """
 
     cavity_radius: float
@@ -120,8 +119,8 @@ def whole_layers(spec: Spec, z: float) -> float:
 def slot_exit(spec: Spec, low: float, inside: tuple[float, float], width: float) -> Exit:
     """Return a slot with silicone over it, its floor moved from z = `low` to a whole layer of the base.
 
-    It stays where it is where `inside` (what it takes, from z to z, mm) would no longer fit, or the cups' wall under
-    the window would get thinner than the least wall.
+    It is not moved if `inside` (its content, from z to z, mm) would no longer fit, or the cups' wall under the window
+    would get thinner than the least wall.
     """
     snapped, height = whole_layers(spec, low), spec.moulds.slot_height_mm
     if snapped <= inside[0] + EPS and snapped + height >= inside[1] - EPS and snapped >= _least_floor(spec):
@@ -138,7 +137,7 @@ def wire_exit(spec: Spec, top: float, core: float | None = None) -> Exit | None:
     """Return the exit of a spec's wires, side by side, whose passage ends at z = `top`; None without wires.
 
     Under a cap, `core` is the core's top (mm), and all of the slot moves to a whole layer. A notch keeps its open top:
-    its floor moves down to one, where the wall under it stays.
+    its floor moves down to one, if the wall under it remains.
     """
     wires = spec.wires
     if not wires:

@@ -1,4 +1,4 @@
-"""The embedded design: concentric open rings round the motor; the circuit's pad lies on top and touches every layer.
+"""The embedded design: concentric open rings round the motor; the circuit's pad is on top and touches every layer.
 
 ------------------- FPCB pad over all layers
 | L2 | L1 |  motor  | L1 | L2 |
@@ -70,13 +70,13 @@ def _check_circuit(spec: Spec, dims: Dimensions) -> None:
     limits.at_most("fpcb.pad_diameter_mm", pad, spec.diameter_mm, "the pad stays on the body, whose diameter is")
     outermost = 2 * (dims.radii[-2] if len(dims.radii) > 1 else dims.cavity_radius)
     limits.at_least(
-        "fpcb.pad_diameter_mm", pad, outermost + 0.2, "the embedded pad lies on every layer, so it reaches at least"
+        "fpcb.pad_diameter_mm", pad, outermost + 0.2, "the embedded pad covers every layer, so it reaches at least"
     )
     limits.at_most("fpcb.tail_width_mm", fpcb.tail_width_mm, pad, "the tail is no wider than the pad, which has")
 
 
 def advice(spec: Spec, dims: Dimensions) -> list[str]:
-    """Say where nothing holds the motor."""
+    """Warn if nothing holds the motor."""
     if spec.fpcb or spec.motor.fill:
         return []
     return [
@@ -116,9 +116,9 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
 
 def left_out(spec: Spec) -> list[Reason]:
     """Name the tooling that an open ring does without."""
-    reasons = [("filament stub and hole", "embedded: open rings hold no suction")]
+    reasons = [("filament stub and hole", "embedded: open rings have no suction")]
     if spec.fpcb:
-        reasons.insert(0, ("tongue and slot", "embedded: the circuit lies on the rings"))
+        reasons.insert(0, ("tongue and slot", "embedded: the circuit is on the rings"))
     return reasons
 
 

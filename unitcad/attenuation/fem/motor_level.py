@@ -63,7 +63,7 @@ def level(
     reading         "skin" or "edge"
     draw            `Draw(seed, index)` of all that is not known; None: nominal values, bonded, the unit as drawn
     fineness        of the mesh: at 1 one core needs about 0.1 s and bonded levels are within 1 %; at 0.5 0.02 s and
-                    2 %, but 25 % where a resting unit is near a resonance (docs/accuracy/fem.md)
+                    2 %, but 25 % where a resting unit is near a resonance (docs/evidence/accuracy/fem.md)
 
     Both readings of one call come from one solution, which is kept: ask for the second one next. Plain arguments and
     results: a process pool can call it. Raises Refusal for an unknown drive or reading, UnitcadError for a material
