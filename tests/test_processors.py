@@ -30,7 +30,7 @@ for words in (
     ["material", *pulls, "--name", "blend", "--like", "ecoflex-00-30"],
     ["phantom", "skin"],
     ["fit", "synthetic-bench"],
-    ["design", "measured-lengths", "--no-check"],
+    ["design", "published", "--no-check"],
 ):
     done = CliRunner().invoke(app, [*words, "-o", words[0]])
     assert done.exit_code == 0, done.output

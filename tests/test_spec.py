@@ -139,7 +139,7 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("tissue.arm={}", r"^tissue\.arm = \{\}: must not be empty: needs one layer or more by name, .*density_kg_m3"),
         ("layers=[]", r"^layers = \[\]: must not be empty: needs one \[\[layers\]\] table or more"),
         ("estimate.models=[]", r"^estimate\.models = \[\]: .* one or more of rule, published, .*fem$"),
-        ("materials.mine.mix_ratio=[]", r"mix_ratio = \[\]: takes a number, or a table with value and, where wanted, "),
+        ("materials.mine.mix_ratio=[]", r"mix_ratio = \[\]: takes a number, or a table with value and optionally "),
         ("motor=['a', 2.5]", r'^motor = \["a", 2.5\]: takes a table, with keys such as part, diameter_mm,'),
         ("motor.fill={ b = true }", r"^motor\.fill = \{ b = true \}: takes true or false$"),
         ("nonsense", "path=value"),

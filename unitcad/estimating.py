@@ -36,7 +36,7 @@ def estimate_spec(
     """Return the estimate of a spec as JSON-ready data (`attenuation.edge.estimates`); same spec, same data.
 
     The model `fem` is a range for each drive and reading, under the key "fem"; it costs seconds and needs scikit-fem.
-    `say` is told how far it is.
+    `say` gets the progress.
 
     Raises `Refusal` if no frequency is known, for an unknown material or tissue, and for values no body has.
     """

@@ -152,7 +152,7 @@ def _reliability(judged: dict[str, list[Judged]]) -> Table:
             rows.append((name, f"{low:g} to {high:g}", count, *shares, ends))
     targets = ", ".join(f"{100 * level:g} %" for level in LEVELS)
     return Table(
-        "Reliability: probabilities of meeting a wish, and how often it was met",
+        "Reliability: probabilities of meeting a target, and how often it was met",
         ("model", "probability", "judgements", "mean probability", "share met", "95 % interval of the share"),
         tuple(rows),
         f"Targets: at most {targets} at the edge, of each of the nine units. The judgements of one unit hang together, "

@@ -1,13 +1,10 @@
 """The search over readings of the finite elements: what a fit by choice costs, on levels whose truth is known."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 pytest.importorskip("skfem")
 
-from benchmarks.accuracy import runner
 from benchmarks.accuracy.fem_search import (
     AXES,
     drawn_levels,
@@ -75,16 +72,3 @@ def test_a_search_names_its_hypothesis():
     assert drive == "flat"
     taken = levels[int(draw.split()[1]), :, where[0], where[1], where[2], where[3]]
     assert best.best == pytest.approx(np.exp(np.abs(np.log(taken / MEASURED)).mean()))
-
-
-def test_the_page_has_error_against_time_of_a_unit_under_both_drives():
-    (page,) = [one for one in runner.read(Path(__file__).parents[2] / "docs" / "evidence") if one.suite == "fem"]
-    table = page.tables[0]
-    assert {row[0].rpartition(", ")[2] for row in table.rows} == {"axial", "flat"}
-    assert {"fineness", "unknowns", "time", "error, skin", "error, own edge"} <= set(table.columns)
-    for name in {row[0] for row in table.rows}:
-        rows = [row for row in table.rows if row[0] == name]
-        unknowns, errors = [row[2] for row in rows], [max(row[-2:]) for row in rows]
-        assert len(rows) == 4
-        assert unknowns == sorted(unknowns)
-        assert errors[-1] < 0.3 * errors[0]  # of a mesh eight times as fine

@@ -128,7 +128,7 @@ def test_absolute_values_are_only_a_range() -> None:
 
 
 def test_round_a_limb_distances_are_arcs_and_the_ends_of_a_ring_are_neighbours() -> None:
-    ring = array({"kind": "ring", "count": 8}, body={"radius_mm": 40.0})
+    ring = array({"kind": "ring", "count": 8}, limb={"radius_mm": 40.0})
     arc = 2 * math.pi * 40 / 8
     found = pairs(ring).centre
     assert found[0, 7] == pytest.approx(arc, abs=2e-3)

@@ -15,7 +15,6 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from unitcad.attenuation.edge.closed_form import crossings, published_path
-from unitcad.attenuation.edge.lab_fit import unit_key
 from unitcad.attenuation.edge.models import COMPARED
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.edge.variant_units import nominal
@@ -72,17 +71,6 @@ def test_the_units_on_which_the_models_differ_most_come_first() -> None:
         assert row["levels"]["crossings"] == pytest.approx(without * float(path[0]), rel=1e-4)
     page = contents(result)["fit.md"]
     assert f"| {rows[0]['unit']} |" in page.partition("## Units on which the models differ most")[2]
-
-
-def test_constants_lie_between_the_stored_and_the_lab_s_own(tmp_path: Path) -> None:
-    """One own unit of a one-constant model: the weights are 0.9 and 1 without an error of measurement."""
-    fit = fit_lab(load_fit_lab(_written(tmp_path, unit=[UNITS[1]]))).fit
-    spec = estimate_input(load("encapsulating"), 110.0)
-    own = 0.06 / float(published_path(nominal(spec))[0])
-    one = fit.model["published"]
-    assert one.constants["s"] == pytest.approx((one.stored["s"] ** 0.9 * own) ** (1 / 1.9), rel=1e-5)
-    assert fit.measured[0].key == unit_key(estimate_input(load("encapsulating")))
-    assert fit.measured[0].key != unit_key(estimate_input(load("encapsulating", ["layers.0.wall_mm=1.2"])))
 
 
 def test_levels_come_from_a_file_of_measure(tmp_path: Path) -> None:
@@ -167,37 +155,6 @@ def test_the_command_writes_four_files_and_prints_the_null(tmp_path: Path) -> No
     assert sorted(file.name for file in out.iterdir()) == ["fit.json", "fit.md", "fit.svg", "lab-fit.toml"]
     shown = CliRunner().invoke(app, ["fit", _written(tmp_path), "--json"])
     assert json.loads(shown.output)["fit"] == tomllib.loads((out / "lab-fit.toml").read_text())
-
-
-def test_a_constant_on_its_bound_is_said_and_its_model_comes_last(tmp_path: Path) -> None:
-    """Levels that fall as the outer layer softens: no positive kappa fits, so the search ends at its lower bound."""
-    names, levels = ("ecoflex-00-10", "dragon-skin-30"), (0.9, 0.05)
-    units = [
-        {
-            "name": f"u{i}{j}",
-            "spec": "embedded",
-            "set": {"layers.0.material": names[i], "layers.1.material": names[1 - i]},
-            "level": {"value": levels[i] * (1.0 + 0.1 * j)},
-        }
-        for i in (0, 1)
-        for j in range(3)
-    ]
-    lab = _written(tmp_path, unit=units, with_paper=False)
-    result = fit_lab(load_fit_lab(lab))
-    assert result.fit.model["divider"].constants["kappa"] == pytest.approx(1e-3)
-    assert result.fit.model["divider"].at_bound == "kappa"
-    assert result.chosen.order[-1] == "divider"
-    made = contents(result)
-    assert "Warning: divider: the units do not determine kappa (0.001)" in made["fit.md"]
-    assert tomllib.loads(made["lab-fit.toml"])["model"]["divider"]["at_bound"] == "kappa"
-    (tmp_path / "lab-fit.toml").write_text(made["lab-fit.toml"])
-    told = CliRunner().invoke(app, ["fit", lab]).stdout
-    assert "warning: divider: the units do not determine kappa" in " ".join(told.split())
-    found = estimate_spec(load("embedded", {"estimate.fit": str(tmp_path / "lab-fit.toml")}))
-    assert any("do not determine kappa" in line for line in found["answer"]["details"])
-    free = fit_lab(load_fit_lab("synthetic-bench"))
-    assert free.fit.model["divider"].at_bound is None
-    assert "Warning" not in contents(free)["fit.md"]
 
 
 def test_units_that_do_not_determine_q_are_named(tmp_path: Path) -> None:

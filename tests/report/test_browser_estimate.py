@@ -3,8 +3,6 @@
 import io
 import json
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -81,7 +79,7 @@ def test_both_drives_are_drawn_and_stand_in_the_table(visit, estimate):
     assert ratio[-1] > 100  # far out a sideways force moves more skin
 
 
-def test_two_lines_lead_and_the_rest_is_folded(running: Any, solved: Path, estimate: dict[str, Any]) -> None:
+def test_two_lines_lead_and_the_rest_is_folded(running, solved, estimate):
     seen = Visit(running, solved / "report.html")
     answer, shown = estimate["answer"], seen.page.inner_text("#estimate")
     for line in (answer["headline"], answer["lines"][1], answer["lines"][0][len(answer["headline"]) :].strip()):
@@ -97,7 +95,7 @@ def test_two_lines_lead_and_the_rest_is_folded(running: Any, solved: Path, estim
     seen.close()
 
 
-def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit: Visit, estimate: dict[str, Any]) -> None:
+def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit, estimate):
     levels = estimate["fem"]["levels"]
     chart = visit.page.locator("#estimate figure.ranges", has_text=f"of {DRAWS} draws")
     bars = chart.locator(".row:not(.scale)").evaluate_all(

@@ -40,7 +40,7 @@ def _target(vary: dict[str, Any] | None = None, **goals: Any) -> Target:
 @pytest.fixture(scope="module")
 def known() -> Inversion:
     """The target whose answer is known, moulds drawn."""
-    return invert(load_target("measured-lengths"))
+    return invert(load_target("published"))
 
 
 def test_the_answer_that_is_known(known: Inversion) -> None:
@@ -56,7 +56,7 @@ def test_the_answer_that_is_known(known: Inversion) -> None:
         expected = predictive_of([estimate_input(spec) for spec in known.specs if spec.name == one["name"]])
         assert one["probability"] == pytest.approx(expected.at_most(0.06)[0], rel=1e-6)
     assert all("only ones within the limits" in one["lengths_gain"] for one in best)
-    assert set(known.data["left_out"]) == {"ecoflex-00-30", "ecoflex-00-50"}
+    assert set(known.data["skipped"]) == {"ecoflex-00-30", "ecoflex-00-50"}
     assert [one["measured"]["level"] for one in best[:2]] == [0.04, 0.0517]
     assert all(one["checks"] > 20 for one in best)
     assert all(one["relies_on"] == [] for one in best[:2])
@@ -207,38 +207,6 @@ def test_what_is_offered_for_several_impossible_targets_is_accepted_together(tar
     assert several > targets / 6
 
 
-def test_three_per_cent_is_answered_with_the_least_that_is_possible() -> None:
-    with pytest.raises(Refusal) as refused:
-        invert(_target(edge_max=0.03), check=False)
-    assert refused.value.nearest == 0.04
-    least = "an edge level of 0.04 (probability 0.5, or measured) is the least (encapsulating ecoflex-00-10/dragon-skin"
-    assert least in str(refused.value)
-    accepted = invert(_target(edge_max=0.04), check=False).data["proposals"][0]
-    assert (accepted["measured"]["level"], accepted["nearest_other"]) == (0.04, False)
-    with pytest.raises(Refusal):
-        invert(_target(edge_max=0.0399), check=False)
-
-
-def test_what_no_unit_was_measured_at_is_answered_by_the_probability() -> None:
-    vary = {"wall_mm": [1.5, 1.5]}
-    with pytest.raises(Refusal, match=r"an edge level of 0\.0\d+ .* is the least") as refused:
-        invert(_target(vary, edge_max=0.03), check=False)
-    unit = load("encapsulating", {f"layers.{i}.{key}": 1.5 for i in (0, 1) for key in ("wall_mm", "cap_mm")})
-    unit = load(unit, {"layers.1.material": "dragon-skin-10-medium", "diameter_mm": 14.0})
-    median = float(predictive_of([estimate_input(unit)]).quantile(0.5)[0])
-    assert refused.value.nearest == pytest.approx(median, rel=0.01)
-    assert invert(_target(vary, edge_max=refused.value.nearest), check=False).data["proposals"]
-
-
-def test_a_measured_level_is_the_most_where_it_is_above_the_probable_ones() -> None:
-    with pytest.raises(Refusal) as refused:
-        invert(_target(edge_max=None, edge_min=0.95, probability_min=0.9), check=False)
-    assert refused.value.nearest == 0.671
-    assert "an edge level of 0.671 (probability 0.9, or measured) is the most" in str(refused.value)
-    goals = {"edge_max": None, "edge_min": 0.671, "probability_min": 0.9}
-    assert invert(_target(**goals), check=False).data["proposals"][0]["measured"]["meets"]
-
-
 def test_limits_that_exclude_each_other_are_named_together() -> None:
     with pytest.raises(
         Refusal, match=r"target\.mass_max_g = 0\.3: none of .* with target\.cure_hours_max = "
@@ -352,11 +320,11 @@ def test_the_front_is_what_nothing_beats(found: Candidates) -> None:
 
 
 def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(known: Inversion, tmp_path: Path) -> None:
-    first = design_files.contents(known, "out/design-measured-lengths")
-    again = design_files.contents(invert(load_target("measured-lengths"), check=True), "out/design-measured-lengths")
+    first = design_files.contents(known, "out/design-published")
+    again = design_files.contents(invert(load_target("published"), check=True), "out/design-published")
     assert first == again
-    design_files.write(tmp_path / "design-measured-lengths", first)
-    rows = list(csv.DictReader((tmp_path / "design-measured-lengths/ranking.csv").read_text("utf-8").splitlines()))
+    design_files.write(tmp_path / "design-published", first)
+    rows = list(csv.DictReader((tmp_path / "design-published/ranking.csv").read_text("utf-8").splitlines()))
     assert len(rows) == known.found.count
     assert [int(row["place"]) for row in rows] == list(range(1, len(rows) + 1))
     p = [round(float(row["probability"]), 2) for row in rows]
@@ -366,7 +334,7 @@ def test_the_same_target_gives_the_same_files_and_each_spec_builds_as_it_is(know
             ElementTree.fromstring(first[name])
     data = json.loads(first["design.json"])
     for one, spec in zip(data["proposals"], known.specs, strict=True):
-        file = tmp_path / "design-measured-lengths/specs" / Path(one["file"]).name
+        file = tmp_path / "design-published/specs" / Path(one["file"]).name
         assert load(file) == spec
     assert "<script" not in first["design.html"].decode()
     assert len({name_of(known.found, row) for row in range(known.found.count)}) == known.found.count
@@ -390,17 +358,15 @@ def test_grid() -> None:
 
 
 def test_the_command_writes_its_folder_and_explains(run: Any, tmp_path: Path) -> None:
-    done = run("design", "measured-lengths", "--no-check", cwd=tmp_path)
+    done = run("design", "published", "--no-check", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[-1] == "out/design-measured-lengths"
+    assert done.stdout.splitlines()[-1] == "out/design-published"
     assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target; probability 0.8" in done.stdout
-    made = {
-        path.name for path in (tmp_path / "out/design-measured-lengths").iterdir() if not path.name.startswith("front-")
-    }
+    made = {path.name for path in (tmp_path / "out/design-published").iterdir() if not path.name.startswith("front-")}
     assert made == {"design.html", "design.md", "design.json", "ranking.csv", "specs"}
-    as_json = json.loads(run("design", "measured-lengths", "--no-check", "--json", cwd=tmp_path).stdout)
-    assert as_json["folder"] == "out/design-measured-lengths"
-    why = run("design", "measured-lengths", "--no-check", "--explain", "three-layer", "-o", "other", cwd=tmp_path)
+    as_json = json.loads(run("design", "published", "--no-check", "--json", cwd=tmp_path).stdout)
+    assert as_json["folder"] == "out/design-published"
+    why = run("design", "published", "--no-check", "--explain", "three-layer", "-o", "other", cwd=tmp_path)
     assert "vary.layers has no 3" in why.stdout
     assert not (tmp_path / "other").exists()
     spec = as_json["proposals"][0]["file"]

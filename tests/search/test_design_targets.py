@@ -63,7 +63,7 @@ def test_a_fault_of_a_table_for_every_spec_is_named() -> None:
 
 
 def test_shipped_targets_load_and_are_listed(run: Any) -> None:
-    assert set(shipped()) == {"amplify", "measured-lengths", "quiet-edge"}
+    assert set(shipped()) == {"amplify", "published", "quiet-edge"}
     for name in shipped():
         assert load_target(name).name == name
         assert name in run("list", "targets").stdout

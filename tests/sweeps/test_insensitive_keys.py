@@ -23,7 +23,7 @@ def unread(sweep):
     return {model: keys for model, keys in found.insensitive.items() if keys}
 
 
-def test_the_walls_of_the_shipped_sweep_do_not_enter_rule_and_divider() -> None:
+def test_the_walls_of_the_shipped_sweep_do_not_enter_rule_and_divider():
     walls = ["layers.0.wall_mm", "layers.1.wall_mm"]
     assert unread(load_sweep("thickness")) == {"rule": walls, "divider": walls}
 
@@ -54,7 +54,7 @@ def test_keys_of_tooling_casting_and_files_are_no_matter_of_the_estimate():
 
 
 @pytest.mark.parametrize("mode", ["zip", "cases"])
-def test_keys_that_vary_together_are_told_apart(mode: str) -> None:
+def test_keys_that_vary_together_are_told_apart(mode):
     """The side of the softer layer moves every model's level; the wall beside it moves none of rule's and divider's."""
     names, walls = ["ecoflex-00-10", "dragon-skin-10-medium"], [1.25, 1.5]
     if mode == "zip":
@@ -83,7 +83,7 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path):
     assert warning in done.output
     told = json.loads((tmp_path / "b" / "batch.json").read_text())["estimate"]
     assert told["not_measured"] == {"layers.0.wall_mm": 1.25, "layers.1.wall_mm": 1.25}
-    assert told["not_read"] == {
+    assert told["insensitive"] == {
         "rule": ["layers.0.wall_mm", "layers.1.wall_mm"],
         "divider": ["layers.0.wall_mm", "layers.1.wall_mm"],
         "published": [],
@@ -122,7 +122,7 @@ def test_a_control_s_wall_is_that_of_the_measured_controls():
     assert found.not_measured == {"layers.0.wall_mm": 2.5}
 
 
-def test_a_wall_of_two_layers_is_the_one_that_was_measured() -> None:
+def test_a_wall_of_two_layers_is_the_one_that_was_measured():
     sweep = from_file({"base": "three-layer", "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "three")
     three = swept_estimate(sweep, sweep.count)
     assert three is not None

@@ -46,7 +46,6 @@ from unitcad.casting.steps import NEEDS, BenchStep, Phase, duration, phases
 from unitcad.casting.views import picture_path, views
 from unitcad.catalogue import Material
 from unitcad.meshcheck.findings import counted
-from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.lettering import seen
 from unitcad.text import listed, number, spaced
@@ -461,7 +460,7 @@ def pocket_procedure(
         earliest_finish_min=finish,
         bench_min=sum(phase.bench_min for phase in until),
         time_line=line,
-        printing=_printing(moulds, printed_mm3, array, units),
+        printing=_printing(moulds, printed_mm3, units),
         preparation=(*cast, *prepared),
         off_grid=(),
         unit_heights=(),
@@ -535,12 +534,18 @@ def _and_blade(moulds: PatchMoulds) -> str:
     return " and blade" * all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
 
 
-def _printing(moulds: PatchMoulds, solid_mm3: float, array: Array, folders: Iterable[str]) -> Printing:
-    sheet = printing(moulds, solid_mm3)
-    of_units = zip(folders, array.units, strict=True)
-    files = (f"{folder}/{file}" for folder, unit in of_units for file in mould_plates(MouldSet(unit)))
-    units = f"The units' moulds: {listed(files)}, as their casting.md says."
-    return replace(sheet, how=(*sheet.how, units))
+def _printing(moulds: PatchMoulds, solid_mm3: float, units: Mapping[str, Procedure]) -> Printing:
+    """Return the plates of the sheet and of each distinct unit."""
+    sheet, of_units = printing(moulds, solid_mm3), [unit.printing for unit in units.values()]
+    files = [f"{folder}/{plate}" for folder, unit in units.items() for plate in unit.printing.plates]
+    return replace(
+        sheet,
+        sizes=tuple(dict.fromkeys((*sheet.sizes, *(size for each in of_units for size in each.sizes)))),
+        plates=(*sheet.plates, *files),
+        minutes=sheet.minutes + sum(each.minutes for each in of_units),
+        cm3=sheet.cm3 + sum(each.cm3 for each in of_units),
+        how=(*sheet.how, f"The units' moulds: {listed(files)}, as their casting.md says."),
+    )
 
 
 def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:

@@ -168,7 +168,7 @@ def crosstalk(
     """Return an array's crosstalk as JSON-ready data.
 
     `matrix`: the decay between each two units by drive, rows the unit that drives, to the other's centre and nearest
-    edge, null for itself, at the units' own frequencies; `sums`: what adds up at each place; `band`: the same at the
+    edge, null for itself, at the units' own frequencies; `sums`: the sum at each place; `band`: the same at the
     nearest neighbour and the worst place over frequencies (Hz); `absolute`: a range; `masses`: with the
     masses of the others on the skin. Raises Refusal for a unit without an estimate, a frequency that no body takes,
     and for masses of more than `MOST_LOADED` units.
@@ -377,8 +377,8 @@ def crosstalk_csv(array: Array, band: Sequence[float] = BAND_HZ) -> bytes:
 
 
 IN_BRACKETS = (
-    "In brackets is the range: tissue moduli, damping, thicknesses and frequency taken to both ends of their ranges, "
-    "and what a unit that sticks to the skin or rests on it changes."
+    "In brackets is the range: tissue moduli, damping, thicknesses and frequency at both ends of their ranges, "
+    "and a unit that sticks to the skin or rests on it."
 )
 ALIKE = 1e-3
 """Sums that differ by less, as a share, are called alike."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -19,11 +18,11 @@ from unitcad.arrays.construction import construction_of
 from unitcad.arrays.crosstalk import BAND_HZ, crosstalk, crosstalk_lines, ratio_line, ratios
 from unitcad.arrays.crosstalk_maps import CROSSTALK
 from unitcad.casting.steps import in_short
+from unitcad.cli.build_summary import to_open
 from unitcad.cli.output import console, print_json, progress
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
-from unitcad.pipeline.write import PAGE
 from unitcad.text import number
 from unitcad.validation import compound_kind
 
@@ -45,8 +44,7 @@ def array_summary(array: Array, folder: Path, manifest: Manifest) -> Iterator[st
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
         yield from crosstalk_lines(json.loads(crosstalk.read_bytes()))[:2]
-    if (folder / PAGE).is_file():
-        yield f"open {shlex.quote(str(folder / PAGE))}"
+    yield from to_open(folder)
 
 
 def _more_cavities(array: Array) -> Iterator[str]:
@@ -93,7 +91,7 @@ def estimate_arrays(
     for one in compared:
         screen.print(ratio_line(one), soft_wrap=True)
     if not details:
-        typer.echo("--details prints what each unit gets, the pairs, the band and the assumptions")
+        typer.echo("--details prints the sum at each unit, the pairs, the band and the assumptions")
 
 
 def _print_details(data: Mapping[str, Any]) -> None:

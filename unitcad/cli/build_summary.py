@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterator
+from pathlib import Path
 
 from unitcad.casting.steps import in_short
 from unitcad.designs import widths
@@ -39,9 +40,14 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
     if level := manifest["estimate"]:
         yield from level["lines"]
+    yield from to_open(built.folder)
+
+
+def to_open(folder: Path) -> Iterator[str]:
+    """Yield a line for each page of a result's folder."""
     for name, use in ((BENCH, " to cast"), (PAGE, "")):
-        if (built.folder / name).is_file():
-            yield f"open {shlex.quote(str(built.folder / name))}{use}"
+        if (folder / name).is_file():
+            yield f"open {shlex.quote(str(folder / name))}{use}"
 
 
 def _across(spec: Spec, parts: list[PartRecord]) -> str:

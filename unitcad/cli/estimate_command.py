@@ -49,9 +49,9 @@ def estimate(
 ) -> None:
     """Estimate the level at a unit's edge, or an array's crosstalk.
 
-    The first line has the level in per cent of the motor's amplitude: measured, if this unit was, and an 80 % range by
-    the model that leads. The second has the paper's analytic model and its error. For an array: how much of a unit's
-    motion reaches its neighbours; several arrays are compared with the first.
+    The first line has the level in per cent of the motor's amplitude, and the 80 % range of the model that leads. If
+    this unit was measured, it has the measurement. The second line has the paper's analytic model and its error. For an
+    array: the share of a unit's motion at its neighbours; several arrays are compared with the first.
     """
 
     if model not in ("", "all", *MODELS, FEM):

@@ -26,8 +26,8 @@ def fit(
 ) -> None:
     """Judge the edge-level models with a lab's units, and fit them.
 
-    Each unit is predicted without it, next to a baseline of four class means. The constants are shrunk towards the
-    stored ones by how many units there are. `estimate --fit` and `build --fit` take lab-fit.toml.
+    Each unit is predicted from all others, by every model and by a baseline of four class means. The fewer units, the
+    more the constants shrink towards the stored ones. `estimate --fit` and `build --fit` take lab-fit.toml.
     """
 
     loaded = load_fit_lab(lab)

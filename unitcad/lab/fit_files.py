@@ -64,7 +64,7 @@ def as_data(result: Fitted) -> dict[str, Any]:
 
 
 def unit_rows(result: Fitted) -> list[dict[str, Any]]:
-    """Return each unit's measured level and, by the model that leads, what was predicted without it."""
+    """Return each unit's measured level and the leading model's prediction without it."""
     chosen = result.chosen
     assert chosen.campaigns is not None
     name = chosen.leads
@@ -232,5 +232,5 @@ def _chart(result: Fitted) -> str:
             series.append(Series(f"{label}, with {PERCENT[0]} to {PERCENT[1]} %", measured, predicted, True, bars=bars))
     ends = [min(row["measured"] for row in rows), max(row["measured"] for row in rows)]
     series.append(Series("predicted = measured", ends, ends, dashed=True))
-    title = f"{result.fit.name}: {result.fit.leads}, each leave-one-out"
+    title = f"{result.fit.name}: {result.fit.leads}, leave-one-out"
     return chart(series, title, "measured level", "predicted level", log_x=True, log_y=True)

@@ -79,7 +79,7 @@ class FitLabFile(Table, frozen=True, kw_only=True):
     note: Annotated[str, Meta(max_length=1000, description="a remark for the results")] = ""
     moduli: Annotated[
         Literal["small-strain", "quasi-static"],
-        Meta(description="moduli of the silicones: at small strain, or of a slow pull"),
+        Meta(description="moduli of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa"),
     ] = "small-strain"
     with_paper: Annotated[
         bool, Meta(description="whether the paper's nine units count in addition to the lab's own")
@@ -202,7 +202,7 @@ def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | 
 
 SOURCES: tuple[Moduli, ...] = get_args(Moduli)
 LEAST_ALONE = 6
-"""Units of a lab without the paper's: one is left out, four class means are fitted, one degree of freedom is left."""
+"""Units of a lab without the paper's: with one left out and four class means fitted, one degree of freedom remains."""
 _WIDEST = 10.0
 """Largest half-width of a range of ln constant that is written: beyond it the units say nothing of the constant."""
 _SIDES = 0.95

@@ -78,7 +78,7 @@ def _point(i: int, row: Mapping[str, str | None]) -> Point:
 
 
 def _layers(field: str, unit: str) -> tuple[str, list[str]]:
-    """Return design and silicones of "embedded E10/D30"."""
+    """Return design and silicones of a name like DESIGN E10/D30."""
     design, _, pair = unit.partition(" ")
     known = (CONTROL, *(name for name, one in designs().items() if one.passes))
     if design not in known:

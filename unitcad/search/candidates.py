@@ -65,8 +65,8 @@ class Geometry:
 class Candidates:
     """Candidates as columns, one row each: `geometry` and `sequence` are indices into the two lists.
 
-    mass in g; hours from the first weighing until the unit is out of the mould; crosstalk at the pitch, or where units
-    touch if the pitch is shorter, NaN without a pitch. `probability` is that of meeting the level; `novelty`: how many
+    mass in g; hours from the first weighing until the unit is out of the mould; crosstalk at the pitch, or at touching
+    units if the pitch is shorter, NaN without a pitch. `probability` is that of meeting the level; `novelty`: how many
     of lengths, motor and frequency no measured unit had. skipped: silicones without a modulus, with the reason.
     refused: the reasons why lengths were refused, by design and field.
     """

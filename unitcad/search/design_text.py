@@ -36,7 +36,7 @@ def target_line(goals: Mapping[str, Any]) -> str:
 
 
 def head_lines(data: Mapping[str, Any]) -> list[str]:
-    """Return how much was tried, what the probabilities come from, and what the evidence ranks."""
+    """Return the number of candidates, the source of the probabilities, and the order that the evidence supports."""
     tried, leads = data["tried"], data["leads"]
     refused = sum(one["count"] for one in tried["refused"])
     not_made = f"; {refused} sets of lengths that no design accepts" if refused else ""

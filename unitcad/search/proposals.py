@@ -35,7 +35,7 @@ _TRIES = 3
 """Candidates of a kind that are judged until one can be cast."""
 RANKS = "design, which side is soft, silicones with another side soft"
 NOT_RANKED = "walls, caps, diameter, frequency, and silicones with the same side soft"
-"""What the measured units tell apart, and what they do not: the range is only wider where they have another value."""
+"""The measured units do not tell these apart: another value only widens the range."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
 
 
 def leads_block(target: Target) -> dict[str, Any]:
-    """Return which model leads, by which units, and what the evidence ranks and what not."""
+    """Return the leading model, the units behind it, the keys that the evidence ranks and those that it does not."""
     slow = ", by the moduli of a slow pull" if target.asked.estimate.moduli == "quasi-static" else ""
     by = f"the paper's nine levels{slow}" if target.fit is None else f"the lab's fit {target.fit.name}"
     model = lead_of(target.asked.estimate.moduli, target.fit).model
@@ -156,7 +156,7 @@ def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[
 
 
 def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None) -> dict[str, Any]:
-    """Return a candidate as data: what it is, its probability and range, its measurement, limits, unmeasured inputs."""
+    """Return a candidate as data: its kind, its probability and range, its measurement, limits, unmeasured inputs."""
     variant, lengths, goals = estimate_input(spec), found.lengths(row), found.target.goals
     low, middle, high = (float(end[row]) for end in found.range)
     measured = measurement(found.target, variant)
@@ -242,7 +242,7 @@ def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
 
 
 def _gain(kind: Kind) -> str:
-    """Say what lengths do to a kind's probability."""
+    """Say how lengths change a kind's probability."""
     if kind.rows.size < 2:
         return "its lengths are the only ones within the limits"
     return (

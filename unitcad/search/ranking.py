@@ -75,7 +75,7 @@ def kinds(found: Candidates, rows: np.ndarray) -> list[Kind]:
 
 
 def unmeasured(variant: EstimateInput) -> list[str]:
-    """Return what of a candidate the nearest measured unit had otherwise."""
+    """Return the inputs in which a candidate differs from the nearest measured unit."""
     return nearest(variant)["differs_in"]
 
 

@@ -120,9 +120,7 @@ class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         tuple[kinds.MotorDiameter, kinds.MotorDiameter] | None,
         Meta(description="smallest and largest diameter; default: 14, or the smallest that takes the motor"),
     ] = None
-    step_mm: Annotated[
-        Step, Meta(description="step of walls and caps; the best candidates are refined between the steps")
-    ] = 0.25
+    step_mm: Annotated[Step, Meta(description="step of walls and caps")] = 0.25
     diameter_step_mm: Annotated[Step, Meta(description="step of the diameter")] = 1.0
 
     def walls(self, layers: int) -> tuple[float, float]:
@@ -136,11 +134,11 @@ class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class ModelsTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Inputs of the estimate."""
 
-    fit: Annotated[str | None, Meta(description="lab-fit.toml of unitcad fit, in place of the paper's units")] = None
+    fit: Annotated[str | None, Meta(description="lab-fit.toml of unitcad fit")] = None
     tissue: Annotated[Name, Meta(description="body under the unit")] = "forearm"
-    moduli: Annotated[Moduli, Meta(description="moduli of the silicones: at small strain, or of a slow pull")] = (
-        "small-strain"
-    )
+    moduli: Annotated[
+        Moduli, Meta(description="moduli of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")
+    ] = "small-strain"
 
 
 class TargetFile(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

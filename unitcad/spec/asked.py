@@ -240,7 +240,7 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     ] = ("rule", "published", "corrected", "divider")
     moduli: Annotated[
         Moduli,
-        Meta(description="youngs_modulus_kpa (small-strain) or quasistatic_modulus_kpa of the silicones"),
+        Meta(description="modulus of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa"),
     ] = "small-strain"
     fit: Annotated[
         str | None, Meta(description="lab-fit.toml of unitcad fit next to the spec: the lab's own constants and ranges")
