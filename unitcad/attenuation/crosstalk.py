@@ -1,4 +1,4 @@
-"""What of a unit's motion reaches a neighbour: the skin there over the skin at the unit's edge, with a range."""
+"""Crosstalk, a unit's motion at a neighbour: the skin there over the skin at the unit's edge, with a range."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CONTACT: dict[Drive, tuple[tuple[float, ...], tuple[float, ...]]] = {
     "flat": ((1.0, 0.82, 0.66, 0.48, 0.34, 0.23, 0.19, 0.14), (1.0,) * 8),
     "axial": ((1.0, 0.83, 0.84, 0.9, 0.9, 0.9, 0.9, 0.9), (1.0, 1.0, 1.05, 1.47, 1.5, 1.5, 1.58, 2.14)),
 }
-"""By what factors |u| over that at the edge differs from bare skin's, least and largest, at `CONTACT_MM` from the edge.
+"""Factors between |u| over that at the edge and bare skin's, least and largest, at `CONTACT_MM` from the edge.
 
 Finite elements of the paper's two designs with four pairs of silicones each, skin that sticks to the unit or lets it
 slide, 100 to 150 Hz, against the layered solver (`python -m benchmarks.accuracy skin` makes them again).
@@ -54,7 +54,7 @@ def contact(drive: Drive, mm: float | np.ndarray) -> tuple[Any, Any]:
 
 
 def ends(variant: EstimateInput) -> list[dict[str, int]]:
-    """Return what `RANGE` names, each kind at its low and its high end, as `decay` takes it."""
+    """Return the inputs that `RANGE` names, each kind at its low and its high end, as `decay` takes it."""
     ranged = variant.frequency.ends[0] < variant.frequency.ends[1]
     kinds = ["moduli", "damping", "thicknesses", *(["frequency"] if ranged else [])]
     return [{kind: end} for kind in kinds for end in (0, 1)]

@@ -133,7 +133,7 @@ def _decays(variants: Sequence[EstimateInput]) -> list[float]:
 
 
 def _reads(variant: EstimateInput) -> str:
-    """Return what of a variant a body and its frequency are made of."""
+    """Return the part of a variant that sets its body and frequency."""
     return repr((variant.tissue, variant.frequency))
 
 
@@ -199,7 +199,7 @@ def _drive_block(variant: EstimateInput, drive: Drive, found: list[Response], be
 
 
 def _with_contact(drive: Drive, curve: dict[str, list[float]]) -> dict[str, list[float]]:
-    """Return a curve of |u| by mm from the edge whose spread has in it what a unit on the skin changes."""
+    """Return a curve of |u| by mm from the edge whose spread includes the effect of a unit on the skin."""
     factors = contact(drive, np.arange(len(curve["value"])))
     ends = zip(("low", "high"), factors, strict=True)
     return {"value": curve["value"], **{name: (np.array(curve[name]) * own).tolist() for name, own in ends}}

@@ -1,4 +1,4 @@
-"""The paper's closed forms, as published and corrected, and what the empirical models read, over arrays of units. SI.
+"""The paper's closed forms, as published and corrected, and inputs of the empirical models, over arrays of units. SI.
 
 Every function broadcasts: a `Units` holds any number of variants of N layers each. A path runs from the motor outwards
 through the walls of the layers, inside out, at the skin, and ends at the outer face, in air (equations 4 to 6).

@@ -1,4 +1,4 @@
-"""What of an estimate goes into tables and manifests. It loads no solver."""
+"""The part of an estimate for tables and manifests. It loads no solver."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def estimate(
 
     `models` have a block each; the answer does not depend on them. With a lab's `fit` the constants are its own, each
     model has a predictive range, and the data have `fit` and `own_measured`. `layered` gives the layered solver's
-    block, rounded; it reads no silicone: variants on one body share it. A quantity that can't be given is null beside
+    block, rounded; it reads no silicone: variants on one body share it. A quantity that can't be given is null next to
     a `reason`. Raises `Refusal` for values that no body has.
     """
     errors = table_error(variant.moduli)
@@ -121,7 +121,7 @@ def estimate(
 
 
 def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
-    """Return what a fit is, which model leads by it, and how well the models and the baseline do there."""
+    """Return a description of a fit, the model that leads by it, and the scores of models and baseline there."""
     scores = {name: fit.model[name] for name in (*models, BASELINE)}
     return {
         "name": fit.name,
@@ -244,7 +244,7 @@ def assessment_block(assessment: Assessment) -> dict[str, Any]:
 
 
 def _noted(variant: EstimateInput) -> list[str]:
-    """Return what is to be said of moduli that are known but not at the motor's frequency."""
+    """Return notes on moduli that are known but not at the motor's frequency."""
     moduli = [(layer.material, layer.youngs_modulus) for layer in variant.layers]
     return [f"{name} youngs_modulus: {one.note}" for name, one in moduli if one.note and one.value is not None]
 
@@ -262,7 +262,7 @@ def _quantity(quantity: Quantity, factor: float) -> dict[str, Any]:
 
 
 def rounded(data: Any, digits: int = SIGNIFICANT_DIGITS) -> Any:
-    """Return `data` with its floats to `digits` significant digits, and None for what is not finite.
+    """Return `data` with its floats to `digits` significant digits, and None for floats that are not finite.
 
     So the last bits of a platform do not show.
     """

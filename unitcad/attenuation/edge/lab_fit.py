@@ -1,4 +1,4 @@
-"""A lab's fit as it is stored: the models' constants, what a new unit's level may be, the lab's own measurements.
+"""A lab's stored fit: the models' constants, the prediction for a new unit, the lab's own measurements.
 
 A new unit's ln level is Student-t distributed: `scale`^2 = discrepancy^2 (1 + g' C g), where g is the gradient of the
 model's ln level in the logarithms of its constants, and C their covariance over discrepancy^2.
@@ -25,11 +25,11 @@ PERCENT = (10, 90)
 
 
 class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A model fitted to a lab's units: constants, where they were stored, and the predictive.
+    """A model fitted to a lab's units: constants, their stored values, and the predictive.
 
     `discrepancy`: standard deviation of a unit's ln level about the model. `covariance`: of the constants' logarithms,
     in the order of `constants`, over discrepancy^2. `left_out` is the factor with the unit left out.
-    `at_bound`: the constant that the search left on its bound, None where the units determine all.
+    `at_bound`: the constant that the search left on its bound, None if the units determine all.
     """
 
     constants: dict[str, Positive]
@@ -76,7 +76,7 @@ class InputFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A lab's fit: `units` of its own, beside the paper's nine or not, by which moduli; `leads`: `models.leader`.
+    """A lab's fit: `units` of its own, with or without the paper's nine, by which moduli; `leads`: `models.leader`.
 
     `between_labs`: standard deviation between labs of a constant's logarithm over that between units of one lab.
     """
@@ -119,8 +119,8 @@ def fault(fit: LabFit) -> tuple[str, Any, str] | None:
 def predictive(fit: LabFit, model: str, variant: EstimateInput) -> tuple[int, float, float]:
     """Return (degrees of freedom, centre, scale) of the Student-t distribution of a variant's ln level in the lab.
 
-    At the middle of the inputs' ranges, for a unit like the measured ones; centre and scale are NaN where an input is
-    not known.
+    At the middle of the inputs' ranges, for a unit like the measured ones; centre and scale are NaN if an input is not
+    known.
     """
     units, one = nominal(variant), fit.model[model]
     centre = float(np.log(edge_levels(units, model, one.constants))[0])
@@ -170,7 +170,7 @@ def error_block(fit: LabFit, model: str) -> dict[str, Any]:
 
 
 def unit_key(variant: EstimateInput) -> str:
-    """Return what tells one unit from another: a hash of design, silicones and lengths; not of body or frequency."""
+    """Return the identity of a unit: a hash of design, silicones and lengths; not of body or frequency."""
     geometry = variant.geometry
     lengths = [
         geometry.cavity_radius,

@@ -143,7 +143,7 @@ def _level_at_corners(
 ) -> Callable[[cf.Wave, int | None], Any]:
     """Return a function that gives a model's level at the corners of the variant, or of the control of a layer.
 
-    It keeps what it has worked out: level, amplitude and ratios read the same. The wave is for models that have waves.
+    It caches its results: level, amplitude and ratios read the same. The wave is for models that have waves.
     """
 
     @cache
@@ -157,9 +157,9 @@ def _level_at_corners(
 
 
 def spread(variant: EstimateInput, predict: Callable[[], Any]) -> dict[str, Any]:
-    """Return {value, low, high} of `predict`, a number for each corner, and a `reason` for what is null.
+    """Return {value, low, high} of `predict`, a number for each corner, and a `reason` for nulls.
 
-    The value is null where an input has a range only; all three where an input is not known.
+    The value is null if an input has only a range; all three if an input is not known.
     """
     reason = unknown(variant)
     if reason:
@@ -253,7 +253,7 @@ def _controls(variant: EstimateInput) -> list[int]:
 def _ratio(
     variant: EstimateInput, model: str, level: Callable[[cf.Wave, int | None], Any], index: int
 ) -> dict[str, Any]:
-    """Return the level over that of the control of layer `index`, by wave where the model has waves."""
+    """Return the level over that of the control of layer `index`, by wave if the model has waves."""
 
     def of(wave: cf.Wave) -> dict[str, Any]:
         return spread(variant, lambda: level(wave, None) / level(wave, index))
@@ -313,7 +313,7 @@ def _paths(units: Units) -> _Paths:
 def _reading(
     variant: EstimateInput, units: Units, reading: cf.Reading, paths: _Paths, controls: dict[int, _Paths]
 ) -> dict[str, Any]:
-    """Return what one reading of eta gives, from the paths of the unit and of its controls."""
+    """Return the result of one reading of eta, from the paths of the unit and of its controls."""
 
     def ratio(index: int, wave: cf.Wave) -> dict[str, Any]:
         with np.errstate(all="ignore"):
@@ -354,7 +354,7 @@ def _constraint(constraint: cf.Constraint, control: str | None, variant: Estimat
 def _by_corner(name: str, values: Any, variant: EstimateInput) -> dict[str, Any]:
     """Return `values`, a row for each corner, as {name}.
 
-    Where an input is known as a range only, {name} is null beside {name}_low and {name}_high.
+    If an input is known only as a range, {name} is null next to {name}_low and {name}_high.
     """
 
     def plain(row: Any) -> Any:

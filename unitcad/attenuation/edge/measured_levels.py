@@ -14,7 +14,7 @@ from unitcad.attenuation.edge.closed_form import Units, softer_passes
 from unitcad.catalogue import Material, materials, measurements
 
 CONTROL = "single"
-"""What stands for the design in a control's name."""
+"""Word in place of the design in a control's name."""
 CLASSES = ("control", "stiff inside", "soft inside, one pass", "soft inside, two passes")
 """One layer; no border with the softer layer inside; such a border, passed once (open rings); passed more often."""
 Moduli = Literal["small-strain", "quasi-static", "data sheet"]
@@ -138,7 +138,7 @@ def _units(design: str, layers: tuple[str, ...], moduli: Moduli) -> Units:
 
 
 def _modulus(material: Material, moduli: Moduli) -> float:
-    """Return Young's modulus in Pa, NaN where there is none."""
+    """Return Young's modulus in Pa, NaN if there is none."""
     by_source = {
         "small-strain": material.youngs_modulus_kpa,
         "quasi-static": material.quasistatic_modulus_kpa,

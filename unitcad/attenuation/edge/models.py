@@ -1,9 +1,9 @@
-"""The models of the edge level, what is fitted to a measured table, how well each does there, and which one leads.
+"""The models of the edge level, their fits to a measured table, their scores there, and the one that leads.
 
 `rule` is s q^n: n counts the passes of borders whose inside is the softer layer. `published` and `corrected` are the
 paper's closed form; its f1 and f2 are not printed, so both have one constant s. `divider` is empirical, with two
 constants. `baseline`, the mean level of each of four classes, and `crossings`, k_t alone for each pass of a border,
-are scored beside them and give no estimate.
+are scored with them and give no estimate.
 """
 
 from __future__ import annotations
@@ -270,7 +270,7 @@ def stored(moduli: Moduli = "small-strain") -> dict[str, dict[str, float]]:
 
 
 def edge_levels(units: Units, model: str, constants: Mapping[str, float] | None = None) -> Any:
-    """Return the edge level (motor amplitude = 1) by a model, shape (...), NaN where an input is not known.
+    """Return the edge level (motor amplitude = 1) by a model, shape (...), NaN if an input is not known.
 
     By the stored constants of small-strain moduli if none are given.
     """

@@ -1,4 +1,4 @@
-"""How far a unit is from the measured ones: its own measurement if there is one, the nearest, and what differs."""
+"""How far a unit is from the measured ones: its own measurement if there is one, the nearest, and the differences."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ COORDINATES = (
     "diameter", "motor's diameter", "motor's height", "cavity's height", "frequency", "walls", "caps",
     "place of the borders", "place of the borders in the caps", "modulus inside", "modulus outside", "passes",
 )  # fmt: skip
-"""Logarithms of a unit's inputs over those that all measured units share, then what tells the measured units apart."""
+"""Logarithms of a unit's inputs over those that all measured units share, then the differences of measured units."""
 LENGTHS = 9
 """How many of the `COORDINATES` all measured units of the paper share: they are 0 for them."""
 _NAMES = ("diameter", "motor", "motor", "height of the cavity", "frequency", "walls", "caps", "walls", "caps")
@@ -56,7 +56,7 @@ def coordinates(units: Units, of: Lengths) -> np.ndarray:
     """Return the `COORDINATES` of units, shape (rows, 12). They change continuously with the body, however it is cut.
 
     A border between layers counts as much as `borders` says; its place is the silicone outside it over the measured
-    units'. Caps count only where a unit has them.
+    units'. Caps count only if a unit has them.
     """
     shared = measurements().unit
     motor = motors()[shared.motor]
@@ -153,7 +153,7 @@ def _moduli(moduli: Any) -> np.ndarray:
 
 
 def _differs_from_all(variant: EstimateInput) -> list[str]:
-    """Return what of a unit is not as in the measured ones, of what these share."""
+    """Return the inputs that the measured units share and this unit does not."""
     shared = measurements().unit
     motor = motors()[shared.motor]
     return [

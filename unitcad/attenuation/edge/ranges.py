@@ -1,4 +1,4 @@
-"""Where a new unit's level may lie: a Student-t distribution of ln level about the model that leads.
+"""The range of a new unit's level: a Student-t distribution of ln level about the model that leads.
 
 Its scale is the standard deviation of the leading model's left-out residuals (of a lab's fit: the fit's own). It grows
 with everything that no measured unit had, and the residual of measured units that are near enters with half its
@@ -23,7 +23,7 @@ from unitcad.attenuation.edge.variant_units import stacked
 from unitcad.attenuation.inputs import EstimateInput
 
 LENGTH_SLOPE, MODULUS_SLOPE = 0.5, 1.0
-"""Standard deviations of d ln level / d ln input where nothing was measured: assumed.
+"""Standard deviations of d ln level / d ln input without measurement: assumed.
 
 Finite elements give 0.1 for walls, caps and frequency and up to 1.2 for the diameter; the two measured pairs that
 differ in one modulus give +0.7 and +1.6.
@@ -38,9 +38,9 @@ _EDGE = 0.05
 
 @dataclass(frozen=True)
 class Predictive:
-    """Student-t distributions of ln level of any number of units, shape (...); NaN where an input is not known.
+    """Student-t distributions of ln level of any number of units, shape (...); NaN if an input is not known.
 
-    Half of each lies below `centre`, with the scale `below`, half above it with the scale `above`.
+    Half of each is below `centre`, with the scale `below`, half above it with the scale `above`.
     """
 
     degrees_of_freedom: int
@@ -89,7 +89,7 @@ class Lead:
 
     def predictive(self, units: Units, of: Lengths) -> Predictive:
         """Return the distribution of further units' ln level."""
-        with np.errstate(all="ignore"):  # what is not known is NaN; a legal extreme may overflow
+        with np.errstate(all="ignore"):  # unknown inputs are NaN; a legal extreme may overflow
             return self._predictive(units, of)
 
     def _predictive(self, units: Units, of: Lengths) -> Predictive:
@@ -109,7 +109,7 @@ class Lead:
         return Predictive(self.degrees_of_freedom, centre, below, above)
 
     def _far(self, at: np.ndarray) -> np.ndarray:
-        """Return what lengths, frequency and moduli outside the measured ones add to the variance."""
+        """Return the variance added by lengths, frequency and moduli outside the measured ones."""
         # A place at a time: a search has many rows.
         apart = [np.sum((at[:, :LENGTHS] - own[:LENGTHS]) ** 2, axis=-1) for own in np.unique(self.places, axis=0)]
         away = np.min(apart, axis=0)
@@ -118,7 +118,7 @@ class Lead:
         return LENGTH_SLOPE**2 * away + MODULUS_SLOPE**2 * outside
 
     def _unmeasured_borders(self, units: Units) -> tuple[np.ndarray, np.ndarray]:
-        """Return what borders that no measured unit had add to the variance below and above the centre.
+        """Return the variance below and above the centre added by borders that no measured unit had.
 
         The rule between equal moduli and the least measured ratio: its range holds both ends. Each border but the
         strongest may count or not: half its effect.
@@ -145,7 +145,7 @@ def _kernel(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def lead_of(moduli: Moduli = "small-strain", fit: LabFit | None = None) -> Lead:
-    """Return what leads: by a lab's fit, or on the paper's nine units by such moduli."""
+    """Return the leading model: by a lab's fit, or on the paper's nine units by such moduli."""
     return _of_paper(moduli) if fit is None else _of_lab(fit)
 
 

@@ -12,7 +12,7 @@ from unitcad.attenuation.edge.measured_levels import whole_ratio
 from unitcad.attenuation.inputs import EstimateInput, SiliconeLayer
 
 FIELDS = ("youngs_modulus", "poisson_ratio", "tan_delta")
-"""What a silicone has a range of."""
+"""Properties of a silicone that have a range."""
 
 
 def nominal(variant: EstimateInput) -> Units:

@@ -60,8 +60,8 @@ class HarmonicMesh:
     basis   scikit-fem's scalar basis on the rectangles: shape functions, quadrature
     owner   the block of each element
     above   whether a node belongs to the unit; at z = 0 the skin and the unit have nodes of their own
-    floor   the lowest z, where everything is held
-    radius  where the body ends and is held
+    floor   the lowest z, at which everything is fixed
+    radius  of the body's outer border, which is fixed
     """
 
     basis: skfem.Basis
@@ -108,7 +108,7 @@ def lines(breaks: Sequence[float], focus: Sequence[float], fineness: float) -> n
 def harmonic_mesh(blocks: Sequence[Block], fineness: float, radius: float, corner: float | None = None) -> HarmonicMesh:
     """Mesh `blocks` out to `radius` (m); void elsewhere. A line goes through r = `corner`, say the edge of a load.
 
-    Where blocks overlap the last one counts.
+    Of overlapping blocks the last one counts.
     """
     corners = sorted({x for b in blocks for x in (b.r0, b.r1) if x < radius} | {0.0, corner or 0.0})
     levels = sorted({z for b in blocks for z in (b.z0, b.z1)})

@@ -146,7 +146,7 @@ def _local_matrices(mesh: HarmonicMesh, blocks: Sequence[Block], omega: float, h
 
 
 def _equations(mesh: HarmonicMesh, harmonic: int, contact: Contact, rigid: np.ndarray) -> np.ndarray:
-    """Return the equation of each unknown, -1 where it is held or prescribed; unit and skin share those of a bond."""
+    """Return the equation of each unknown, -1 if it is fixed or prescribed; unit and skin share those of a bond."""
     fields, nodes = rigid.shape
     held = np.tile((mesh.z < mesh.floor + TINY) | (mesh.r > mesh.radius - TINY), (fields, 1))
     on_axis = mesh.r < TINY

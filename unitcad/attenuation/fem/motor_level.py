@@ -27,12 +27,15 @@ from unitcad.errors import unknown_name
 
 Drive = Literal["flat", "axial"]
 Reading = Literal["skin", "edge"]
-"""Where the amplitude is read: the skin at r = D/2, or the unit's own outer edge at its top."""
+"""Place of the reading: the skin at r = D/2, or the unit's own outer edge at its top."""
 Component = Literal["along", "normal", "radial", "total"]
-"""What is read: along the drive (axial: u_z; flat: u_r where the drive points), |u_z|, |u_r|, or the root of the sum
-of the squares of u_r, u_theta and u_z (of a force that turns: over half a turn, the mean of the largest squares)."""
+"""Component of the reading.
+
+Along the drive (axial: u_z; flat: u_r in the drive's direction), |u_z|, |u_r|, or the root of the sum of the squares of
+u_r, u_theta and u_z (of a force that turns: over half a turn, the mean of the largest squares).
+"""
 RADIUS = 0.16
-"""Where the elements end and are held, m: farther out changes a level by less than the mesh does."""
+"""Outer, fixed border of the elements, m: one farther out changes a level by less than the mesh does."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ def level(
     frequency_hz    overrides the input's, also that of a draw
     drive           "flat" (sideways force) or "axial"
     reading         "skin" or "edge"
-    draw            `Draw(seed, index)` of all that is not known; None: nominal values, bonded, the unit as drawn
+    draw            `Draw(seed, index)` of all unknowns; None: nominal values, bonded, the unit as drawn
     fineness        of the mesh: at 1 one core needs about 0.1 s and bonded levels are within 1 %; at 0.5 0.02 s and
                     2 %, but 25 % where a resting unit is near a resonance (docs/evidence/accuracy/fem.md)
 

@@ -1,7 +1,7 @@
 """A unit on its body as rings of material for the finite elements. SI, z upwards from the skin.
 
-The motor is a rigid cylinder, the circuit's pad an elastic plate. The tail and its slot, which are not round, are left
-out. What touches within the unit is bonded.
+The motor is a rigid cylinder, the circuit's pad an elastic plate. The tail and its slot, which are not round, are
+ignored. Touching parts within the unit are bonded.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is not known of a unit on its body, and one draw of it. SI."""
+"""The unknowns of a unit on its body, and one draw of them. SI."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CIRCUIT_MODULUS = (1e9, 3e9, 5e9)
 
 
 CHOICES = ("contact", "gap filled", "floor", "no circuit")
-"""What is drawn with even odds; the contact is the first since it parts the levels into two groups."""
+"""Unknowns drawn with even odds; the contact is the first since it parts the levels into two groups."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Setting:
-    """What the elements need beside an input: how skin carries the unit, and the circuit's Young's modulus (Pa)."""
+    """Settings of the elements besides an input: how skin carries the unit, and the circuit's Young's modulus (Pa)."""
 
     contact: Contact = "bonded"
     circuit_modulus: float = CIRCUIT_MODULUS[1]
@@ -66,9 +66,9 @@ class Setting:
 def drawn(variant: EstimateInput, draw: Draw) -> tuple[EstimateInput, Setting]:
     """Return an input with every unknown set by a draw, and the draw's setting.
 
-    Moduli, damping, thicknesses of the body, frequency and the motor's mass lie in their ranges; the ring of air
-    beside the motor is open or filled, a floor of Layer 1 under the motor is there or not, and so is the circuit. The
-    ring is filled wherever nothing else would hold the motor.
+    Moduli, damping, thicknesses of the body, frequency and the motor's mass lie in their ranges; the ring of air round
+    the motor is open or filled, a floor of Layer 1 under the motor is there or not, and so is the circuit. The ring is
+    filled if the motor would be loose otherwise.
     """
 
     def known(name: str, quantity: Quantity, spread: float = 1.0) -> Quantity:

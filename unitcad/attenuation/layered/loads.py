@@ -1,10 +1,10 @@
-"""What hangs on wavenumbers, radii and loads alone, kept for the last of them: most calls have the same radii.
+"""Functions of only wavenumbers, radii and loads, cached for the last of them: most calls have the same radii.
 
 Bessel functions of the Hankel transforms, and the moment of J1 that is a radial disc's transform.
 
 A static homogeneous half-space under each load, in closed form.
 
-It is what is taken out of a Hankel integral at the surface.
+It is taken out of a Hankel integral at the surface.
 
 Rows are those of a load's kernel, with its `orders`: (u_r, u_z) under an axisymmetric load, and under a sideways one
 (A, B, Z), of which u_r = A - B, u_theta = -(A + B) and u_z = -Z are made.
@@ -74,7 +74,7 @@ def kept(make: Callable[..., Made]) -> Callable[..., Made]:
 _SERIES = 1.0  # |x| up to which the power series of the moment is summed
 _FAR = 40.0  # |x| from which the expansion in 1/x is good to 1e-16
 _FIRST_ORDER = 100  # J of this order is below 1e-25 for |x| up to _FAR
-_LEAST = 1e-220  # where the downward recurrence starts: at |x| = _SERIES it grows by 1e189
+_LEAST = 1e-220  # start of the downward recurrence: at |x| = _SERIES it grows by 1e189
 
 
 def bessel(order: int, x: Any) -> Any:
@@ -225,16 +225,16 @@ _UNIT = 2.0**-53
 def static_rounding(integrals: Any, s: Any = None) -> Any:
     """Bound the rounding of `static_kernel` times the integrals of a load, shape (rows, n); s: radii over the disc's.
 
-    It is over the kernel's largest row: the rows of a compliance come from one solution, and what is taken out of the
+    It is over the kernel's largest row: the rows of a compliance come from one solution, and the part taken out of the
     integrand leaves the compliance's rounding in the integral: that of 1 / k all over, which adds up to the closed form
     again. In units of 2^-53, times the integral:
 
     - 16: the moduli with their damping and eps 3 each, the solution for the compliance 6, the kernel 2, the product
       and the sum 2;
-    - 24: the integral itself. That is what the second order needs, at m next to `_ELLIPTIC`, where its terms are seven
+    - 24: the integral itself. The second order needs it, at m next to `_ELLIPTIC`, where its terms are seven
       times their sum; the others are within 8, a point's within 4.
 
-    And beside it: s is rounded, once, and the integral follows by s times its slope. That is at most
+    In addition: s is rounded, once, and the integral follows by s times its slope. That is at most
     three times the integral and min(s, 1 / s) (1 - ln |1 - s|): the slope is logarithmic at the rim, and a radial
     load's 1 - s goes to 0 there.
     """

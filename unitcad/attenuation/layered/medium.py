@@ -272,7 +272,7 @@ def _check_material(what: str, body: Layer | HalfSpace, above: bool) -> None:
 class Stack:
     """Layers, top first, on a half-space: its compliance and its transfer to a depth, per wavenumber.
 
-    Raises `Refusal` for what is no `Layer` or no `HalfSpace`.
+    Raises `Refusal` for objects other than `Layer` and `HalfSpace`.
     """
 
     def __init__(self, layers: Iterable[Layer], half_space: HalfSpace, least_loss: float = 0.0) -> None:
@@ -314,7 +314,7 @@ class Stack:
     def without_empty_layers(self) -> Stack:
         """Return the same stack without layers of no thickness, which change nothing."""
         if all(layer.thickness > 0 for layer in self.layers):
-            return self  # and what it knows of its materials
+            return self  # and its cached properties of materials
         return Stack([layer for layer in self.layers if layer.thickness > 0], self.half_space, self.least_loss)
 
     def with_loss(self, tan_delta: float) -> Stack:
@@ -334,7 +334,7 @@ class Stack:
     def last_pole(self, omega: float) -> float:
         """Return a wavenumber (1/m) above every pole and branch point: slow surface waves, bending of layers as plates.
 
-        The softest layer bends with what it lies on, not as a plate. Raises as `materials`.
+        The softest layer bends with the layers under it, not as a plate. Raises as `materials`.
         """
         if self._pole is None or self._pole[0] != omega:
             self._pole = omega, _last_pole(self.layers, self.materials(omega), omega)

@@ -11,12 +11,12 @@ and of layers on a stiff base) and the bending of a stiff layer on a soft one ha
 no damping, poles may lie on the axis or too close to it to pass: there the path goes around each of them (`detours`),
 on the side on which a little loss would leave it. No loss is put into the medium for that, and nothing is extrapolated.
 
-All layers count at every wavenumber: no bound is known of what a lower layer sends back that is both proved and
-cheaper than the layer.
+All layers count at every wavenumber: no bound of the waves from a lower layer is known that is both proved and cheaper
+than the layer.
 
 A layered half-space and its displacement under a load.
 
-The response at any number of radii: solved one by one where they are few, else read off one radial curve.
+The response at any number of radii: solved one by one if they are few, otherwise read off one radial curve.
 
 The curve is a cubic spline through solved points. They lie a sixth of the distance to the load's edge apart, where
 the slope is steep, up to half a millimetre, and a millimetre farther out. Waves in soft tissue are 4 mm long or longer
@@ -84,7 +84,7 @@ class Response:
 
     @property
     def error(self) -> float:
-        """The largest of all bounds: what rtol times the largest |u| is compared with."""
+        """The largest of all bounds, which is compared with rtol times the largest |u|."""
         return float(max(np.max(self.error_r), np.max(self.error_theta), np.max(self.error_z)))
 
     @property
@@ -97,7 +97,7 @@ def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rto
     """Return the displacement of `medium` under `load` at radii r (m, any shape), a depth z (m) and omega (rad/s).
 
     rtol: wanted error over the largest |u| of all radii, 1e-12 to 0.1. Raises `Refusal` for invalid values, and
-    for r = 0 under a surface point load, `UnitcadError` where no finite answer was found. If rtol can't be reached
+    for r = 0 under a surface point load, `UnitcadError` if no finite answer was found. If rtol can't be reached
     the errors say so.
     """
     return responses([(medium, omega)], [load], r, z, rtol)[0][0]
@@ -152,7 +152,7 @@ def _on_one_path(
     end = max(body.medium.last_pole(body.omega) for body in bodies)
     _check_size(end, float(flat.max()) + loads[0].reach + 2.0 * z, max(body.omega for body in bodies))
     sideways = any(load.direction == "tangential" for load in loads)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what is no number is refused below
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # values that are no numbers are refused below
         # Each component is made of at most two rows, and one of them is at least as large as each row.
         problem = Problem(tuple(bodies), tuple(loads), flat, z)
         integrals = _solve(problem, end, rtol / 2.0 if sideways else rtol)
@@ -200,8 +200,8 @@ def _radii(r: Any) -> Array:
 def _solve(bare: Problem, end: float, rtol: float) -> Integrals:
     """Return the best that is reached in a few attempts, for each row and radius.
 
-    What was integrated first may have been accepted beside a largest |u| that the rest then took away: again, beside
-    the one that came out. Where the panels do not suffice for rtol, a larger one may spend them better.
+    The first integrals may have been accepted relative to a largest |u| that the rest then reduced: they are repeated
+    relative to the final one. If the panels do not suffice for rtol, a larger one may spend them better.
     """
     best, size = None, np.inf
     for _ in range(_MOST_ATTEMPTS):
