@@ -198,9 +198,7 @@ def _quasistatic(material: Material) -> Quantity:
     if value is None:
         return Quantity(None, note="no quasistatic_modulus_kpa is known, which estimate.moduli asks for")
     how = f" ({value.method})" if value.method else ""
-    return replace(
-        _quantity(value, 1e3), note=f"quasi-static, softer than at the motor's frequency{how}; {value.source}"
-    )
+    return replace(_quantity(value, 1e3), note=f"quasi-static{how}; {value.source}")
 
 
 def _no_modulus(material: Material) -> str:

@@ -82,8 +82,12 @@ def test_readings_and_constraints(encapsulating):
     exponents = [readings[name]["exponents_s_wave"][0] for name in ("loss_modulus", "kelvin_voigt")]
     assert exponents[0] == pytest.approx(2 * exponents[1])
     rows = [(row["equation"], row["control"]) for row in paper["constraints"]]
-    assert rows == [("6a", SOFT), ("6b", SOFT), ("6c", None), ("6d", None), ("6a", STIFF), ("6b", STIFF)]
-    assert [row["holds"] for row in paper["constraints"]] == [False, False, True, True, True, True]
+    first = [(name, SOFT) for name in ("5a", "5b", "6a", "6b")]
+    assert rows == [*first, ("6c", None), ("6d", None), *((name, STIFF) for name, _ in first)]
+    assert [row["holds"] for row in paper["constraints"]] == [True, True, False, False, *[True] * 6]
+    against = paper["hierarchical_over_control"][1]
+    of_path = paper["constraints"][7]
+    assert of_path["left"] / of_path["right"] == pytest.approx(against["value"], rel=1e-9)
 
 
 def test_measured_in_both_prints_and_one_unit_without_a_figure():

@@ -210,8 +210,8 @@ def _tissue(name: str, own: Mapping[str, Mapping[str, TissueEntry]]) -> tuple[Ti
 def moduli_by_source() -> dict[str, dict[str, float]]:
     """Return Young's modulus (kPa) of the shipped silicones by source, then by name; silicones without one are skipped.
 
-    "paper": small strain at the operating frequency. "data sheet": static, at 100 %. "tensile, METHOD": slow pulls by
-    others, worked out by each method that could be defended (tensile.toml).
+    "paper": as printed; the instrument is quasi-static. "data sheet": static, at 100 %. "tensile, METHOD": slow pulls
+    by others, worked out by each method that could be defended (tensile.toml).
     """
     known = materials()
     sources = {

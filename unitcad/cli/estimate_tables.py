@@ -49,6 +49,7 @@ def _print_details(screen: Console, data: dict[str, Any]) -> None:
             screen.print(f"  {inputs[1]}", soft_wrap=True)
     published = data["models"].get("published", {})
     if published.get("constraints"):
+        screen.print(_coefficients(published["interfaces"], published["coefficients"]))
         screen.print(_constraints(published["constraints"]))
     if published.get("readings") and published["readings"][0]["hierarchical_over_control"]:
         screen.print(_readings(published["readings"]))
@@ -276,14 +277,24 @@ def _slope(seen: dict[str, Any], name: str) -> str:
     )
 
 
+def _coefficients(interfaces: list[str], found: dict[str, dict[str, Any]]) -> Table:
+    """Tabulate equation 4's coefficients of both waves."""
+    heads = [f"{key}, {wave.upper()}" for wave in found for key in ("k_t", "k_r")]
+    table = Table("from a layer to the next", *heads, title="transmission and reflection, equation 4")
+    for i, name in enumerate(interfaces):
+        ends = [{end: values[i] for end, values in block.items()} for block in found.values()]
+        table.add_row(name, *(_ranged(one, key) for one in ends for key in ("k_t", "k_r")))
+    return table
+
+
 def _constraints(rows: list[dict[str, Any]]) -> Table:
-    table = Table("6", "what", "left", "", "right", "margin", "unit", title="the paper's constraints, equation 6")
+    table = Table("", "says", "left", "", "right", "margin", "unit", title="the paper's inequalities 5 and 6")
     table.add_column("holds")
     for row in rows:
         numbers = [_ranged(row, key) for key in ("left", "right", "margin")]
         holds = {True: "yes", False: "no", None: row.get("reason", "not known")}[row["holds"]]
         what = row["text"].replace("control", row["control"] or "")
-        table.add_row(row["equation"][-1], what, numbers[0], row["relation"], *numbers[1:], row["unit"], holds)
+        table.add_row(row["equation"], what, numbers[0], row["relation"], *numbers[1:], row["unit"], holds)
     return table
 
 

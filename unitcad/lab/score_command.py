@@ -22,8 +22,8 @@ def score(
 ) -> None:
     """Score every model on a digitised figure, with the constants of the nine measured levels.
 
-    Columns: unit, distance_mm, value, error, source. Points at 0 mm are levels at the edge; farther points are on the
-    skin.
+    Columns: unit, distance_mm, value, error, source.
+    Points at 0 mm are levels at the edge, farther points are on the skin.
     """
     points = load_figure(figure)
     with progress("score"):

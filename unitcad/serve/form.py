@@ -185,6 +185,6 @@ def choices_of(data: Mapping[str, Any]) -> Choices:
 
 
 def _modulus(entry: Material) -> str:
-    """Return the remark on a material in the list: its modulus at the motor's frequency."""
+    """Return the remark on a material in the list: its small-strain modulus."""
     modulus = entry.youngs_modulus_kpa
     return f"{number(modulus.value, 3)} kPa" if modulus else "no modulus at small strain"

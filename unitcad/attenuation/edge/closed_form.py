@@ -165,7 +165,7 @@ def softer_passes(units: Units) -> Any:
 
 @dataclass(frozen=True)
 class Constraint:
-    """One of the paper's inequalities 6: `left` `relation` `right` for a unit against a control, as arrays."""
+    """One of the paper's inequalities 5 and 6: `left` `relation` `right` for a unit against a control, as arrays."""
 
     name: str
     text: str
@@ -186,17 +186,22 @@ class Constraint:
 
 
 def constraints(units: Units, control: Units) -> list[Constraint]:
-    """Return inequalities 6a to 6d, eta = E tan(delta)/omega in Pa s; 6c and 6d for each pair of neighbouring layers.
+    """Return inequalities 5a, 5b and 6a to 6d; 6c and 6d for each pair of neighbouring layers.
 
-    6a and 6b compare sums of eta d/(E v), whose unit is s2; another reading of eta multiplies both sides by the same
-    number. 6c and 6d say that the impedance grows outwards; they need no control.
+    5 compares `published_path`. 6a and 6b compare sums of eta d/(E v) with eta = E tan(delta)/omega in Pa s, whose unit
+    is s2; another reading of eta multiplies both sides by the same number. 6c and 6d say that the impedance grows
+    outwards; they need no control.
     """
     inequalities = []
-    attenuation: list[tuple[str, Wave]] = [("6a", "p"), ("6b", "s")]
-    for name, wave in attenuation:
+    waves: list[tuple[str, Wave]] = [("a", "p"), ("b", "s")]
+    for name, wave in waves:
+        text = f"path of {wave.upper()} waves: unit below control"
+        paths = published_path(units, wave), published_path(control, wave)
+        inequalities.append(Constraint(f"5{name}", text, "<", *paths, "1"))
+    for name, wave in waves:
         sides = [np.sum(exponents(u, wave, "literal"), axis=-1) / u.omega for u in (units, control)]
         inequalities.append(
-            Constraint(name, f"attenuation of {wave.upper()} waves: unit above control", ">", sides[0], sides[1], "s2")
+            Constraint(f"6{name}", f"attenuation of {wave.upper()} waves: unit above control", ">", *sides, "s2")
         )
     growth: list[tuple[str, Wave]] = [("6c", "p"), ("6d", "s")]
     for name, wave in growth:

@@ -289,14 +289,17 @@ def _published_details(variant: EstimateInput, controls: list[int]) -> dict[str,
     }
 
 
+_NO_CONTROL = ("6c", "6d")
+
+
 def _constraints(variant: EstimateInput, units: Units, controls: Mapping[int, Units]) -> list[dict[str, Any]]:
-    """Return 6a and 6b for each control; 6c and 6d, which need no control, once."""
+    """Return 5, 6a and 6b for each control; 6c and 6d, which need no control, once."""
     first = next(iter(controls), None)
     return [
-        _constraint(constraint, variant.layers[index].material if constraint.name in ("6a", "6b") else None, variant)
+        _constraint(constraint, None if constraint.name in _NO_CONTROL else variant.layers[index].material, variant)
         for index, control in controls.items()
         for constraint in cf.constraints(units, control)
-        if index == first or constraint.name in ("6a", "6b")
+        if index == first or constraint.name not in _NO_CONTROL
     ]
 
 

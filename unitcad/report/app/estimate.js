@@ -163,12 +163,16 @@
   }
 
   function margins(models) {
-    const rows = (models.published && models.published.constraints) || [];
-    if (!rows.length) return null;
-    return [el("h3", {}, "The paper's constraints"), table(["Equation", "Says", "Control", "Left", "", "Right", "Margin", "Unit", "Holds"], rows.map((row) => ({
+    const { constraints: rows, coefficients: found, interfaces } = models.published || {};
+    if (!rows || !rows.length) return null;
+    const at = (block, key, i) => (known(block[key][i]) ? three(block[key][i]) : known((block[`${key}_low`] || [])[i]) ? `${three(block[`${key}_low`][i])} to ${three(block[`${key}_high`][i])}` : "not known");
+    const waves = Object.keys(found);
+    const passed = interfaces.map((name, i) => [name, ...waves.flatMap((wave) => ["k_t", "k_r"].map((key) => at(found[wave], key, i)))]);
+    return [el("h3", {}, "The paper's equations 4 to 6"),
+      table(["From a layer to the next", ...waves.flatMap((wave) => ["k_t", "k_r"].map((key) => `${key}, ${wave.toUpperCase()} wave`))], passed, { label: "Transmission and reflection" }), table(["Equation", "Says", "Control", "Left", "", "Right", "Margin", "Unit", "Holds"], rows.map((row) => ({
       className: row.holds === false ? "bad" : undefined,
       cells: [row.equation, row.text, row.control || "", row.left, row.relation, row.right, row.margin, row.unit || "", row.holds === true ? "holds" : row.holds === false ? "fails" : row.reason || "not known"],
-    })), { label: "The paper's constraints" })];
+    })), { label: "The paper's inequalities 5 and 6" })];
   }
 
   function errors(data) {
@@ -242,7 +246,7 @@
     }
     return section("estimate", "Attenuation estimate", lead(data.answer), elements(data.fem),
       el("details", {}, el("summary", {}, "How sure?"), el("ul", { className: "lead-notes" }, data.answer.details.map((line) => el("li", {}, line))), levels(data), el("h3", {}, "Outwards from the edge"), curves(data.layered)),
-      el("details", {}, el("summary", {}, "Tables: against controls, inputs, the paper's constraints, errors"), ratios(data), inputs(data), margins(data.models || {}), errors(data)), assumptions(data),
+      el("details", {}, el("summary", {}, "Tables: against controls, inputs, the paper's equations, errors"), ratios(data), inputs(data), margins(data.models || {}), errors(data)), assumptions(data),
       el("details", {}, el("summary", {}, "All numbers"), facts(data)));
   }
 
