@@ -59,7 +59,7 @@ class Dimensions:
     exit            slot or notch of tails or wires; None if nothing leaves through the silicone
     ledge_radius    radius at which the tongue's tip ends in the core
     sides           exits of the tail: +1 along +x, -1 along -x
-    motor_low       z of the motor's face towards the skin: it lies on the lip
+    motor_low       z of the motor's face towards the skin: it rests on the lip
     mouth_radius    radius of the lip's mouth; 0 without a lip
     lip_edge        height of the lip's upright edge
     tapers          narrowing of core, and of the layers' outsides, for each mm upwards
@@ -157,7 +157,7 @@ def lip_edge(spec: Spec) -> float:
 
 
 def motor_low(spec: Spec) -> float:
-    """Return how far from the skin the motor lies, mm: its edge on the cone of the lip."""
+    """Return the distance of the motor from the skin, mm: its edge on the cone of the lip."""
     cone = spec.motor.lip_mm / math.tan(math.radians(LIP_LEAN_DEG))
     # Up to a hundredth, clear of the grid that the cone is snapped to.
     return lip_edge(spec) + math.ceil(100 * cone + 0.2) / 100 if cone else 0.0

@@ -45,7 +45,7 @@ def _leads(spec: Spec) -> list[str]:
 
 
 def _not_estimated(spec: Spec) -> list[str]:
-    """Say that no measured unit has what the estimate does not read."""
+    """Say that no measured unit has the features that the estimate does not read."""
     if not spec.motor.lip_mm:
         return []
     return ["motor.lip_mm: no measured unit has a lip; the estimate is that of the unit without it"]
