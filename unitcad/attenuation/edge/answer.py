@@ -104,7 +104,7 @@ def _measured(estimated: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _headline(data: dict[str, Any], levels: dict[str, Any]) -> str:
-    """Say what was measured, or the level that is expected, and the range."""
+    """Return the measured or expected level, and the range, in words."""
     if data["p50"] is None:
         return f"Not known: {levels[RULE]['reason']}."
     where = "of the motor's amplitude at the edge"
