@@ -1,6 +1,6 @@
 """Writes docs/fem.json: the nine units by finite elements, at nominal values and over seeded draws.
 
-python docs/make_fem.py [DRAWS]    some three seconds a draw, 24 levels; then run make_model.py for the tables
+python docs/make_fem.py [DRAWS]    about 3 s a draw, 24 levels; tables: explanation/finite-elements.md
 """
 
 from __future__ import annotations

@@ -135,7 +135,9 @@ def drawn_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
 
 
 def _geometry(spec: Spec, motor_mass: Quantity) -> Geometry:
-    dims = dimensions(spec)
+    # The estimate knows neither a lip nor draft.
+    plain = replace(spec, motor=replace(spec.motor, lip_mm=0.0), moulds=replace(spec.moulds, draft_deg=0.0))
+    dims = dimensions(plain)
     radius, height = dims.motor_radius * 1e-3, dims.motor_height * 1e-3
     tops = zip(dims.radii, dims.heights, spec.layers, strict=True)
     return Geometry(

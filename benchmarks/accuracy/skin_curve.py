@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from msgspec.structs import replace
@@ -70,7 +71,7 @@ def published(variant: EstimateInput) -> Iterator[Published]:
     for hertz, (median, low, high) in BANDS.items():
         band = "40 to 60 Hz" if hertz == 50.0 else "75 to 100 Hz"
         for drive in DRIVES:
-            found = _over_ends(variant, lambda end, hertz=hertz, drive=drive: far(variant, hertz, drive, end))
+            found = _over_ends(variant, partial(far, variant, hertz, drive))
             yield Published(
                 f"SkinSource (Tummala 2024), hand and forearm, {band}: left every 20 mm, {drive} drive",
                 f"{median:.2f} ({low:.2f} to {high:.2f})",
@@ -82,7 +83,7 @@ def published(variant: EstimateInput) -> Iterator[Published]:
     motor = replace(variant, diameter=10e-3, geometry=replace(variant.geometry, motor_radius=5e-3))
     at = 1e-3 * np.array([5.0 + 8.0, 5.0 + 24.0])
     for drive in DRIVES:
-        found = _over_ends(motor, lambda end, drive=drive: float(decay(motor, at[:1], drive, 150.0, end)[0]))
+        found = _over_ends(motor, lambda end, drive=drive: float(decay(motor, at[:1], drive, 150.0, end)[0]))  # type: ignore[arg-type]
         yield Published(
             f"Sofia and Jones 2013, forearm: 8 mm from the motor, {drive} drive",
             "markedly attenuated",

@@ -19,7 +19,7 @@ from unitcad import catalogue
 from unitcad.checks.check import MouldCheck
 from unitcad.checks.draw import upright
 from unitcad.checks.finding import MouldFinding, at_most
-from unitcad.designs.stretch import allowed_strain, tail_strain
+from unitcad.designs.stretch import allowed_strain, lip_strain, tail_strain
 from unitcad.kernels.mesh import arrays
 from unitcad.kernels.sections import thick_parts
 from unitcad.moulds.cavities import united
@@ -49,7 +49,7 @@ class Strain:
 
 
 def strains(moulds: MouldSet) -> list[Strain]:
-    """Return the strains that the geometry asks for: each unit's peel off its core, the tail's way out."""
+    """Return the strains that the geometry asks for: of each unit's peel, the tail's way out and the motor's way in."""
     needed = []
     for step in moulds.plan.steps:
         last = step is moulds.plan.steps[-1]
@@ -67,6 +67,8 @@ def strains(moulds: MouldSet) -> list[Strain]:
     fpcb, slot = moulds.spec.fpcb, moulds.dimensions.exit
     if fpcb and slot:
         needed.append(Strain("tail through the slot", 100 * tail_strain(fpcb, slot)))
+    if moulds.dimensions.mouth_radius and moulds.design.opens == "below":
+        needed.append(Strain("motor through the lip", 100 * lip_strain(moulds.dimensions)))
     needed += [Strain(where, percent) for where, percent in moulds.plan.stretches]
     return needed
 

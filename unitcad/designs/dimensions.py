@@ -11,6 +11,10 @@ MOTOR_CLEARANCE = 0.1
 """Least ring of air between the motor and Layer 1, mm, unless `motor.fill` closes it."""
 WIRE_GAP = 0.1
 """Between wires side by side, and between them and their neighbours, mm."""
+LIP_EDGE, LIP_LEAN_DEG = 0.4, 40.0
+"""Least height of a lip's upright edge, mm, and the lean of the cone over it: the core prints without support."""
+Outline = tuple[tuple[float, float], ...]
+"""Points (r, z) of a surface of revolution, from the skin upwards, mm."""
 
 
 EPS = 1e-9
@@ -47,14 +51,18 @@ class Pad:
 class Dimensions:
     """A unit's radii and heights; z = 0 is the skin.
 
-    cavity_radius   r of the cavity and so of the core; Layer 1 begins there
-    radii[i]        outer radius of layer i, in the section at y = 0 if it is not round
+    cavity_radius   r of the cavity and so of the core at the skin, without a lip; Layer 1 begins there
+    radii[i]        outer radius of layer i at the skin, in the section at y = 0 if it is not round
     core_height     top of the core
     heights[i]      top of layer i
     pad             the circuit's pad; None without a circuit
     exit            slot or notch of tails or wires; None if nothing leaves through the silicone
     ledge_radius    radius at which the tongue's tip ends in the core
     sides           exits of the tail: +1 along +x, -1 along -x
+    motor_low       z of the motor's face towards the skin: it rests on the lip
+    mouth_radius    radius of the lip's mouth; 0 without a lip
+    lip_edge        height of the lip's upright edge
+    tapers          narrowing of core, and of the layers' outsides, for each mm upwards
     """
 
     cavity_radius: float
@@ -67,6 +75,32 @@ class Dimensions:
     exit: Exit | None
     ledge_radius: float
     sides: tuple[int, ...]
+    motor_low: float = 0.0
+    mouth_radius: float = 0.0
+    lip_edge: float = 0.0
+    tapers: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def core_outline(self) -> Outline:
+        """The core's side, from the skin to its top."""
+        taper, top = self.tapers[0], self.core_height
+        upper = self.cavity_radius - taper * top, top
+        if not self.mouth_radius:
+            return (self.cavity_radius, 0.0), upper
+        lean = math.tan(math.radians(LIP_LEAN_DEG))
+        meets = (self.lip_edge * lean + self.cavity_radius - self.mouth_radius) / (lean + taper)
+        wide = self.cavity_radius - taper * meets, meets
+        return (self.mouth_radius, 0.0), (self.mouth_radius, self.lip_edge), wide, upper
+
+    def outside(self, layer: int) -> Outline:
+        """Return the outside of a layer (from 0), or the core's side (-1), from the skin to its top."""
+        if layer < 0:
+            return self.core_outline
+        return (self.radii[layer], 0.0), (self.rim_radius(layer), self.heights[layer])
+
+    def rim_radius(self, layer: int) -> float:
+        """Return the outer radius of a layer (from 0) at its top."""
+        return self.radii[layer] - self.tapers[1] * self.heights[layer]
 
     @property
     def outer_radius(self) -> float:
@@ -95,7 +129,8 @@ def concentric(spec: Spec, core_height: float, exit: Exit | None) -> Dimensions:
     radii[-1] = spec.diameter_mm / 2
     caps = [layer.cap_mm for layer in spec.layers]
     cavity = motor.diameter_mm / 2 if motor.fill else inner
-    back = motor.thickness_mm
+    low, edge = motor_low(spec), lip_edge(spec)
+    back, taper = low + motor.thickness_mm, math.tan(math.radians(spec.moulds.draft_deg))
     return Dimensions(
         cavity_radius=cavity,
         radii=tuple(radii),
@@ -107,7 +142,25 @@ def concentric(spec: Spec, core_height: float, exit: Exit | None) -> Dimensions:
         exit=exit,
         ledge_radius=cavity - spec.moulds.ledge_mm,
         sides=(1, -1) if fpcb and fpcb.tail == "both" else (1,) if fpcb or spec.wires else (),
+        motor_low=low,
+        mouth_radius=motor.diameter_mm / 2 - motor.lip_mm if motor.lip_mm else 0.0,
+        lip_edge=edge,
+        # A filled cavity is as wide as the motor all the way up.
+        tapers=(0.0 if motor.fill else taper, taper),
     )
+
+
+def lip_edge(spec: Spec) -> float:
+    """Return the height of a lip's upright edge, mm: whole layers of the base; 0 without a lip."""
+    layer = spec.moulds.layer_mm
+    return math.ceil(LIP_EDGE / layer - EPS) * layer if spec.motor.lip_mm else 0.0
+
+
+def motor_low(spec: Spec) -> float:
+    """Return the distance of the motor from the skin, mm: its edge on the cone of the lip."""
+    cone = spec.motor.lip_mm / math.tan(math.radians(LIP_LEAN_DEG))
+    # Up to a hundredth, clear of the grid that the cone is snapped to.
+    return lip_edge(spec) + math.ceil(100 * cone + 0.2) / 100 if cone else 0.0
 
 
 def whole_layers(spec: Spec, z: float) -> float:

@@ -12,10 +12,10 @@ import math
 from unitcad import catalogue
 from unitcad.designs import limits
 from unitcad.designs.design import Design, Fitting, Reason
-from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
+from unitcad.designs.dimensions import Dimensions, Outline, concentric, motor_low, wire_exit
 from unitcad.designs.parts import ADHESIVE, bond, motor_hold, slots
 from unitcad.errors import Refusal
-from unitcad.shape import Shape, cut, ring
+from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec
 from unitcad.spec.raw import RawSpec
 from unitcad.text import number
@@ -23,16 +23,17 @@ from unitcad.text import number
 
 def layers(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
     """Draw layer i: the tube from the radius of the one inside it to its own, as high as the motor, less the notch."""
-    inner = (dims.cavity_radius, *dims.radii[:-1])
-    return {
-        f"layer{i + 1}": cut(ring(r0, r1, 0, height), slots(dims))
-        for i, (r0, r1, height) in enumerate(zip(inner, dims.radii, dims.heights, strict=True))
-    }
+
+    def section(i: int) -> Outline:
+        inside = dims.outside(i - 1)
+        return (inside[0], *dims.outside(i), *inside[:0:-1])
+
+    return {f"layer{i + 1}": cut(Revolve(polygon(*section(i))), slots(dims)) for i in range(len(dims.heights))}
 
 
 def dimensions(spec: Spec) -> Dimensions:
     """Return the dimensions: the core is as high as the motor; wires leave through a notch, a tail over the top."""
-    height = spec.motor.thickness_mm
+    height = motor_low(spec) + spec.motor.thickness_mm
     return concentric(spec, height, wire_exit(spec, height))
 
 
@@ -99,7 +100,7 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
             f"ring, the pad on top of all layers.{hold}"
         )
         return [Fitting(text, ("soldering iron and solder", ADHESIVE))]
-    text = "Push the motor in from the skin's side."
+    text = "Set the motor into the ring from above." if dims.mouth_radius else "Push the motor in from the skin's side."
     if spec.wires:
         text = "Push the motor into the ring from above, the wires lying in the notch."
     steps = [Fitting(f"{text}{hold}")]

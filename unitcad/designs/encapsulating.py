@@ -13,7 +13,16 @@ from __future__ import annotations
 from unitcad import catalogue
 from unitcad.designs import limits
 from unitcad.designs.design import Design, Fitting
-from unitcad.designs.dimensions import MOTOR_CLEARANCE, Dimensions, Exit, concentric, slot_exit, wire_exit
+from unitcad.designs.dimensions import (
+    MOTOR_CLEARANCE,
+    Dimensions,
+    Exit,
+    Outline,
+    concentric,
+    motor_low,
+    slot_exit,
+    wire_exit,
+)
 from unitcad.designs.parts import ADHESIVE, bond, motor_hold, slots
 from unitcad.designs.stretch import allowed_strain, pad_strain, tail_strain, widest_tail_end
 from unitcad.errors import Refusal
@@ -28,20 +37,22 @@ TIP_PROUD = 0.2
 
 def layers(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
     """Draw layer i: wall and cap in one profile, less the slots of tails or wires."""
-    inner = zip((dims.cavity_radius, *dims.radii[:-1]), (dims.core_height, *dims.heights[:-1]), strict=True)
-    return {
-        f"layer{i + 1}": cut(Revolve(polygon((r0, 0), (r1, 0), (r1, z1), (0, z1), (0, z0), (r0, z0))), slots(dims))
-        for i, ((r0, z0), r1, z1) in enumerate(zip(inner, dims.radii, dims.heights, strict=True))
-    }
+
+    def section(i: int) -> Outline:
+        inside, outside = dims.outside(i - 1), dims.outside(i)
+        top, below = outside[-1][1], inside[-1][1]
+        return (inside[0], *outside, (0.0, top), (0.0, below), *inside[:0:-1])
+
+    return {f"layer{i + 1}": cut(Revolve(polygon(*section(i))), slots(dims)) for i in range(len(dims.heights))}
 
 
 def dimensions(spec: Spec) -> Dimensions:
     """Return the dimensions: the core holds motor and circuit; tail or wires leave through a slot at its top."""
     fpcb, moulds = spec.fpcb, spec.moulds
-    core = spec.motor.thickness_mm + (fpcb.thickness_mm if fpcb else 0.0)
+    back = motor_low(spec) + spec.motor.thickness_mm
+    core = back + (fpcb.thickness_mm if fpcb else 0.0)
     exit = wire_exit(spec, core + TIP_PROUD, core)
     if fpcb and not exit:
-        back = spec.motor.thickness_mm
         low = back + fpcb.thickness_mm / 2 - moulds.slot_height_mm / 2
         exit = slot_exit(spec, low, (back, core), moulds.slot_width_clearance_mm + fpcb.tail_width_mm)
     return concentric(spec, core, exit)
@@ -93,7 +104,7 @@ def _check_circuit(spec: Spec, dims: Dimensions, fpcb: Circuit, exit: Exit) -> N
     limits.at_most(
         "fpcb.pad_diameter_mm",
         pad,
-        2 * dims.cavity_radius,
+        2 * dims.core_outline[-1][0],
         "the encapsulated pad touches Layer 1 only, so it stays in the cavity of",
     )
     limits.at_least("fpcb.pad_diameter_mm", pad, tail, "the pad is no narrower than the tail, which has")
@@ -143,8 +154,9 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
     else:
         steps = [Fitting("Lay the unit down with the cavity's mouth up, and the motor beside it, its back up.")]
     back, moved_in = ("the pad", "pad and motor") if spec.fpcb else ("the motor's back", "the motor")
+    way = "through the lip" if dims.mouth_radius else "from the skin's side"
     fixed = (
-        f"{bond(back, 'the cap of Layer 1')} Push {moved_in} in from the skin's side until {back} lies against that "
+        f"{bond(back, 'the cap of Layer 1')} Push {moved_in} in {way} until {back} lies against that "
         f"cap. {motor_hold(spec, dims)}"
     )
     return [*steps, Fitting(fixed, (ADHESIVE,))]

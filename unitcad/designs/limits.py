@@ -26,15 +26,28 @@ EPS = 1e-9
 
 
 def check_motor(spec: Spec, dims: Dimensions) -> None:
-    """Raise Refusal if motor, clearance and walls do not fit the diameter."""
-    clearance = 0.0 if spec.motor.fill else MOTOR_CLEARANCE
+    """Raise Refusal if motor, clearance and walls do not fit the diameter, and for a lip that can't be cast."""
+    clearance = 0.0 if spec.motor.fill else MOTOR_CLEARANCE + dims.tapers[0] * dims.motor_height
     walls = sum(layer.wall_mm for layer in spec.layers)
     at_least(
         "diameter_mm",
         spec.diameter_mm,
         2 * (dims.motor_radius + clearance + walls),
-        f"the motor ({2 * dims.motor_radius:g}), {clearance:g} of clearance and walls of {walls:g} a side need",
+        f"the motor ({2 * dims.motor_radius:g}), {clearance:.3g} of clearance and walls of {walls:g} a side need",
     )
+    if dims.mouth_radius or spec.motor.lip_mm:
+        _check_lip(spec, dims)
+
+
+def _check_lip(spec: Spec, dims: Dimensions) -> None:
+    lip, neck = spec.motor.lip_mm, spec.moulds.filament_hole_mm / 2 + spec.moulds.least_wall_mm
+    most = down(dims.motor_radius - neck)
+    at_most("motor.lip_mm", lip, max(most, 0.0), "the core's neck in the lip carries the filament's hole, so at most")
+    under = dims.exit.low if dims.exit else dims.motor_height
+    if dims.core_outline[-2][1] > under:
+        ring = f"a ring of air of {dims.air_ring:g} mm"
+        limit = f"the core's cone over the lip is too wide for {ring}; motor.fill = true would do"
+        raise Refusal("motor.lip_mm", lip, limit, 0.0)
 
 
 def widest_exit(spec: Spec, dims: Dimensions) -> float:

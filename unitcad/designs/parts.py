@@ -8,8 +8,8 @@ z
 
 from __future__ import annotations
 
-from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Pad
-from unitcad.shape import Shape, box, cut, cylinder, moved, turned, union
+from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Outline, Pad
+from unitcad.shape import Revolve, Shape, box, cut, cylinder, moved, polygon, turned, union
 from unitcad.spec import Spec
 from unitcad.spec.resolved import Circuit, Wires
 from unitcad.text import number
@@ -19,8 +19,16 @@ BEYOND = 1.0
 
 
 def motor(dims: Dimensions) -> Shape:
-    """Draw the motor as a cylinder standing on the skin."""
-    return cylinder(dims.motor_radius, 0, dims.motor_height)
+    """Draw the motor as a cylinder on the skin, or on the lip."""
+    return cylinder(dims.motor_radius, dims.motor_low, dims.motor_height)
+
+
+def solid_within(outline: Outline, low: float, high: float) -> Shape:
+    """Draw the solid within a surface of revolution that goes on straight down to z = `low` and up to `high`."""
+    (r0, _), *_, (r1, _) = outline
+    if len(outline) == 2 and r0 == r1:
+        return cylinder(r0, low, high)
+    return Revolve(polygon(*dict.fromkeys(((0.0, low), (r0, low), *outline, (r1, high), (0.0, high)))))
 
 
 ADHESIVE = "silicone adhesive"
@@ -28,9 +36,10 @@ ADHESIVE = "silicone adhesive"
 
 def motor_hold(spec: Spec, dims: Dimensions) -> str:
     """Describe the surroundings of the motor once it is in."""
+    lip = " The lip keeps it in." if dims.mouth_radius else ""
     if spec.motor.fill:
-        return "Layer 1 encloses the motor."
-    return f"A ring of air of {number(dims.air_ring, 3)} mm stays round the motor (motor.fill = true closes it)."
+        return f"Layer 1 encloses the motor.{lip}"
+    return f"A ring of air of {number(dims.air_ring, 3)} mm stays round the motor (motor.fill = true closes it).{lip}"
 
 
 def bond(what: str, where: str) -> str:

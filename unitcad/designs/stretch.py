@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from unitcad.catalogue import Material
-from unitcad.designs.dimensions import Exit
+from unitcad.designs.dimensions import Dimensions, Exit
 from unitcad.spec import Spec
 from unitcad.spec.resolved import Circuit
 
@@ -14,6 +14,12 @@ def allowed_strain(spec: Spec, known: Mapping[str, Material]) -> float:
     """Return the margin's part of the least elongation at break among the layers (1 = 100 %)."""
     least = min(float(known[layer.material].elongation_pct) for layer in spec.layers)
     return spec.casting.strain_margin * least / 100
+
+
+def lip_strain(dims: Dimensions) -> float:
+    """Return the strain of a lip's mouth as motor and pad are pushed through it: radius over radius, less one."""
+    passing = max(dims.motor_radius, dims.pad.radius if dims.pad else 0.0)
+    return passing / dims.mouth_radius - 1
 
 
 def tail_strain(fpcb: Circuit, slot: Exit) -> float:

@@ -144,7 +144,9 @@ def unit_section(
     regions = cut(bodies, segments, reach=dims.outer_radius + TAIL_MM)
     notes = []
     if dims.air_ring > 0:
-        notes.append(Note("air", ((dims.motor_radius + dims.cavity_radius) / 2, dims.motor_height / 3)))
+        low = dims.core_outline[-2][1]
+        at = (dims.motor_radius + dims.cavity_radius) / 2, low + (dims.motor_height - low) / 3
+        notes.append(Note("air", at))
     return section(regions, _unit_measures(dims), notes)
 
 
@@ -178,7 +180,9 @@ def _unit_measures(dims: Dimensions) -> list[Measure]:
     measures = [
         *walls,
         Measure(f"Ø{_mm(2 * dims.motor_radius)}", -dims.motor_radius, dims.motor_radius, "below", 0, 0),
-        Measure(f"R{_mm(dims.cavity_radius)}", 0, dims.cavity_radius, "below", 1, 0),
+        Measure(f"mouth Ø{_mm(2 * dims.mouth_radius)}", -dims.mouth_radius, dims.mouth_radius, "below", 1, 0)
+        if dims.mouth_radius
+        else Measure(f"R{_mm(dims.cavity_radius)}", 0, dims.cavity_radius, "below", 1, 0),
         Measure(f"Ø{_mm(2 * dims.outer_radius)}", -dims.outer_radius, dims.outer_radius, "below", 2, 0),
     ]
     levels = sorted({0.0, dims.motor_height, dims.core_height, *dims.heights})

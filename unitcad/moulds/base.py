@@ -20,11 +20,11 @@ from collections.abc import Sequence
 
 from unitcad.designs import Dimensions, design_of
 from unitcad.designs.dimensions import Exit
-from unitcad.designs.parts import BEYOND, strip
+from unitcad.designs.parts import BEYOND, solid_within, strip
 from unitcad.designs.tooling import Layout
 from unitcad.moulds import filament
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG
-from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, union
+from unitcad.shape import Extrude, Profile, Shape, box, cut, moved, rounded_rectangle, union
 from unitcad.spec import Spec
 
 PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER = 1.5, 4.0, 1.5
@@ -71,7 +71,7 @@ def plinth(spec: Spec, lay: Layout) -> Shape:
 
 def core(dims: Dimensions) -> Shape:
     """Draw the positive of a cavity, standing on the plinth (its foot sunk in it)."""
-    return cylinder(dims.cavity_radius, -BEYOND, dims.core_height)
+    return solid_within(dims.core_outline, -BEYOND, dims.core_height)
 
 
 def notch(spec: Spec, dims: Dimensions, exit: Exit, side: int) -> Shape:

@@ -6,23 +6,28 @@ import math
 
 from unitcad.designs import Dimensions
 from unitcad.designs.dimensions import Exit
-from unitcad.designs.parts import BEYOND
+from unitcad.designs.parts import BEYOND, solid_within
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.moulds.base import outline, plate_bottom, plate_top, tapered
 from unitcad.moulds.layout import EPS, MARK, groove_depth_of
 from unitcad.moulds.ribs import SQUARE, rib_shapes, slot_shapes
-from unitcad.shape import Extrude, Shape, box, cut, cylinder, moved, ring, union
+from unitcad.shape import Extrude, Shape, box, cut, moved, ring, union
 from unitcad.spec import Spec, printer_of
 
 
 def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
     """Draw the one-piece cup of a layer (from 0): recess over the plinth, seat at z = 0, bores, windows, grooves."""
-    rim, radius = dims.heights[layer], dims.radii[layer]
-    tools: list[Shape] = [recess(spec, lay)]
-    tools += [moved(cylinder(radius, -BEYOND, rim + BEYOND), c.x, c.y) for c in lay.cells]
+    rim = dims.heights[layer]
+    tools: list[Shape] = [recess(spec, lay), *bores(dims, lay, layer)]
     tools += grooves(spec, dims, lay, layer)
     tools += windows(spec, dims, lay, rim)
     return cut(cup_blank(spec, lay, rim), tools)
+
+
+def bores(dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
+    """Draw the bores of a cup (from 0), longer than it at both ends."""
+    bore = solid_within(dims.outside(layer), -BEYOND, dims.heights[layer] + BEYOND)
+    return [moved(bore, cell.x, cell.y) for cell in lay.cells]
 
 
 def cup_blank(spec: Spec, lay: Layout, rim: float) -> Shape:

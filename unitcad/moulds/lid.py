@@ -144,9 +144,8 @@ def pocket_depth(dims: Dimensions, layer: int, count: int) -> float:
 
 def _ceiling(dims: Dimensions, layer: int) -> tuple[float, float]:
     """Return inner and outer radius of the flat top of a layer; the inner one is 0 for a cap."""
-    inside = (dims.cavity_radius, *dims.radii)[layer]
-    is_ring = (dims.core_height, *dims.heights)[layer] >= dims.heights[layer]
-    return (inside if is_ring else 0.0), dims.radii[layer]
+    inside, top = dims.outside(layer - 1)[-1]
+    return (inside if top >= dims.heights[layer] else 0.0), dims.rim_radius(layer)
 
 
 def _at_the_rim(dims: Dimensions, layer: int) -> bool:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from unitcad.designs import Dimensions, design_of
-from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Layout
 from unitcad.moulds import filament
 from unitcad.moulds.base import core, notch
-from unitcad.moulds.cup import cup_blank, windows
+from unitcad.moulds.cup import bores, cup_blank, windows
 from unitcad.moulds.tongue import tongues
-from unitcad.shape import Common, Shape, cut, cylinder, moved
+from unitcad.shape import Common, Shape, cut, moved
 from unitcad.spec import Spec
 
 
@@ -21,10 +20,7 @@ def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
     seals: list[Shape] = []
     if dims.exit:
         around = [shape for _, shape in tongues(dims, lay)]
-        walls = cut(
-            cup_blank(spec, lay, dims.heights[layer]),
-            [moved(cylinder(dims.radii[layer], -BEYOND, dims.heights[layer] + BEYOND), c.x, c.y) for c in lay.cells],
-        )
+        walls = cut(cup_blank(spec, lay, dims.heights[layer]), bores(dims, lay, layer))
         seals += [cut(Common((walls, window)), around) for window in windows(spec, dims, lay, dims.heights[layer])]
         seals += [
             cut(Common((moved(core(dims), c.x, c.y), moved(notch(spec, dims, dims.exit, s), c.x, c.y))), around)

@@ -65,6 +65,9 @@ class MotorTable(Table, frozen=True, kw_only=True):
     fill: Annotated[bool, Meta(description="true: Layer 1 reaches the motor, without a ring of air between them")] = (
         False
     )
+    lip_mm: Annotated[
+        float, Meta(ge=0, le=10, description="reach of a lip of Layer 1 over the motor's edge at the skin; 0: none")
+    ] = 0.0
 
 
 class FpcbTable(Table, frozen=True, kw_only=True):
@@ -191,6 +194,9 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     ledge_mm: Annotated[
         float, Meta(ge=LEAST_LEDGE, le=100, description="width of the core's ledge that carries the tongue")
     ] = 0.6
+    draft_deg: Annotated[
+        float, Meta(ge=0, le=3, description="taper of bores and core, narrower upwards: silicone comes off more easily")
+    ] = 0.0
 
 
 class CastingTable(Table, frozen=True, kw_only=True):

@@ -46,6 +46,7 @@ class MotorSize(Table, frozen=True, kw_only=True):
     thickness_mm: float
     drive: Drive
     fill: bool
+    lip_mm: float = 0.0
 
 
 class Circuit(Table, frozen=True, kw_only=True):
@@ -98,6 +99,7 @@ class Moulds(Table, frozen=True, kw_only=True):
     plinth_height_mm: float
     plate_mm: float
     ledge_mm: float
+    draft_deg: float = 0.0
 
 
 class Estimate(Table, frozen=True, kw_only=True):

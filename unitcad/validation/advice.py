@@ -20,7 +20,8 @@ GRAVITY, MOTOR_G_CM3 = 9.80665, 5.0
 
 def warnings(spec: Spec) -> list[str]:
     """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's."""
-    return [*_thin_layers(spec), *_leads(spec), *_roof(spec), *_circuit_stock(spec), *_play(spec), *_design(spec)]
+    leads = [*_leads(spec), *_roof(spec), *_not_estimated(spec), *_circuit_stock(spec)]
+    return [*_thin_layers(spec), *leads, *_play(spec), *_design(spec)]
 
 
 def _thin_layers(spec: Spec) -> list[str]:
@@ -41,6 +42,13 @@ def _leads(spec: Spec) -> list[str]:
         return []
     offer = "add a table [wires] with diameter_mm, or [fpcb]"
     return [f"no way out for the motor's leads: they lie between unit and skin; {offer}"]
+
+
+def _not_estimated(spec: Spec) -> list[str]:
+    """Say that no measured unit has the features that the estimate does not read."""
+    if not spec.motor.lip_mm:
+        return []
+    return ["motor.lip_mm: no measured unit has a lip; the estimate is that of the unit without it"]
 
 
 def _roof(spec: Spec) -> list[str]:

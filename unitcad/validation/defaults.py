@@ -94,7 +94,7 @@ def _motor(raw: RawSpec) -> tuple[catalogue.Motor | None, MotorSize]:
             raise Refusal(f"motor.{field}", None, "is required where no part is named")
     known = {field: size for field, size in sizes.items() if size is not None}
     drive = given.drive or (part.drive.value if part and part.drive else UNKNOWN_DRIVE)
-    return part, MotorSize(part=name, drive=drive, fill=given.fill, **known)
+    return part, MotorSize(part=name, drive=drive, fill=given.fill, lip_mm=given.lip_mm, **known)
 
 
 def _moulds(raw: RawSpec, design: Design) -> Moulds:

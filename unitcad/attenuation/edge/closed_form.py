@@ -199,10 +199,9 @@ def constraints(units: Units, control: Units) -> list[Constraint]:
         paths = published_path(units, wave), published_path(control, wave)
         inequalities.append(Constraint(f"5{name}", text, "<", *paths, "1"))
     for name, wave in waves:
-        sides = [np.sum(exponents(u, wave, "literal"), axis=-1) / u.omega for u in (units, control)]
-        inequalities.append(
-            Constraint(f"6{name}", f"attenuation of {wave.upper()} waves: unit above control", ">", *sides, "s2")
-        )
+        text = f"attenuation of {wave.upper()} waves: unit above control"
+        left, right = (np.sum(exponents(u, wave, "literal"), axis=-1) / u.omega for u in (units, control))
+        inequalities.append(Constraint(f"6{name}", text, ">", left, right, "s2"))
     growth: list[tuple[str, Wave]] = [("6c", "p"), ("6d", "s")]
     for name, wave in growth:
         squared = impedances(units, wave) ** 2 * (2.0 if wave == "s" else 1.0)

@@ -13,8 +13,8 @@ Loads on the surface, in the Hankel domain.
 
 A normal load (F1 of the paper's equation 2a) is a pressure, positive into the body, with a J0 transform; a radial load
 (F2, equation 2b) is a traction outwards from the axis, with a J1 transform. q(k) = integral of q(r) J(kr) r dr.
-A tangential load is a traction in one direction of the plane, theta = 0, the same everywhere on the disc: a motor that
-drives sideways. Its transform is that of the normal one.
+A tangential load is a traction in one direction of the plane, theta = 0. It is the same everywhere on the disc: a
+motor that drives sideways. Its transform is that of the normal one.
 
 A force that turns in the plane, as a coin ERM's does, is two tangential ones in quadrature: F along theta = 0 and -i F
 along theta = pi/2. Together they move a point at theta by F e^{-i theta} (u_r, i u_theta, u_z), in the amplitudes
