@@ -23,8 +23,8 @@ from unitcad.cli.command_line import app
 from unitcad.lab.record import RULES
 from unitcad.meshcheck.rules.registry import FAMILIES, Rule, rules
 from unitcad.rooms import commands, file_kinds, load
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import default_of, entry_in, fields_of, meaning, named_in, table_in, values_of
+from unitcad.spec.raw import RawSpec
 
 FILES = [kind for kind in file_kinds() if kind.model]
 
@@ -122,7 +122,7 @@ def keys_of_file(name: str, model: type[Struct]) -> str:
         "",
     ]
     for header, table in tables(model):
-        if model is not AskedSpec and table in set(dict(tables(AskedSpec)).values()):
+        if model is not RawSpec and table in set(dict(tables(RawSpec)).values()):
             lines += [f"## {header}", "", "The same keys as in a [spec file](spec-file.md).", ""]
             continue
         about = inspect.cleandoc(table.__doc__ or "").partition("\n\n")[0]

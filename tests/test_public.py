@@ -26,7 +26,7 @@ import unitcad
 from unitcad import attenuation
 from unitcad.catalogue import entries
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.spec.asked import AskedSpec
+from unitcad.spec.raw import RawSpec
 from unitcad.sweeps import batch
 
 PACKAGE = Path(unitcad.__file__).parent
@@ -132,7 +132,7 @@ def test_functions_say_what_they_raise_and_in_which_units(name: str) -> None:
 
 def test_signatures_are_those_of_a_file() -> None:
     keys = inspect.signature(unitcad.Spec).parameters
-    assert list(keys) == list(AskedSpec.__struct_fields__)
+    assert list(keys) == list(RawSpec.__struct_fields__)
     required = [name for name, key in keys.items() if key.default is key.empty]
     assert required == ["name", "design", "diameter_mm", "layers"]
     assert list(inspect.signature(unitcad.check).parameters)[:2] == ["files", "printer"]

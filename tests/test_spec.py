@@ -32,7 +32,7 @@ def test_the_templates_are_all_there() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_effective_spec_reads_back_as_itself(name: str) -> None:
+def test_a_resolved_spec_reads_back_as_itself(name: str) -> None:
     spec = load(name)
     assert from_data(tomllib.loads(to_toml(spec))) == spec
     assert spec.name == name

@@ -15,7 +15,7 @@ from unitcad.accuracy.timing import Timing, interleaved
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape
-from unitcad.spec.asked import OutputTable
+from unitcad.spec.raw import OutputTable
 from unitcad.validation import default_template, load
 
 ANGLE = 0.1

@@ -17,7 +17,7 @@ from unitcad.pipeline.write import PAGE, Built, held
 from unitcad.pipeline.write import build as build_whole
 from unitcad.report import write_report
 from unitcad.spec import Spec
-from unitcad.spec.asked import OUTPUTS, Format
+from unitcad.spec.raw import OUTPUTS, Format
 from unitcad.validation import Changes, Source
 
 

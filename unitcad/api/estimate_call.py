@@ -11,7 +11,7 @@ from unitcad import notebook
 from unitcad.arguments import texts
 from unitcad.attenuation.edge.estimate_summary import summary
 from unitcad.estimating import estimate_spec
-from unitcad.spec.asked import Model
+from unitcad.spec.raw import Model
 from unitcad.validation import Changes, Source, load
 
 

@@ -20,7 +20,7 @@ from msgspec import Meta
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import convert
-from unitcad.spec.asked import Table
+from unitcad.spec.raw import Table
 
 FORMAT = "unitcad cast record"
 ENDING = ".cast.json"

@@ -26,7 +26,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pins import PIN_RADIUS, Pins
 from unitcad.shape import cylinder, moved
 from unitcad.shape.profile import GRID_PER_MM
-from unitcad.spec.effective import Moulds
+from unitcad.spec.resolved import Moulds
 
 KNIFE = "the base carries an edge thinner than that clearance: give the silicone over it a corner less sharp"
 THIN = 1e-3

@@ -17,8 +17,8 @@ from unitcad.designs.tooling import Tooling
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import is_custom
+from unitcad.spec.raw import RawSpec
 
 __all__ = [
     "CIRCUIT_COLOUR",
@@ -57,7 +57,7 @@ def shipped() -> dict[str, Design]:
     return {module.DESIGN.name: module.DESIGN for module in modules if hasattr(module, "DESIGN")}
 
 
-def design_of(spec: Spec | AskedSpec) -> Design:
+def design_of(spec: Spec | RawSpec) -> Design:
     """Return the design of a spec. Raises Refusal for an unknown one, UnitcadError for a custom one that fails."""
     if is_custom(spec.design):
         return custom(spec.design, spec.design_source or "")

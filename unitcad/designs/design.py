@@ -10,7 +10,7 @@ from unitcad.designs.dimensions import Dimensions
 from unitcad.designs.tooling import Tooling
 from unitcad.shape import Shape
 from unitcad.spec import Spec
-from unitcad.spec.asked import AskedSpec
+from unitcad.spec.raw import RawSpec
 
 Reason = tuple[str, str]
 """A skipped output and the reason."""
@@ -28,7 +28,7 @@ def _nothing_left_out(spec: Spec) -> list[Reason]:
     return []
 
 
-def _inside_cavity(asked: AskedSpec, inner_radius: float) -> float:
+def _inside_cavity(asked: RawSpec, inner_radius: float) -> float:
     return inner_radius - 0.3
 
 
@@ -61,7 +61,7 @@ class Design:
     dimensions   radii, heights, pad and exit that follow from a spec
     limits       raises Refusal for a spec that this design can't be made of
     advice       warnings about unwise values, a sentence each
-    pad_radius   default radius of the circuit's pad (mm), from the asked spec and the radius inside the walls
+    pad_radius   default radius of the circuit's pad (mm), from the raw spec and the radius inside the walls
     wire_sides   sides of a wire that need clearance in its exit: 2 in a slot, 1 in a notch
     tooling      "concentric": base, cups, tongues and blade drawn from the dimensions; "complement": the space round
                  the cast layers; or a function from a spec and the cast layers' shapes to a Tooling
@@ -81,7 +81,7 @@ class Design:
     dimensions: Callable[[Spec], Dimensions]
     limits: Callable[[Spec, Dimensions], None] = _no_limits
     advice: Callable[[Spec, Dimensions], list[str]] = _nothing
-    pad_radius: Callable[[AskedSpec, float], float] = _inside_cavity
+    pad_radius: Callable[[RawSpec, float], float] = _inside_cavity
     wire_sides: int = 1
     tooling: Literal["concentric", "complement"] | Callable[[Spec, Sequence[Shape]], Tooling] = "complement"
     suction: bool = False

@@ -1,4 +1,4 @@
-"""The lengths that follow from an effective spec (mm): one place for designs, moulds and drawings to read them from."""
+"""The lengths that follow from a resolved spec (mm): one place for designs, moulds and drawings to read them from."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from unitcad.designs.parts import ADHESIVE, bond, motor_hold, slots
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec
-from unitcad.spec.asked import AskedSpec
+from unitcad.spec.raw import RawSpec
 from unitcad.text import number
 
 
@@ -86,7 +86,7 @@ def advice(spec: Spec, dims: Dimensions) -> list[str]:
     ]
 
 
-def pad_radius(asked: AskedSpec, cavity_radius: float) -> float:
+def pad_radius(asked: RawSpec, cavity_radius: float) -> float:
     """Return the default radius of the pad: over every layer, half a millimetre or half a wall short of the edge."""
     return asked.diameter_mm / 2 - min(0.5, asked.layers[-1].wall_mm / 2)
 

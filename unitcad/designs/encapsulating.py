@@ -28,8 +28,8 @@ from unitcad.designs.stretch import allowed_strain, pad_strain, tail_strain, wid
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec
-from unitcad.spec.asked import LEAST_TAIL
-from unitcad.spec.effective import Circuit
+from unitcad.spec.raw import LEAST_TAIL
+from unitcad.spec.resolved import Circuit
 
 TIP_PROUD = 0.2
 """Height of a tongue for wires above the core, mm, so that Layer 1 clears them, before it moves to a layer."""

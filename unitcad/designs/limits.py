@@ -13,8 +13,8 @@ from unitcad.designs.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, Ex
 from unitcad.designs.rib_leaves import farthest_push, leaf_mm, least_skirt
 from unitcad.errors import Refusal
 from unitcad.spec import Spec, printer_of
-from unitcad.spec.asked import LEAST_LEDGE, FpcbTable, WiresTable
-from unitcad.spec.effective import Circuit
+from unitcad.spec.raw import LEAST_LEDGE, FpcbTable, WiresTable
+from unitcad.spec.resolved import Circuit
 
 TAIL_SHARE = 0.7
 """Half the tail's width over the core's radius, at most: beyond it the ledge has no shoulders."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Outline, Pad
 from unitcad.shape import Revolve, Shape, box, cut, cylinder, moved, polygon, turned, union
 from unitcad.spec import Spec
-from unitcad.spec.effective import Circuit, Wires
+from unitcad.spec.resolved import Circuit, Wires
 from unitcad.text import number
 
 BEYOND = 1.0

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from unitcad.catalogue import Material
 from unitcad.designs.dimensions import Dimensions, Exit
 from unitcad.spec import Spec
-from unitcad.spec.effective import Circuit
+from unitcad.spec.resolved import Circuit
 
 
 def allowed_strain(spec: Spec, known: Mapping[str, Material]) -> float:

@@ -37,7 +37,7 @@ from unitcad.errors import Refusal, unknown_name
 from unitcad.estimating import estimate_input
 from unitcad.lab.unit_files import Cavity, file_of, measured_walls, source_file, specs_of
 from unitcad.spec import Spec, convert, read_toml, to_data
-from unitcad.spec.asked import Table
+from unitcad.spec.raw import Table
 from unitcad.validation import from_data
 from unitcad.validation.shipped_files import named_file, shipped_files
 

@@ -23,9 +23,9 @@ from unitcad.shape import Shape
 from unitcad.shape.body import Body
 from unitcad.shape.profile import FACETS
 from unitcad.spec import Spec, from_json, to_json, with_formats
-from unitcad.spec.asked import CastingTable
 from unitcad.spec.custom_code import is_body_file
-from unitcad.spec.effective import Estimate
+from unitcad.spec.raw import CastingTable
+from unitcad.spec.resolved import Estimate
 
 _T = TypeVar("_T")
 

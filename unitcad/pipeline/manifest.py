@@ -20,7 +20,7 @@ from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import kernel_versions
 from unitcad.spec import Spec, spec_hash
-from unitcad.spec.asked import OUTPUTS
+from unitcad.spec.raw import OUTPUTS
 from unitcad.validation import warnings
 
 CASTING = ("bom.csv", "casting.json", "casting.md", "troubleshooting.md")

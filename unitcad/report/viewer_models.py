@@ -18,7 +18,7 @@ Modelled = Callable[[Spec], dict[str, Any]]
 
 
 def spec_in(folder: Path) -> Spec:
-    """Read the effective spec of a result folder. Raises UnitcadError if it can't be read."""
+    """Read the resolved spec of a result folder. Raises UnitcadError if it can't be read."""
     return from_data(read_toml(folder / "spec.toml", links=False))
 
 

@@ -29,7 +29,7 @@ from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
 from unitcad.spec import convert, read_toml
-from unitcad.spec.asked import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
+from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
 from unitcad.validation.fit_text import lab_fit
 from unitcad.validation.shipped_files import named_file, shipped_files
 

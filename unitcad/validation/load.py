@@ -14,10 +14,10 @@ from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
 from unitcad.files import read_text
 from unitcad.rooms import FileKind, file_kinds
 from unitcad.spec import Spec, check_plain, convert, read_toml
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
+from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml_lines import line_of
-from unitcad.validation.defaults import effective
+from unitcad.validation.defaults import resolve
 from unitcad.validation.dotted import ABSENT, at, put
 from unitcad.validation.faults import every_fault, settled
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files, shipped_of
@@ -155,7 +155,7 @@ def _is_compound(kind: FileKind, source: object) -> UnitcadError:
 
 
 def from_tables(keys: Mapping[str, object]) -> Spec:
-    """Return the effective spec of a spec's keys, tables as their classes or as dicts: what calling `Spec` does.
+    """Return the resolved spec of a spec's keys, tables as their classes or as dicts: what calling `Spec` does.
 
     Raises as `from_data`.
     """
@@ -184,14 +184,14 @@ def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any
 
 
 def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
-    """Return the validated, effective `Spec` of plain data.
+    """Return the validated, resolved `Spec` of plain data.
 
     `folder` is where the path of a custom design starts, whose file is then read and may run; without one no
     file is. Raises Refusal for the first fault; the value that it offers is accepted in that field.
     """
     plain = with_source(dict(data), folder) if folder else dict(data)
     try:
-        return effective(convert(plain, AskedSpec))
+        return resolve(convert(plain, RawSpec))
     except UnknownKey:
         raise
     except Refusal as refusal:
@@ -199,7 +199,7 @@ def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
 
 
 def _judge(data: dict[str, Any]) -> None:
-    effective(convert(data, AskedSpec))
+    resolve(convert(data, RawSpec))
 
 
 def _sound(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The tables of a spec as typed in a TOML file. Lengths in mm, the unit in each name.
 
-None means that the key is missing; `unitcad.spec.effective` has the same spec with every value there. Only types and
+None means that the key is missing; `unitcad.spec.resolved` has the same spec with every value there. Only types and
 ranges of single values are checked here. The design and `validation` check conditions on several values.
 """
 
@@ -273,7 +273,7 @@ class OutputTable(Table, frozen=True, kw_only=True):
     ] = 0.01
 
 
-class AskedSpec(Table, frozen=True, kw_only=True):
+class RawSpec(Table, frozen=True, kw_only=True):
     """A haptic unit. Required: name, design, diameter_mm and [[layers]]."""
 
     name: Annotated[

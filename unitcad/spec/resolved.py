@@ -16,8 +16,7 @@ from unitcad import notebook
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue.entries import Drive
 from unitcad.errors import UnitcadError
-from unitcad.spec.asked import (
-    AskedSpec,
+from unitcad.spec.raw import (
     CastingTable,
     EstimateTable,
     Format,
@@ -28,6 +27,7 @@ from unitcad.spec.asked import (
     MotorTable,
     MouldsTable,
     OutputTable,
+    RawSpec,
     Table,
     WiresTable,
 )
@@ -142,7 +142,7 @@ else:
 
         @property
         def __signature__(cls) -> inspect.Signature:
-            return inspect.signature(AskedSpec)
+            return inspect.signature(RawSpec)
 
 
 class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
