@@ -37,7 +37,7 @@ def answer(
 ) -> dict[str, Any]:
     """Return the answer of an estimate (`estimates.estimate`) as data.
 
-    `lines`: the two that lead, `headline` the first without its source; `details`: what says how sure they are.
+    `lines`: the two that lead, `headline` the first without its source; `details`: how sure they are.
     `level`: the headline's, measured or else `p50` (null if a modulus is known as a range only). `p10`, `p50` and
     `p90`: the leading model's median and 80 % range, fractions of the motor's amplitude. `levels`: each model's edge
     level; `analytic`: those of the paper's model. Errors are factors with the unit left out. `held`: how many of the
@@ -121,7 +121,7 @@ def _headline(data: dict[str, Any], levels: dict[str, Any]) -> str:
 
 
 def _source(variant: EstimateInput, data: dict[str, Any], fit: LabFit | None) -> str:
-    """Say where the range comes from, and which measured unit is nearest."""
+    """Say the source of the range, and which measured unit is nearest."""
     if data["p50"] is None:
         return ""
     if fit is None:
@@ -141,7 +141,7 @@ def _spread(one: dict[str, Any]) -> str:
 
 
 def _second(data: dict[str, Any]) -> str:
-    """Say the paper's analytic model, from the unit's own moduli, and its error beside the baseline's."""
+    """Say the paper's analytic model, from the unit's own moduli, and its error next to the baseline's."""
     published, corrected = (data["analytic"][name] for name in ANALYTIC)
     if published["low"] is None:
         return f"The paper's analytic model gives no number: {published['reason']}"
@@ -163,7 +163,7 @@ def _level(level: dict[str, Any]) -> str:
 def _details(
     variant: EstimateInput, estimated: dict[str, Any], data: dict[str, Any], fit: LabFit | None
 ) -> Iterator[str]:
-    """Say how sure the answer is: errors, what was not measured, what the models can't tell apart, the skin."""
+    """Say how sure the answer is: errors, unmeasured inputs, units that the models can't tell apart, the skin."""
     name, error = data["model"] or RULE, number(data["typical_error"], 2)
     worst = f", worst x {number(data['worst_error'], 2)} ({data['worst_at']})" if data["worst_error"] else ""
     units = f"the units of {fit.name}" if fit else "the nine measured units"
