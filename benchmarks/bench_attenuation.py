@@ -19,7 +19,7 @@ from unitcad.arrays.crosstalk import Decays, crosstalk
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.crosstalk import decay
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels
+from unitcad.attenuation.edge.models import MODELS, edge_levels
 from unitcad.attenuation.inputs import EstimateInput, TissueLayer, body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.estimating import estimate_input
@@ -124,9 +124,10 @@ def arrays(rounds: int) -> None:
     omega, n = 2 * np.pi * rng.uniform(80, 250, MANY), rng.choice([1.0, 2.0], MANY)
 
     def units(part: slice | int) -> Units:
-        return Units(moduli[part], [1070.0] * 2, [0.4999] * 2, [0.2] * 2, walls[part], omega[part], n[part])
+        whole = np.full(np.shape(n[part]), 16.0)
+        return Units(moduli[part], [1070.0] * 2, [0.4999] * 2, [0.2] * 2, walls[part], omega[part], n[part], whole)
 
-    for model in (name for name in MODELS if name != "bush"):  # it reads sections, which these units have none of
+    for model in MODELS:
         jobs: dict[str, Callable[[], object]] = {
             f"{model}: {MANY} in one call": lambda model=model: edge_levels(units(slice(None)), model),
             f"{model}: {SINGLE} single calls": lambda model=model: [

@@ -257,7 +257,7 @@ def estimates(scratch: Path, variants: int) -> dict[str, Any]:
         "estimates",
     )
     some = range(0, sweep.count, sweep.count // 200)
-    models = ("paper", "consistent", "fitted")
+    models = ("rule", "published", "divider")
 
     def loop() -> None:
         for index in some:

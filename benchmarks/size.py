@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (528_000, 403, 65_600),
-    "core": (251_000, 225, 32_200),
-    "tests": (438_000, 0, 0),
+    "total": (538_000, 405, 67_300),
+    "core": (258_000, 225, 33_500),
+    "tests": (402_500, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, MOST_LINES = 45, 900

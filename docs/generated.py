@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import inspect
-import json
+import re
 import sys
 import typing
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from typing import Any
 
 import typer
 from mkdocs.structure.files import File, Files
-from msgspec import NODEFAULT, Struct
+from msgspec import Struct
 
 from unitcad.arrays import layouts
 from unitcad.checks import mould_checks
@@ -23,8 +23,8 @@ from unitcad.cli.command_line import app
 from unitcad.lab.record import RULES
 from unitcad.meshcheck.rules.registry import FAMILIES, Rule, rules
 from unitcad.rooms import commands, file_kinds, load
-from unitcad.spec.asked import AskedSpec
-from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, named_in, notes, table_in
+from unitcad.spec.fields import default_of, entry_in, fields_of, meaning, named_in, table_in, values_of
+from unitcad.spec.raw import RawSpec
 
 FILES = [kind for kind in file_kinds() if kind.model]
 
@@ -122,10 +122,10 @@ def keys_of_file(name: str, model: type[Struct]) -> str:
         "",
     ]
     for header, table in tables(model):
-        if model is not AskedSpec and table in set(dict(tables(AskedSpec)).values()):
+        if model is not RawSpec and table in set(dict(tables(RawSpec)).values()):
             lines += [f"## {header}", "", "The same keys as in a [spec file](spec-file.md).", ""]
             continue
-        about = " ".join(inspect.cleandoc(table.__doc__ or "").split())
+        about = inspect.cleandoc(table.__doc__ or "").partition("\n\n")[0]
         lines += [f"## {header or 'The file'}", "", about, "", *_keys(table)]
     if name == "array":
         for kind in layouts.layouts().values():
@@ -152,13 +152,13 @@ def tables(model: type[Struct], path: str = "") -> Iterator[tuple[str, type[Stru
 def _keys(table: type[Struct]) -> list[str]:
     rows = ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
     for key, field in fields_of(table).items():
-        default = "required" if field.required else _default(field)
+        default = "required" if field.required else f"`{default_of(field)}`" if default_of(field) else ""
         text = meaning(field.type)
         if not text and (inner := table_in(field.type) or table_in(entry_in(field.type)) or _named(field.type)):
             text = inspect.cleandoc(inner.__doc__ or "").partition("\n")[0].rstrip(".")
         if not text and typing.get_origin(field.type) is not typing.Literal:
             raise ValueError(f"{table.__name__}.{key} has no description")
-        rows.append(f"| `{key}` | {_values(field.type)} | {default} | {text[:1].upper()}{text[1:]} |")
+        rows.append(f"| `{key}` | {_code(values_of(field.type))} | {default} | {text[:1].upper()}{text[1:]} |")
     return [*rows, ""]
 
 
@@ -167,45 +167,8 @@ def _named(kind: Any) -> type[Struct] | None:
     return table_in(kind) or (_named(inner) if (inner := named_in(kind)) else None)
 
 
-def _default(field: Any) -> str:
-    value = field.default if field.default is not NODEFAULT else field.default_factory()
-    if value is None or isinstance(value, Struct) or value in ((), {}, ""):
-        return ""
-    return f"`{json.dumps(value, default=list)}`"
-
-
-def _values(kind: Any) -> str:
-    """Return the values that a key takes: words, a range, or a type."""
-    words: list[str] = []
-    for one in alternatives(kind):
-        origin = typing.get_origin(one)
-        if origin is typing.Literal:
-            words += [f"`{json.dumps(value)}`" for value in typing.get_args(one)]
-        elif one in (int, float):
-            words.append(_range(kind, one))
-        elif one is str:
-            words.append("text")
-        elif one is bool:
-            words.append("`true`, `false`")
-        elif origin in (tuple, list):
-            words.append(f"list of {_values(entry_in(one))}")
-        elif one is not type(None):
-            words.append("table")
-    return ", ".join(dict.fromkeys(words))
-
-
-def _range(kind: Any, number: type) -> str:
-    bounds = [note for note in notes(kind) if note.ge is not None or note.le is not None]
-    low = next((note.ge for note in bounds if note.ge is not None), None)
-    high = next((note.le for note in bounds if note.le is not None), None)
-    name = "whole number" if number is int else "number"
-    if low is None and high is None:
-        return name
-    if high is None:
-        return f"{name} from {low:g}"
-    if low == high:
-        return f"{low:g}"
-    return f"{low:g} to {high:g}" if number is float else f"{low:g} to {high:g}, whole"
+def _code(words: str) -> str:
+    return re.sub(r'"[^"]*"|\b(?:true|false)\b', lambda word: f"`{word[0]}`", words)
 
 
 def _sentence(text: str) -> str:

@@ -13,7 +13,7 @@ from unitcad.validation import from_data
 def spec_of(record: CastRecord) -> Spec:
     """The spec that was cast. Raises Refusal where the record has none, or one that this version refuses."""
     if record.spec is None:
-        raise Refusal("spec", None, "is required here: the effective spec as a table")
+        raise Refusal("spec", None, "is required here: the resolved spec as a table")
     return from_data(record.spec)
 
 

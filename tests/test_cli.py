@@ -87,13 +87,13 @@ def test_a_folder_that_can_not_be_written_is_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("setting", "field"), [("layers.0.cap_mm=500", "layers.0.cap_mm"), ("diameter_mm=900",) * 2])
 def test_estimate_says_that_build_would_refuse_the_moulds(setting: str, field: str, tmp_path: Path) -> None:
-    estimated = _run("estimate", "encapsulating", "--set", setting, "--model", "fitted", "--json")
+    estimated = _run("estimate", "encapsulating", "--set", setting, "--model", "divider", "--json")
     built = _run("build", "encapsulating", "--set", setting, cwd=tmp_path)
     assert (estimated.returncode, built.returncode) == (0, 2)
     reason = built.stderr.removeprefix("error: ")
     assert reason.startswith(field.partition("=")[0] + " = ")
     assert estimated.stderr == f"warning: encapsulating: its moulds can't be made: {reason}"
-    assert json.loads(estimated.stdout)["models"]["fitted"]
+    assert json.loads(estimated.stdout)["models"]["divider"]
 
 
 WRONG = {
@@ -205,9 +205,9 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     assert lines[3] == "mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
     assert lines[4].startswith(f"ready {duration(procedure['earliest_finish_min'])} after the print")
     assert f"{len(manifest['mould_checks'])} of {len(manifest['mould_checks'])} mould checks passed" in lines[5]
-    assert lines[6] == manifest["estimate"]["answer"]
-    assert lines[7] == f"open {folder / 'bench.html'} to cast"
-    assert lines[8] == f"open {folder / 'report.html'}"
+    assert lines[6:8] == manifest["estimate"]["lines"]
+    assert lines[8] == f"open {folder / 'bench.html'} to cast"
+    assert lines[9] == f"open {folder / 'report.html'}"
     assert (folder / "report.html").is_file()
     without = _run("build", "embedded", "--formats", "stl", "-o", str(tmp_path / "b"), "--no-report")
     assert not (Path(without.stdout.strip()) / "report.html").exists()

@@ -43,7 +43,7 @@ cavities = [
 ]
 
 [estimate]
-models = ["fem"]
+models = ["elements"]
 """
 FAULTS = {
     "diameter_mm": 3,
@@ -92,7 +92,7 @@ def test_names_are_refused_with_those_that_there_are(bad: Path) -> None:
     told = {one.field: str(one) for one in (refusal(bad), *refusal(bad).others)}
     for name in ("fdm-0.25", "fdm-0.4", "sla"):
         assert name in told["moulds.printer"]
-    for name in ("bush", "consistent", "fitted", "mechanics", "paper"):
+    for name in ("corrected", "divider", "fem", "published", "rule"):
         assert name in told["estimate.models.0"]
     assert "nearest" not in told["moulds.printer"] + told["estimate.models.0"]
 

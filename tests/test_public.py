@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import doctest
 import inspect
 import json
+import re
 import subprocess
 import sys
 import tomllib
@@ -21,9 +23,10 @@ import trimesh
 import typed_use
 
 import unitcad
+from unitcad import attenuation
 from unitcad.catalogue import entries
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.spec.asked import AskedSpec
+from unitcad.spec.raw import RawSpec
 from unitcad.sweeps import batch
 
 PACKAGE = Path(unitcad.__file__).parent
@@ -36,6 +39,46 @@ UNIT: dict[str, Any] = {"name": "unit", "design": "encapsulating", "diameter_mm"
 
 def _run(code: str) -> str:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+
+
+PUBLIC = {f"unitcad.{name}": getattr(unitcad, name) for name in unitcad.__all__} | {
+    f"unitcad.attenuation.{name}": getattr(attenuation, name)
+    for name in attenuation.__all__
+    if isinstance(getattr(attenuation, name), type)  # Damping and Load are unions of the others
+}
+
+
+def _sections(text: str) -> dict[str, str]:
+    """The sections of a numpydoc docstring by title."""
+    parts = re.split(r"(?m)^(\w[\w ]*)\n-+\n", inspect.cleandoc(text))
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_a_public_name_is_documented_with_an_example_that_runs(name: str) -> None:
+    value = PUBLIC[name]
+    sections = _sections(value.__doc__)
+    assert ">>> " in sections["Examples"]
+    if inspect.isfunction(value):
+        assert {"Returns", "Examples"} <= set(sections)
+        assert "Raises" in sections or name == "unitcad.templates"
+    # A class documents its parameters; a result, which only functions make, its attributes.
+    result = isinstance(value, type) and name.endswith(("Result", "EdgeEstimate", "Response", "UnitcadError"))
+    if not inspect.ismodule(value) and not result:
+        listed = re.findall(r"(?m)^([*\w][\w, *]*?)(?: :.*)?$", sections.get("Parameters", ""))
+        documented = {part.strip(" *") for line in listed for part in line.split(",")}
+        asked = set(inspect.signature(value).parameters) - {"self"}
+        assert asked <= documented, asked - documented
+    parser, runner = doctest.DocTestParser(), doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
+    runner.run(parser.get_doctest(sections["Examples"], {}, name, None, 0))
+    assert runner.tries
+    assert not runner.failures
+
+
+def test_an_undocumented_parameter_is_seen() -> None:
+    assert _sections("Do it.\n\nParameters\n----------\na : int\n    Number.\n")["Parameters"].startswith("a : int")
+    with pytest.raises(KeyError):
+        _sections("Do it.")["Examples"]
 
 
 def test_importing_loads_nothing() -> None:
@@ -89,7 +132,7 @@ def test_functions_say_what_they_raise_and_in_which_units(name: str) -> None:
 
 def test_signatures_are_those_of_a_file() -> None:
     keys = inspect.signature(unitcad.Spec).parameters
-    assert list(keys) == list(AskedSpec.__struct_fields__)
+    assert list(keys) == list(RawSpec.__struct_fields__)
     required = [name for name, key in keys.items() if key.default is key.empty]
     assert required == ["name", "design", "diameter_mm", "layers"]
     assert list(inspect.signature(unitcad.check).parameters)[:2] == ["files", "printer"]
@@ -342,7 +385,7 @@ def test_arguments_of_another_type_are_refused_in_one_sentence(
 def test_a_single_text_is_a_list_of_one(tmp_path: Path) -> None:
     built = unitcad.build("encapsulating", tmp_path, formats="stl", only="unit", check=False)
     assert list(built.volumes) == ["layer1", "layer2", "motor", "fpcb"]
-    assert list(unitcad.estimate("encapsulating", models="paper").edge) == ["paper"]
+    assert list(unitcad.estimate("encapsulating", models="published").edge) == ["published"]
 
 
 def test_tab_completion_offers_the_public_names_alone() -> None:

@@ -16,14 +16,14 @@ from unitcad.checks import mould_checks
 from unitcad.cli.command_line import app
 from unitcad.lab.record import RULES
 from unitcad.rooms import commands, load
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import fields_of
+from unitcad.spec.raw import RawSpec
 
 PAGES = pages()
 
 
 def test_the_spec_page_has_every_key_of_every_table() -> None:
-    for header, table in tables(AskedSpec):
+    for header, table in tables(RawSpec):
         section = PAGES["reference/spec-file.md"].split(f"## {header or 'The file'}\n")[1].split("\n## ")[0]
         assert re.findall(r"(?m)^\| `(\w+)` \|", section) == list(fields_of(table)), header
 

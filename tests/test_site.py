@@ -43,7 +43,7 @@ def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path: Path)
         assert (tmp_path / "site" / page.relative_to(ROOT / "docs").with_suffix(".html")).is_file(), page
         relative = page.relative_to(ROOT / "docs").as_posix()
         assert (
-            relative.startswith("accuracy/")
+            relative.startswith("evidence/accuracy/")
             or relative == "index.md"
             or f"]({relative})" in (ROOT / "docs" / "index.md").read_text("utf-8")
         ), f"the index of the docs lacks {relative}"
@@ -53,7 +53,7 @@ def test_a_lost_link_fails_the_site(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "mkdocs.yml", tmp_path)
     with (tmp_path / "docs/index.md").open("a") as page:
-        page.write("\n[x](nowhere.md) [y](model.md#nothing)\n")
+        page.write("\n[x](nowhere.md) [y](spec.md#nothing)\n")
     done = build(tmp_path, tmp_path / "site")
     assert done.returncode != 0
     assert "nowhere.md" in done.stdout + done.stderr

@@ -18,9 +18,9 @@ from unitcad.errors import Refusal
 from unitcad.lab.fit_files import fit_toml
 from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.pipeline.make import Progress, Subject
-from unitcad.spec.asked import OUTPUTS, AskedSpec
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.spec.fields import alternatives, entry_in, fields_of, notes, table_in
+from unitcad.spec.raw import OUTPUTS, RawSpec
 from unitcad.validation import from_data, put, read
 
 OWN = "ours"
@@ -152,7 +152,7 @@ def _keys(table: type[msgspec.Struct], path: str) -> Iterator[tuple[str, Any]]:
             yield where, field.type
 
 
-KEYS = dict(_keys(AskedSpec, ""))
+KEYS = dict(_keys(RawSpec, ""))
 
 
 def _within(kind: Any, now: Any) -> Iterator[Any]:
@@ -182,7 +182,7 @@ _STORE = MemoryStore()
 
 
 @cache
-def _effective(base: str) -> dict[str, Any]:
+def _resolved(base: str) -> dict[str, Any]:
     return msgspec.to_builtins(from_data(_bases()[base]))
 
 
@@ -206,7 +206,7 @@ def _changes(path: str) -> Iterator[tuple[str, Any]]:
     if path in FIRST:
         yield FIRST[path]
     for name in _bases():
-        present = _at(_effective(name), path)
+        present = _at(_resolved(name), path)
         yield from ((name, value) for value in (*OTHERS.get(path, ()), *_within(KEYS[path], present)))
 
 

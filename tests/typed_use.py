@@ -37,5 +37,5 @@ def use(out: Path) -> tuple[float, FileReport, float | None]:
     built: unitcad.BuildResult = unitcad.build(variant, out, formats=["stl"], only=["unit"], check=False)
     result: unitcad.CheckResult = unitcad.check(built.folder, printer="sla", select=["T"])
     first: FileReport = check_file(result.reports[0].path, Options())
-    estimated: unitcad.EdgeEstimate = unitcad.estimate(spec, models=["fitted"], frequency_hz=125)
-    return volume, first, estimated.edge["fitted"]
+    estimated: unitcad.EdgeEstimate = unitcad.estimate(spec, models=["rule"], frequency_hz=125)
+    return volume, first, estimated.edge["rule"]

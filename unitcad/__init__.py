@@ -36,14 +36,14 @@ if TYPE_CHECKING:
     from unitcad.errors import UnitcadError as UnitcadError
     from unitcad.pipeline.variant import Variant as Variant
     from unitcad.spec import Spec as Spec
-    from unitcad.spec.asked import CastingTable as Casting
-    from unitcad.spec.asked import EstimateTable as Estimate
-    from unitcad.spec.asked import FpcbTable as Fpcb
-    from unitcad.spec.asked import LayerTable as Layer
-    from unitcad.spec.asked import MotorTable as Motor
-    from unitcad.spec.asked import MouldsTable as Moulds
-    from unitcad.spec.asked import OutputTable as Output
-    from unitcad.spec.asked import WiresTable as Wires
+    from unitcad.spec.raw import CastingTable as Casting
+    from unitcad.spec.raw import EstimateTable as Estimate
+    from unitcad.spec.raw import FpcbTable as Fpcb
+    from unitcad.spec.raw import LayerTable as Layer
+    from unitcad.spec.raw import MotorTable as Motor
+    from unitcad.spec.raw import MouldsTable as Moulds
+    from unitcad.spec.raw import OutputTable as Output
+    from unitcad.spec.raw import WiresTable as Wires
     from unitcad.validation import load as load
     from unitcad.validation import templates as templates
 
@@ -82,21 +82,21 @@ __all__ = [
 
 _PLACES = {
     "BuildResult": "api.build_call:BuildResult",
-    "Casting": "spec.asked:CastingTable",
+    "Casting": "spec.raw:CastingTable",
     "CheckResult": "api.check_call:CheckResult",
     "EdgeEstimate": "api.estimate_call:EdgeEstimate",
-    "Estimate": "spec.asked:EstimateTable",
-    "Fpcb": "spec.asked:FpcbTable",
-    "Layer": "spec.asked:LayerTable",
+    "Estimate": "spec.raw:EstimateTable",
+    "Fpcb": "spec.raw:FpcbTable",
+    "Layer": "spec.raw:LayerTable",
     "Material": "catalogue:MaterialEntry",
-    "Motor": "spec.asked:MotorTable",
-    "Moulds": "spec.asked:MouldsTable",
-    "Output": "spec.asked:OutputTable",
+    "Motor": "spec.raw:MotorTable",
+    "Moulds": "spec.raw:MouldsTable",
+    "Output": "spec.raw:OutputTable",
     "Refusal": "errors:Refusal",
     "Spec": "spec:Spec",
     "UnitcadError": "errors:UnitcadError",
     "Variant": "pipeline.variant:Variant",
-    "Wires": "spec.asked:WiresTable",
+    "Wires": "spec.raw:WiresTable",
     "attenuation": "attenuation",
     "build": "api.build_call:build",
     "catalogue": "catalogue",
@@ -122,6 +122,8 @@ def __getattr__(name: str) -> object:
     module, _, attribute = _PLACES[name].partition(":")
     loaded = import_module(f"{__name__}.{module}")
     value = getattr(loaded, attribute) if attribute else loaded
+    if attribute.endswith(("Table", "Entry")):
+        value.__doc__ = import_module(f"{__name__}.spec.fields").documented(value)
     globals()[name] = value
     return value
 

@@ -25,7 +25,17 @@ UNIT_ALONE = "; --only unit makes only the unit"
 
 
 class UnitcadError(Exception):
-    """A request that can't be met, or something that the machine lacks: exit code 2, no traceback."""
+    """A request that can't be met, or a lack of the machine. The command line prints it and exits with code 2.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> try:
+    ...     unitcad.check()
+    ... except unitcad.UnitcadError as error:
+    ...     print(error)
+    check needs a file, a folder or a glob
+    """
 
     exit_code = 2
 
@@ -86,11 +96,34 @@ class Unfinished(UnitcadError):
 
 
 class Refusal(UnitcadError):
-    """A value that is refused: its field, the value, the limit that it breaks and the nearest accepted value.
+    """A value that is refused.
 
-    `nearest` is a value that may be typed in `field`'s place and that meets this limit (it may then meet another one).
-    `value` is None for a field that is missing. `file` and `line` are the place of the value, `others` are further
-    faults of the same data; `unitcad.validation.load` fills them in.
+    Parameters
+    ----------
+    field : str
+        Dotted path of the value, such as ``layers.0.wall_mm``.
+    value : object
+        The refused value; None for a missing one.
+    limit : str
+        The limit that it breaks, in words.
+    nearest : object, optional
+        The nearest value that meets this limit.
+
+    Attributes
+    ----------
+    file, line : str and int, or None
+        Place of the value.
+    others : tuple of Refusal
+        Further faults of the same data.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> try:
+    ...     unitcad.load("encapsulating", set={"diameter_mm": 3})
+    ... except unitcad.Refusal as refusal:
+    ...     print(refusal.field, refusal.value, refusal.nearest)
+    diameter_mm 3.0 12.2
     """
 
     file: str | None = None

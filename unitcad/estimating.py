@@ -9,7 +9,6 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from unitcad.attenuation.edge.closed_form import CONTROL_PASSES
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded, rounded_layered
 from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.attenuation.edge.variant_units import merged
@@ -23,7 +22,7 @@ from unitcad.spec import Spec
 from unitcad.validation.fit_text import lab_fit
 
 _MOTOR_DENSITY = (4000.0, 5000.0, 6500.0)  # kg/m3: low, value, high
-MECHANICS = "mechanics"
+FEM = "fem"
 """The model by finite elements: a range, costly, and only made when it is asked for."""
 
 
@@ -36,22 +35,21 @@ def estimate_spec(
 ) -> dict[str, Any]:
     """Return the estimate of a spec as JSON-ready data (`attenuation.edge.estimates`); same spec, same data.
 
-    The model `mechanics` is a range for each drive and reading, under the key "mechanics"; it costs seconds and needs
-    scikit-fem. `say` gets the progress.
+    The model `fem` is a range for each drive and reading, under the key "fem"; it costs seconds and needs scikit-fem.
+    `say` gets the progress.
 
     Raises `Refusal` if no frequency is known, for an unknown material or tissue, and for values no body has.
     """
     variant, asked = estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models)
-    stack = spec.estimate.stack if models is None and spec.estimate.fit is None else None
-    data = estimate(variant, closed_forms(asked), layered, fit_of(spec), stack)
+    data = estimate(variant, closed_forms(asked), layered, fit_of(spec))
     if "fit" in data:
         data["fit"] = {**_fit_file(spec), **data["fit"]}
-    if MECHANICS in asked:
-        from unitcad.attenuation.mechanics.prior_range import range_block
-        from unitcad.attenuation.mechanics.sensitivities import mechanics_inputs
+    if FEM in asked:
+        from unitcad.attenuation.fem.prior_range import range_block
+        from unitcad.attenuation.fem.sensitivities import fem_inputs
 
         block = range_block(variant, say=say)
-        data[MECHANICS] = rounded({**block, "inputs_seen": mechanics_inputs(variant, say)})
+        data[FEM] = rounded({**block, "inputs_seen": fem_inputs(variant, say)})
     return data
 
 
@@ -69,8 +67,8 @@ def _fit_file(spec: Spec) -> dict[str, Any]:
 
 
 def closed_forms(models: Sequence[str]) -> tuple[str, ...]:
-    """Return the models of a list that are formulas: all but `mechanics`."""
-    return tuple(model for model in models if model != MECHANICS)
+    """Return the models of a list that are formulas: all but `fem`."""
+    return tuple(model for model in models if model != FEM)
 
 
 def frequency_table_of_spec(
@@ -115,7 +113,7 @@ def drawn_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
     return EstimateInput(
         name=spec.name,
         design=spec.design,
-        passes=CONTROL_PASSES if len(spec.layers) == 1 else passes,
+        passes=passes,
         diameter=spec.diameter_mm * 1e-3,
         geometry=_geometry(spec, motor_mass(spec, motor)),
         layers=tuple(
@@ -202,9 +200,7 @@ def _quasistatic(material: Material) -> Quantity:
     if value is None:
         return Quantity(None, note="no quasistatic_modulus_kpa is known, which estimate.moduli asks for")
     how = f" ({value.method})" if value.method else ""
-    return replace(
-        _quantity(value, 1e3), note=f"quasi-static, softer than at the motor's frequency{how}; {value.source}"
-    )
+    return replace(_quantity(value, 1e3), note=f"quasi-static{how}; {value.source}")
 
 
 def _no_modulus(material: Material) -> str:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from benchmarks.accuracy import runner
-from benchmarks.accuracy.result import markdown
+from benchmarks.accuracy.pages import markdown
 from unitcad.cli.output import form_of, print_json, progress, say_error
 from unitcad.errors import Missing, Refusal, UnitcadError
 
@@ -29,7 +29,7 @@ def accuracy(
     out: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--out", help="Folder of accuracy.md, its pages and accuracy.json; default: docs, none if quick."
+            "-o", "--out", help="Folder of the pages and accuracy.json; default: docs/evidence, none if quick."
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
@@ -51,7 +51,7 @@ def accuracy(
         raise Refusal("--quick", "set", f"does not go with {option}, which says how many; leave one out")
     results = []
     left_out: dict[str, str] = {}
-    folder = out if out is not None or quick else Path("docs")
+    folder = out if out is not None or quick else Path("docs") / "evidence"
     if folder is not None:
         runner.ready(folder)
     for name in suites or ():

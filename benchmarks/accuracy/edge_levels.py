@@ -10,24 +10,24 @@ from functools import cache, partial
 import numpy as np
 from msgspec.structs import replace
 
+from benchmarks.accuracy.fem_search import unit_spec
 from benchmarks.accuracy.level_scores import score_tables
 from benchmarks.accuracy.machine import machine
-from benchmarks.accuracy.mechanics_search import unit_spec
 from benchmarks.accuracy.result import Cell, Plot, Promise, Result, Say, Summary, Table, stars
 from benchmarks.accuracy.unexplained import NineLevels, unexplained
 from unitcad.accuracy.timing import Timing, interleaved, timing
-from unitcad.attenuation.edge.fitted_models import MODELS, assessments, compared, edge_levels, in_order, stored
 from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable, measured_table
+from unitcad.attenuation.edge.models import COMPARED, MODELS, assessments, edge_levels, in_order, stored
 from unitcad.attenuation.edge.scores import Assessment, Fit, assess
+from unitcad.attenuation.fem.motor_level import Setting, amplitude, motion, pressed_skin
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
-from unitcad.attenuation.mechanics.motor_level import Setting, amplitude, motion, pressed_skin
 from unitcad.catalogue import measurements
 from unitcad.estimating import estimate_input
 from unitcad.spec import Spec
 from unitcad.validation import default_template, load
 
-_TITLES = {"null": "null: soft inside or not", "crossings": "crossings (k_t once or twice)"}
+_TITLES = {"baseline": "baseline: four class means", "crossings": "crossings (k_t once or twice)"}
 _DRAWN, _BARE = "finite elements, as drawn", "finite elements, without the circuit"
 _RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3
 
@@ -42,20 +42,20 @@ class _Model:
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Compare closed forms, null model and finite elements with the measured levels and ratios.
+    """Compare closed forms, baseline and finite elements with the measured levels and ratios.
 
     Bare skin and mesh convergence come with them.
     """
     table = measured_table()
     everyone = np.ones((1, len(table.names)), dtype=bool)
-    levels = {name: one.fit(table, everyone)[0] for name, one in compared().items()}
+    levels = {name: one.levels(table, everyone)[0] for name, one in COMPARED.items()}
     calls: dict[str, Callable[[], object]] = {
-        name: lambda name=name: edge_levels(table.units(4), name) for name in MODELS
+        name: lambda name=name: edge_levels(table.inputs[4], name) for name in MODELS
     }
     times = interleaved(calls, 21)
     models = {
         _TITLES.get(name, name): _Model(
-            assessments()[name], times[name if name in times else "paper"], str(compared()[name].constants)
+            assessments()[name], times[name if name in times else "published"], str(len(COMPARED[name].names))
         )
         for name in in_order(assessments())
     }
@@ -73,11 +73,11 @@ def run(quick: bool, say: Say) -> Result:
         "Against nine levels and twelve ratios to controls: geometric-mean factor error (1 is exact)",
         ("model", "constants", "levels", "left out", "ratios", "left out", "directions", "time a level", "frontier"),
         tuple((*_row(name, model), mark) for (name, model), mark in zip(models.items(), marks, strict=True)),
-        "Best score with a unit left out first. The divider's constants, fitted when this runs: kappa "
-        f"{stored()['fitted']['kappa']:.4g}, s {stored()['fitted']['s']:.4g}. Left out: each unit by constants fitted "
-        "without it. Directions: of twelve ratios, how many lie on the right side of 1. crossings and null take the "
-        "time of paper. The finite elements' time is the median over their solutions, one run each; the others are of "
-        "21 runs.",
+        "Best score with a unit left out first. The rule's constants, fitted when this runs: s "
+        f"{stored()['rule']['s']:.4g}, q {stored()['rule']['q']:.4g}. Left out: each unit by constants fitted "
+        "without it. Directions: of twelve ratios, how many lie on the right side of 1. crossings and baseline take "
+        "the time of published. The finite elements' time is the median over their solutions, one run each; the "
+        "others are of 21 runs.",
     )
     plot = Plot(
         "Error against the measured levels, each unit left out, against time",
@@ -110,7 +110,7 @@ def run(quick: bool, say: Say) -> Result:
     return Result(
         suite="models",
         title="Models of the edge level",
-        text=unexplained(table, solved, closed, assessments()["paper"]),
+        text=unexplained(table, solved, closed, assessments()["published"]),
         tables=(comparison, *scores, _units_table(table, closed, solved), meshes, bare),
         plots=(plot,),
         promises=(
@@ -181,11 +181,11 @@ def _measured(table: MeasuredTable, unit: str) -> float:
 def _units_table(table: MeasuredTable, closed: dict[str, NineLevels], solved: dict[str, NineLevels]) -> Table:
     rows: list[tuple] = []
     for i, name in enumerate(table.names):
-        models = [level for model in ("bush", "fitted", "paper") for level in closed[model].levels[name].values()]
+        models = [level for model in ("rule", "published", "divider") for level in closed[model].levels[name].values()]
         rows.append((name, float(table.levels[i]), *models, *(levels.shown(name) for levels in solved.values())))
     return Table(
         "Each unit's edge level, motor = 1",
-        ("unit", "measured", "bush", "fitted", "paper", *solved),
+        ("unit", "measured", "rule", "published", "divider", *solved),
         tuple(rows),
         "The models carry constants from all nine levels, the finite elements none. The paper does not say in "
         "which shape a control was measured, so its finite-element level is the geometric mean of both, shown beside "

@@ -62,11 +62,11 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
         suite="extremes",
         title="Extreme geometry and random specs",
         text=(
-            f"{len(jobs)} specs: sweeps of the {' and '.join(shipped())} templates to each limit and past it, and "
-            f"random specs from the documented ranges below ({documented}) and from the extreme ones "
-            f"({count - documented}, half of them with one cavity), every field drawn by itself. Each is "
-            "built (unit, moulds, STL, all mould checks, all mesh checks) or refused with a field; after a refusal its "
-            "nearest accepted value is put in until it builds or no value is offered. Anything else is a fault."
+            f"{len(jobs)} specs: sweeps of the {' and '.join(shipped())} templates to each limit and past it. In "
+            f"addition, random specs from the documented ranges below ({documented}) and from the extreme ones "
+            f"({count - documented}, half of them with one cavity), every field drawn independently. Each is built "
+            "with all checks, or refused with a field. After a refusal, the nearest accepted value is put in until "
+            "it builds or no value is offered. Anything else is a fault."
         ),
         tables=(
             _outcome_table(groups),

@@ -8,15 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.accuracy.result import Promise, Table
-from unitcad.attenuation.edge.fitted_models import (
+from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
+from unitcad.attenuation.edge.models import (
+    BASELINE,
+    COMPARED,
+    RULE,
     assessments,
     choice,
-    compared,
+    classes_out,
     forms,
     in_order,
     pairwise,
+    rules,
 )
-from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
 from unitcad.attenuation.edge.scores import RANGE_HOLDS, Fit, assess, bootstrap_range, left_out_errors, sign_flip_p
 
 LEVEL = 0.05
@@ -49,21 +53,24 @@ def with_levels(table: MeasuredTable, levels: np.ndarray) -> MeasuredTable:
 
 
 def simulated(truth: str, count: int, table: MeasuredTable) -> Study:
-    """Make tables by a one-constant model and log-normal noise as large as its own misfit, and score its rivals.
+    """Make tables by a log-linear model and log-normal noise as large as its own misfit, and score its rivals.
 
-    The truth's score with a unit left out is then known: exp(noise sqrt(2/pi) sqrt(n/(n - 1))).
+    The truth's score with a unit left out is then known: exp of the mean of noise sqrt(2/pi / (1 - h)), h the units'
+    leverages.
     """
-    models = compared()
-    fit, units = models[truth].fit, len(table.names)
-    exact = fit(table, np.ones((1, units), dtype=bool))[0]
-    noise = float(np.std(np.log(table.levels / exact), ddof=1))
-    own_score = noise * math.sqrt(2.0 / math.pi * units / (units - 1))
+    models, units = COMPARED, len(table.names)
+    everyone = np.ones((1, units))
+    exact = models[truth].levels(table, everyone)[0]
+    x = table.mean(lambda one: models[truth].gradient(one, models[truth].fit(table, everyone)[0]))
+    leverage = np.diag(x @ np.linalg.pinv(x))
+    noise = float(np.sqrt(np.sum(np.log(table.levels / exact) ** 2) / (units - x.shape[1])))
+    own_score = float(np.mean(noise * np.sqrt(2.0 / math.pi / (1.0 - leverage))))
     rng = np.random.default_rng(_SEED)
     holds = first = false = 0
     told = dict.fromkeys((name for name in models if name != truth), 0)
     for _ in range(count):
         made = with_levels(table, exact * np.exp(noise * rng.standard_normal(units)))
-        errors = {name: left_out_errors(model.fit, made) for name, model in models.items()}
+        errors = {name: left_out_errors(model.levels, made) for name, model in models.items()}
         low, high = np.log(bootstrap_range(errors[truth]))
         holds += bool(low <= own_score <= high)
         first += all(errors[truth].mean() <= errors[name].mean() for name in told)
@@ -89,7 +96,7 @@ def _off(exact: np.ndarray, noise: float, rng: np.random.Generator) -> Fit:
 
 def permutation_p(name: str, count: int, table: MeasuredTable) -> float:
     """Return how often the model's left-out score is as good on levels shuffled among the units; seeded."""
-    fit = compared()[name].fit
+    fit = COMPARED[name].levels
     rng = np.random.default_rng(_SEED)
     observed = left_out_errors(fit, table).mean()
     shuffled = (left_out_errors(fit, with_levels(table, rng.permutation(table.levels))).mean() for _ in range(count))
@@ -106,7 +113,7 @@ def score_tables(count: int) -> tuple[tuple[Table, ...], tuple[Promise, ...]]:
     rows = tuple(
         (
             name,
-            compared()[name].constants,
+            len(COMPARED[name].names),
             found[name].left_out.geometric_mean,
             "{:.2f} to {:.2f}".format(*found[name].left_out_range),
             against.get(name),
@@ -114,7 +121,7 @@ def score_tables(count: int) -> tuple[tuple[Table, ...], tuple[Promise, ...]]:
         )
         for name in order
     )
-    study = simulated(next(name for name in order if compared()[name].constants == 1), count, table)
+    study = simulated(RULE, count, table)
     error = math.sqrt(LEVEL * (1 - LEVEL) / count)
     chosen = choice()
     scores = Table(
@@ -123,9 +130,9 @@ def score_tables(count: int) -> tuple[tuple[Table, ...], tuple[Promise, ...]]:
         rows,
         f"Range: 5 to 95 % over units drawn again; it is too narrow, see the simulated tables. p: sign-flip test of "
         f"the paired errors, all {2**9} patterns; and how often a score is as good when the levels "
-        f"are shuffled among the units ({count} times). Choosing among all {len(forms())} forms without the unit too "
-        f"scores {chosen.score.geometric_mean:.2f} "
-        f"({chosen.range[0]:.2f} to {chosen.range[1]:.2f}).",
+        f"are shuffled among the units ({count} times). The rule, its form chosen among {len(rules())} without the "
+        f"unit too, scores {chosen.score.geometric_mean:.2f} ({chosen.range[0]:.2f} to {chosen.range[1]:.2f}), worst "
+        f"{chosen.score.worst:.2f}.",
     )
     tried = Table(
         "Every form that was tried",
@@ -135,7 +142,14 @@ def score_tables(count: int) -> tuple[tuple[Table, ...], tuple[Promise, ...]]:
             for name, fit in forms().items()
             for one in [assess(fit, False, table)]
         ),
-        "Chosen: for how many of the nine units it is the best form on the other eight.",
+        "Chosen: for how many of the nine units it is the best form of the rule on the other eight.",
+    )
+    by_class = classes_out()
+    classes = Table(
+        "Error on a class of units that the fit did not have",
+        ("class left out", *order),
+        tuple((name, *(errors[model] for model in order)) for name, errors in by_class.items()),
+        f"The {BASELINE} has no mean of the class and takes that of all other units. Four classes calibrate nothing.",
     )
     power = Table(
         f"What nine units can tell: {count} simulated tables, truth {study.truth}, noise {study.noise:.2f} of ln level",
@@ -161,4 +175,4 @@ def score_tables(count: int) -> tuple[tuple[Table, ...], tuple[Promise, ...]]:
         ),
         Promise(f"{best}: p of its left-out score, levels shuffled", p[best], LEVEL),
     )
-    return (scores, tried, power), promises
+    return (scores, classes, tried, power), promises

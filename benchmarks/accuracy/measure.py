@@ -67,12 +67,13 @@ def run(quick: bool, say: Say) -> Result:
         suite="measure",
         title="Signal chains of a measurement",
         text=(
-            f"Amplitudes of synthetic records of {LENGTH_S:g} s at {RATE / 1000:g} kHz whose truth is known, by this "
-            "program's chains `line` and `bandpass` and by four in use, all on the same records: 12 to 300 um, "
+            f"Amplitudes of synthetic records of {LENGTH_S:g} s at {RATE / 1000:g} kHz whose truth is known. The "
+            "chains are unitcad's `line` and `bandpass` and four in use, all on the same records. These have 12 to "
+            "300 um, "
             f"100 to 150 Hz, drift of the frequency {100 * WHOLE.drift:g} %, wander of the amplitude "
             f"{100 * WHOLE.wander:g} %, mains, harmonics, spin-up, noise of 1/{WHOLE.snr:g}. The truth is the "
             "amplitude's mean over the record once the motor runs. A comb at 50 Hz takes 100 and 150 Hz away: there "
-            "the chain of the paper reads next to nothing."
+            "the chain `bandpass` reads next to nothing."
         ),
         tables=(
             Table(
@@ -107,14 +108,14 @@ def run(quick: bool, say: Say) -> Result:
                     )
                     for c in coverage
                 ),
-                "The bound is that of each record, from the Fisher information of the whole model: phase, frequency, "
-                "harmonics, offset, slope and the mains' phases are unknown, the mains' amplitudes are those of a "
-                "motor-off record, and of a sample that is cut off only the side is known. It grows by 3.3 where the "
+                "The bound is that of each record, from the Fisher information of the whole model. Unknown are "
+                "phase, frequency, harmonics, offset, slope and the mains' phases. The mains' amplitudes are those "
+                "of a motor-off record. Of a clipped sample only the side is known. It grows by 3.3 where the "
                 "line is cut off at 0.8, and up to 28 beside 100 and 150 Hz. Within 0.75 Hz of those the record alone "
                 "can't tell a line from the mains in 2 s (L105). The promise of 94 % is of the column "
-                '"within 2 u": the amplitude that the record had. The last column asks for the amplitude that a '
-                "wandering motor has in the long run, of which 2 s say little, and is promised by no figure: repeats "
-                "are for that.",
+                '"within 2 u": the amplitude that the record had. The last column is about the long-run '
+                "amplitude of a wandering motor, of which 2 s show little. Nothing is promised for it: repeats are "
+                "for that.",
             ),
             Table(
                 "Gain of the paper's filters (order 4, Q 30: assumed)",

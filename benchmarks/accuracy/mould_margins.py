@@ -88,7 +88,7 @@ def _seconds(spec: Spec) -> tuple[float, list[FindingRecord]]:
     """Return the seconds that the mould checks of a spec take, and what they found. Raises Refusal."""
     stages = Progress()
     manifest = Subject(spec).make(("unit", "moulds"), True, MemoryStore(), stages).manifest
-    return stages.seconds["mould checks"], manifest["laws"]
+    return stages.seconds["mould checks"], manifest["mould_checks"]
 
 
 def closest(rows: Sequence[tuple]) -> str:

@@ -1,28 +1,21 @@
-"""The front page, accuracy.md, and beside it a folder with a page and the plots of every suite."""
+"""The front page, accuracy.md, and a folder with a page and the plots of every suite."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.accuracy.answers import answer, question
 from benchmarks.accuracy.plot import svg
-from benchmarks.accuracy.result import Result, Table, kept, markdown, table_lines
+from benchmarks.accuracy.result import Result, Table, kept, measured_on, table_lines
 from unitcad import files
 
 FOLDER = "accuracy"
-PICTURES = ("tessellation", "hankel", "stability", "models")
-"""Suites whose plot the front page shows. The others' plots are on their own pages."""
 HEAD = """# Accuracy
 
-Errors against exact or independent references, beside what they cost. In a clone, `python -m benchmarks.accuracy`
-computes all of it and writes these pages; `accuracy.json` holds the same numbers. Run times are medians, taken in turn
-in one run: compare them within a table only, since seconds differ between machines. A star in a table marks the
-frontier: nothing in it is both faster and more exact. A plus after a commit: the code that ran had changes that this
-commit does not hold.
-
-`unitcad accuracy SPEC` measures error, bound and run time for one spec: its meshes at five tolerances, the response of
-the body at five rtols, the inputs that move the results most, and the time that a build saves by what it leaves out.
-Without SPEC it checks the bounds of random media and builds random specs.
+Each suite answers one question with one number, against exact or independent references. In a clone,
+`python -m benchmarks.accuracy` runs them and writes these pages and `accuracy.json`. Run times are medians of one run:
+compare them within a table only. `unitcad accuracy SPEC` measures errors, bounds and times for your own spec.
 """
 
 
@@ -41,39 +34,53 @@ def write(results: Sequence[Result], folder: Path) -> None:
 
 
 def front(results: Sequence[Result]) -> str:
-    """Return the front page: what to pick, the plots of `PICTURES`, and a line on every suite."""
-    lines = [HEAD]
-    picks = tuple(pick for result in results for pick in result.summary.picks)
-    if picks:
-        lines += ["## What to pick", "", *table_lines(Table("", ("for", "error", "pick"), picks)), ""]
-    drawn = [_drawn(result) for result in results if result.suite in PICTURES and result.summary.plot is not None]
-    if drawn:
-        cells = [*drawn, *[""] * (len(drawn) % 2)]
-        rows = [f"| {left} | {right} |" for left, right in zip(cells[::2], cells[1::2], strict=True)]
-        lines += ["## In pictures", "", rows[0], "| --- | --- |", *rows[1:], ""]
-    suites = tuple(
-        (f"[{r.title}]({FOLDER}/{r.suite}.md)", r.summary.worst or None, _promised(r), _when(r)) for r in results
+    """Return the front page: a line for every suite."""
+    rows = tuple(
+        (
+            f"[{question(result)}]({FOLDER}/{result.suite}.md)",
+            answer(result) or None,
+            _promised(result),
+            result.measured.get("date"),
+        )
+        for result in results
     )
-    lines += ["## Every suite", ""]
-    lines += [*table_lines(Table("", ("page", "worst case", "promises", "measured"), suites)), ""]
-    return "\n".join(lines)
+    return "\n".join([HEAD, *table_lines(Table("", ("question", "answer", "promises", "measured"), rows)), ""])
+
+
+def markdown(result: Result, picture: Sequence[str] | None = None) -> str:
+    """Return the suite's page; `picture[i]` is the file of plot i, None links no pictures.
+
+    Question, answer, one plot and one table are shown; method, promises, other plots and tables are folded.
+    """
+    command = f"python -m benchmarks.accuracy {result.suite} {result.options}".strip()
+    lines = [f"# {result.title}", "", f"**{question(result)}** {answer(result)}".rstrip(), ""]
+    broken = tuple((p.what, p.value, p.limit) for p in result.promises if not p.ok)
+    if broken:
+        lines += ["**Broken promises**", "", *table_lines(Table("", ("promise", "value", "limit"), broken)), ""]
+    plots = list(zip(result.plots, picture, strict=True)) if picture is not None else []
+    first = result.summary.plot or 0
+    lines += [line for plot, file in plots[first : first + 1] for line in (f"![{plot.title}]({file})", "")]
+    picks = [Table("Choices", ("task", "error", "choice"), result.summary.picks)] if result.summary.picks else []
+    tables = [*picks, *result.tables]
+    lines += [line for table in tables[:1] for line in _titled(table)]
+    lines += ['<details markdown="1">', "<summary>Method, promises and all tables</summary>", "", result.text, ""]
+    lines += [f"`{command}`; measured on: {measured_on(result)}.", ""]
+    if result.promises:
+        lines += [f"{kept(result.promises)}.", ""]
+    for plot, file in (*plots[:first], *plots[first + 1 :]):
+        lines += [f"![{plot.title}]({file})", ""]
+    lines += [line for table in tables[1:] for line in _titled(table)]
+    return "\n".join([*lines, "</details>", ""])
+
+
+def _titled(table: Table) -> list[str]:
+    return [f"**{table.title}**", "", *table_lines(table), "", *([table.note, ""] if table.note else [])]
 
 
 def _plots(result: Result) -> list[str]:
     return [f"{result.suite}-{i + 1}.svg" for i in range(len(result.plots))]
 
 
-def _drawn(result: Result) -> str:
-    number = result.summary.plot or 0
-    title = result.plots[number].title
-    return f"[![{title}]({FOLDER}/{_plots(result)[number]})]({FOLDER}/{result.suite}.md)"
-
-
 def _promised(result: Result) -> str | None:
-    """Say how many promises are kept."""
+    """Return the number of promises, and of broken ones."""
     return kept(result.promises).partition(";")[0] if result.promises else None
-
-
-def _when(result: Result) -> str:
-    """Return date and commit of the measurement."""
-    return ", ".join(str(result.measured[name]) for name in ("date", "commit") if name in result.measured)

@@ -147,26 +147,8 @@ def shown(value: Cell) -> str:
     return str(value)
 
 
-def markdown(result: Result, picture: Sequence[str] | None = None) -> str:
-    """Return the suite's page; `picture[i]` is the file of plot i, None links no pictures."""
-    command = f"python -m benchmarks.accuracy {result.suite} {result.options}".strip()
-    lines = [f"# {result.title}", "", result.text, "", f"`{command}`; measured on: {measured_on(result)}.", ""]
-    if result.promises:
-        lines += [f"{kept(result.promises)}.", ""]
-    broken = tuple((p.what, p.value, p.limit) for p in result.promises if not p.ok)
-    if broken:
-        lines += ["**Broken promises**", "", *table_lines(Table("", ("what", "value", "limit"), broken)), ""]
-    for plot, file in zip(result.plots, picture, strict=True) if picture is not None else ():
-        lines += [f"![{plot.title}]({file})", ""]
-    for table in result.tables:
-        lines += [f"**{table.title}**", "", *table_lines(table), ""]
-        if table.note:
-            lines += [table.note, ""]
-    return "\n".join(lines)
-
-
 def measured_on(result: Result) -> str:
-    """Return on what a result was measured, in a line."""
+    """Return machine, versions and date of a measurement, in a line."""
     return ", ".join(f"{name} {value}" for name, value in result.measured.items())
 
 

@@ -22,7 +22,8 @@ MODULES = {
     "hankel": "hankel",
     "stability": "stability",
     "models": "edge_levels",
-    "mechanics": "unit_elements",
+    "fem": "unit_elements",
+    "skin": "skin_curve",
     "design": "proposal_reliability",
     "extremes": "extremes",
     "left-out": "left_out",
@@ -38,8 +39,8 @@ NEEDS = {
     "hankel": {**_REFERENCE, "libdlf": "fem"},
     "stability": _REFERENCE,
     "models": _ELEMENTS,
-    "mechanics": _ELEMENTS,
-    "design": {"optuna": "test"},
+    "fem": _ELEMENTS,
+    "skin": _ELEMENTS,
 }
 """What a suite imports beyond the core: each module, and the extra that installs it."""
 

@@ -115,17 +115,17 @@ def study(media: int, say: Say, seed: int = 0, journal: Path | None = None, ever
         text=(
             f"Surface compliance at {len(known)} seeded cases against 60-digit values by another method (the global "
             "matrix, mpmath), normwise and over the problem's own condition number. The plain Thomson-Haskell "
-            "propagator, which multiplies growing exponentials and keeps P and S apart as omega goes to 0, stands "
-            "beside it: it is wrong by more than one percent times the condition number, or no number, in the share of "
-            "cases shown. **What unitcad promises**: compliance to 1e-13 times the condition number (which is large "
-            f"beside branch points: here up to {condition.max():.0e}, with a plain error of up to {error.max():.1e}) "
-            "for nu from 0 to 1/2 exactly, contrast 1e-8 to 1e8, thickness 1e-9 to 0.1 m, omega from 0 to 6e3 rad/s, "
-            f"k h up to {max(case.kh for case in known):.0e}, any damping or none; the response's error below "
-            "`error_r` and `error_z` at each radius, whether or not rtol was reached. The responses below are compared "
-            "with a reference that shares no code with the solver: the global matrix in balls of 128 bits and more "
-            "(python-flint), its own panels, its own closed forms. A film thinner than some micrometres, or one that "
-            "is nearly fluid, needs more wavenumbers than are spent: there a small rtol is often not met, and the "
-            "errors stay at what was reached."
+            "propagator multiplies growing exponentials and keeps P and S apart as omega goes to 0. It is wrong by "
+            "more than one percent times the condition number, or no number, in the share of cases shown. **unitcad "
+            "promises** two bounds. The compliance is within 1e-13 times the condition number, which is large near "
+            f"branch points (here up to {condition.max():.0e}, with a plain error of up to {error.max():.1e}). "
+            "The range: nu from 0 to 1/2 exactly, contrast 1e-8 to 1e8, thickness 1e-9 to 0.1 m, omega from 0 to 6e3 "
+            "rad/s, "
+            f"k h up to {max(case.kh for case in known):.0e}, any damping or none. The response's error is below "
+            "`error_r` and `error_z` at each radius, whether or not rtol was reached. The reference of the responses "
+            "shares no code with the solver: the global matrix in balls of 128 bits and more (python-flint), with "
+            "its own panels and closed forms. A film thinner than some micrometres, or nearly fluid, needs more "
+            "wavenumbers than the limit: a small rtol is then often not met."
         ),
         tables=(
             Table(
@@ -197,7 +197,7 @@ def _where_it_breaks(known: list[Case], errors: np.ndarray) -> str:
     rest = ~(deep | slow)
     return (
         f"Thomson-Haskell is off by more than 1 % in {_share(errors[deep])} of the cases with k h above 15 (growing "
-        f"exponentials), in {_share(errors[slow])} of those below 0.1 rad/s (P and S cancel), and in "
+        f"exponentials). It is so in {_share(errors[slow])} of those below 0.1 rad/s (P and S cancel), and in "
         f"{_share(errors[rest])} of all others."
     )
 

@@ -15,7 +15,7 @@ from unitcad.accuracy.timing import Timing, interleaved
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Shape
-from unitcad.spec.asked import OutputTable
+from unitcad.spec.raw import OutputTable
 from unitcad.validation import default_template, load
 
 ANGLE = 0.1
@@ -66,12 +66,12 @@ def run(quick: bool, say: Say) -> Result:
         title="Tessellation: error against time and triangles",
         text=(
             "manifold3d draws a circle as a polygon, either through the circle's points (plain) or with the circle's "
-            f"area (area-true: what unitcad uses). The {REVOLVED} is revolved alone, so its area-true volume is exact "
-            "to rounding at any tolerance; the other bodies have extruded parts as well (a layer has the slot of its "
-            "tail), and where these meet a revolved face a little volume is off. build123d and CadQuery each "
+            f"area (area-true, unitcad's way). The {REVOLVED} is only revolved, so its area-true volume is exact "
+            "to rounding at any tolerance. The other bodies have extruded parts too, such as the slot of a tail. "
+            "Where these meet a revolved face, a little volume is off. build123d and CadQuery each "
             f"tessellate their own solid by their own `tessellate`, at its default angle of {ANGLE} rad. Both call "
             f"OCCT's mesher{_same_triangles(by_body)}. Distance is one-sided: the farthest that any of {_SAMPLES} "
-            "sampled vertices, edge middles and face centres of the mesh lies from the B-rep's surface. "
+            "sampled vertices, edge middles and face centres of the mesh is from the B-rep's surface. "
             f"{_default(by_body, tolerances)}"
         ),
         tables=tuple(tables),

@@ -48,7 +48,7 @@ def unexplained(
 
     `solved`: finite elements by variant, as drawn first; `closed`: the models; `paper`: the paper's assessment.
     """
-    soft = tuple(name for name, inside in zip(table.names, table.soft_inside, strict=True) if inside)
+    soft = tuple(name for name, inside in zip(table.names, table.classes >= 2, strict=True) if inside)
     controls = tuple(name for name in table.names if name.startswith(CONTROL))
     measured = dict(zip(table.names, table.levels.tolist(), strict=True))
     everywhere = ", ".join(f"{_span(levels.range(table.names))} ({name})" for name, levels in solved.items())
@@ -68,7 +68,7 @@ def unexplained(
         "little to be the reason (as drawn: its table is below). Of the inputs only the circuit was varied, and its "
         f"stiffness is assumed: without it a level becomes up to {moved[most]:.2g} times what it was ({most}). "
         "Without the circuit Layer 1 fills the space between motor and cap. Not varied here, most of it in the model "
-        "`mechanics`: the motor's axis and the sideways force of a flat ERM, the contact (bonded here), the phantom, "
+        "`fem`: the motor's axis and the sideways force of a flat ERM, the contact (bonded here), the phantom, "
         "what the measured amplitudes were divided by, the small-strain moduli and damping of the silicones, the air "
         "gap beside the motor, the rigid motor, the tail and its slot (the finite elements are axisymmetric). Any "
         "could be the reason; none is shown to be."
@@ -104,7 +104,7 @@ def _thinness(table: MeasuredTable) -> str:
     """Return the layers of the layered units over their shear wavelength, thickest and thinnest."""
     shares = []
     for i, layers in enumerate(table.layers):
-        u = table.units(i)
+        u = table.inputs[i]
         if len(layers) > 1:
             speed = wave_speed(u.youngs_modulus, u.density, u.poisson_ratio, "s")
             shares += np.ravel(2 * np.pi * speed / u.omega / u.thickness).tolist()

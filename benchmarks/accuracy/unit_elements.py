@@ -7,14 +7,14 @@ from functools import partial
 
 import numpy as np
 
+from benchmarks.accuracy.fem_search import DRIVES, READINGS, drawn_levels, searches, unit_spec
 from benchmarks.accuracy.machine import machine
-from benchmarks.accuracy.mechanics_search import DRIVES, READINGS, drawn_levels, searches, unit_spec
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, interleaved
+from unitcad.attenuation.fem.motor_level import Drive, Setting, amplitude, motion, pressed_skin
+from unitcad.attenuation.fem.unknowns import Draw, drawn
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
-from unitcad.attenuation.mechanics.motor_level import Drive, Setting, amplitude, motion, pressed_skin
-from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 from unitcad.catalogue import measurements
 from unitcad.estimating import estimate_input
 from unitcad.validation import default_template, load
@@ -40,7 +40,7 @@ def run(quick: bool, say: Say) -> Result:
     typical, worst = _draws_by_mesh(3 if quick else 12)
     tables = [meshes, bare]
     text = (
-        "Finite elements of unit and body, model `mechanics`: harmonic 0 for an axial motor, 1 for a flat one. At "
+        "Finite elements of unit and body, model `fem`: harmonic 0 for an axial motor, 1 for a flat one. At "
         f"fineness {_USED:g}, which a level has by default, bonded units are within {off[_USED]:.1e} of their limit, "
         f"at {_COARSE:g} within {off[_COARSE]:.1e}. Draws of what is not known, near a resonance or with small levels "
         f"some of them, change by a median of {typical:.1e} and by {worst:.1e} at most from fineness {_USED:g} to "
@@ -52,7 +52,7 @@ def run(quick: bool, say: Say) -> Result:
         tables.append(searched)
         text += said
     return Result(
-        suite="mechanics",
+        suite="fem",
         title="Finite elements of a unit",
         text=text,
         tables=tuple(tables),
@@ -67,7 +67,7 @@ def run(quick: bool, say: Say) -> Result:
         measured=machine("numpy", "scipy", "scikit-fem"),
         summary=Summary(
             picks=(
-                ("a level of `mechanics`", f"{off[_USED]:.1e}", f"fineness {_USED:g}"),
+                ("a level of `fem`", f"{off[_USED]:.1e}", f"fineness {_USED:g}"),
                 ("the same, bonded, a try of many", f"{off[_COARSE]:.1e}", f"fineness {_COARSE:g}"),
             ),
             worst=f"a draw at fineness {_USED:g}: {worst:.1e} from fineness {_FINER:g}",

@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.accuracy.level_scores import simulated
 from benchmarks.accuracy.unexplained import NineLevels, unexplained
-from unitcad.attenuation.edge.fitted_models import assessments
 from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.models import assessments
 from unitcad.attenuation.edge.scores import RANGE_HOLDS
 
 NAMES = measured_table().names
@@ -25,7 +25,7 @@ def levels(change=None):
 
 
 def said(drawn, bare):
-    return unexplained(measured_table(), {"drawn": drawn, "bare": bare}, {}, assessments()["paper"])
+    return unexplained(measured_table(), {"drawn": drawn, "bare": bare}, {}, assessments()["published"])
 
 
 def test_a_control_is_the_geometric_mean_of_its_shapes_and_shows_both():
@@ -52,19 +52,19 @@ def test_who_gives_the_measured_orders_is_found_and_a_tie_is_no_order():
     measured = dict(zip(NAMES, measured_table().levels, strict=True))
     ordered = NineLevels({name: {"": float(level)} for name, level in measured.items()})
     solved = {"drawn": levels(), "bare": levels()}
-    text = unexplained(measured_table(), solved, {"table": ordered}, assessments()["paper"])
+    text = unexplained(measured_table(), solved, {"table": ordered}, assessments()["published"])
     assert "D10 < E10 < D30, is given by table." in text
     assert text.count("is given by table.") == 3
 
 
 def test_the_estimates_page_says_how_often_the_range_misses():
     """Of 1000 simulated tables, as the suite takes: a range of 90 % that holds in fewer is said so where it stands."""
-    misses = 1 - simulated("bush", 1000, measured_table()).holds
-    page = (Path(__file__).parents[2] / "docs" / "model.md").read_text("utf-8")
-    assert page.count(f"{100 * misses:.0f} % of them, not in 10 %") == 2
+    misses = 1 - simulated("rule", 1000, measured_table()).holds
+    page = (Path(__file__).parents[2] / "docs" / "explanation" / "estimate.md").read_text("utf-8")
+    assert page.count(f"{100 * misses:.0f} % of them, not in 10 %") == 1
     assert misses <= 1 - RANGE_HOLDS
 
 
 def test_the_page_says_what_fills_the_space_of_a_left_out_circuit():
-    page = (Path(__file__).parents[2] / "docs" / "accuracy" / "models.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "evidence" / "accuracy" / "models.md").read_text("utf-8")
     assert re.search(r"Without the circuit Layer 1 (now )?fills the space between motor and cap", page)

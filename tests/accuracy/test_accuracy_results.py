@@ -12,19 +12,18 @@ from pathlib import Path
 import pytest
 
 from benchmarks.accuracy import runner
+from benchmarks.accuracy.answers import answer, question
 from benchmarks.accuracy.command import accuracy
-from benchmarks.accuracy.pages import front
+from benchmarks.accuracy.pages import front, markdown
 from benchmarks.accuracy.plot import svg
 from benchmarks.accuracy.result import (
     Plot,
     Promise,
     Result,
-    Summary,
     Table,
     fastest,
     frontier,
     kept,
-    markdown,
     shown,
 )
 from unitcad.accuracy.timing import PROCESSOR, interleaved, timing
@@ -92,25 +91,37 @@ def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
 
 
 def test_the_stored_results_are_read_and_a_cell_of_another_type_is_not_written(tmp_path: Path):
-    assert len(runner.read(Path(__file__).parents[2] / "docs")) > 5
+    assert len(runner.read(Path(__file__).parents[2] / "docs" / "evidence")) > 5
     with pytest.raises(TypeError, match="Table t"):
         replace(RESULT, tables=(Table("t", ("a",), ((True,),)),)).as_dict()
 
 
-def test_the_front_page_has_picks_plots_and_a_line_for_every_suite():
-    summary = Summary((("a response", "1e-6", "rtol 1e-5"),), "case y: 1e-3", 0)
-    text = front(
-        [replace(RESULT, summary=summary, measured={"date": "2026-01-02"}), Result("moulds", "Mould checks", "")]
-    )
-    assert "| a response | 1e-6 | rtol 1e-5 |" in text
-    assert "| [![p](accuracy/stability-1.svg)](accuracy/stability.md) |  |" in text
-    assert "| [Stability](accuracy/stability.md) | case y: 1e-3 | 2 promises, **1 broken** | 2026-01-02 |" in text
-    assert "| [Mould checks](accuracy/moulds.md) | - | - |  |" in text
+def test_the_front_page_is_one_screen_with_a_line_for_every_suite():
+    stored = runner.read(Path(__file__).parents[2] / "docs" / "evidence")
+    text = front(stored)
+    assert text.count("](accuracy/") == len(stored)
+    assert len(text.split()) < 500
+    assert all(f"[{question(result)}](accuracy/{result.suite}.md) | {answer(result)}" in text for result in stored)
+
+
+def test_a_page_shows_question_answer_plot_and_table_and_folds_the_rest():
+    for result in runner.read(Path(__file__).parents[2] / "docs" / "evidence"):
+        names = [f"{i}.svg" for i in range(len(result.plots))]
+        text = markdown(result, names)
+        shown_part, _, folded = text.partition('<details markdown="1">')
+        assert shown_part.splitlines()[2].startswith(f"**{question(result)}** "), result.suite
+        assert re.search(r"\d", answer(result)), result.suite
+        assert shown_part.count("![") == min(1, len(result.plots))
+        assert shown_part.count("\n| --- |") + shown_part.count("```text") == min(1, len(result.tables))
+        assert result.text in folded
+        assert all(f"({name})" in text for name in names)
+        assert all(table.title in text for table in result.tables)
+        assert len(re.sub(r"(?m)^\|.*$", "", shown_part).split()) < 80
 
 
 def test_the_worst_case_on_the_front_page_is_that_of_every_table_of_its_page():
     """The Hankel line once said 0.20 of a bound where its page had 0.306."""
-    results = {result.suite: result for result in runner.read(Path(__file__).parents[2] / "docs")}
+    results = {result.suite: result for result in runner.read(Path(__file__).parents[2] / "docs" / "evidence")}
     hankel = results["hankel"]
     over = [
         float(row[table.columns.index("over its bound")])
@@ -128,7 +139,6 @@ def test_the_worst_case_on_the_front_page_is_that_of_every_table_of_its_page():
     said = re.search(r"([\d.]+) of its bound", hankel.summary.worst)
     assert said
     assert float(said[1]) == pytest.approx(max(over), abs=0.006)
-    assert "A plus after a commit" in front(list(results.values()))
 
 
 def test_a_bad_option_or_folder_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

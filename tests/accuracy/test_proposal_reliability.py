@@ -10,18 +10,16 @@ from scipy.stats import beta
 
 from benchmarks.accuracy import proposal_reliability as suite
 from unitcad.attenuation.edge.measured_levels import measured_table
-from unitcad.attenuation.edge.predictive import HELD, stack
-
-THREE = ("crossings", "fitted", "paper")
+from unitcad.attenuation.edge.ranges import held
 
 
 def test_a_units_own_level_does_not_enter_its_prediction() -> None:
     table = measured_table()
-    before = suite.left_out(THREE, table)
+    before = suite.left_out("rule", table)
     for i in (0, 4):
         levels = table.levels.copy()
         levels[i] *= 3.0
-        changed = suite.left_out(THREE, replace(table, levels=levels))
+        changed = suite.left_out("rule", replace(table, levels=levels))
         assert changed[i].met == before[i].met
         assert (changed[i].low, changed[i].high) == (before[i].low, before[i].high)
         assert changed[1].met != before[1].met
@@ -33,7 +31,6 @@ def test_a_table_without_a_unit_has_the_others_in_their_order() -> None:
     assert left.names == (*table.names[:3], *table.names[4:])
     assert left.levels.tolist() == [*table.levels[:3], *table.levels[4:]]
     assert len(left.inputs) == len(left.layers) == len(left.designs) == 8
-    assert stack(THREE, left).degrees_of_freedom.max() == 7
 
 
 def test_intervals_are_those_of_clopper_and_pearson() -> None:
@@ -63,15 +60,10 @@ def test_the_promises_fail_for_ranges_that_miss_and_probabilities_that_say_nothi
 
 
 def test_the_suite_runs_and_keeps_its_promises() -> None:
-    pytest.importorskip("optuna")
     result = suite.run(True, lambda line: None)
     assert result.ok, [one for one in result.promises if not one.ok]
-    assert len(result.promises) == 6
-    searched = result.tables[-1].rows
-    assert [row[0] for row in searched][1:] == ["differential evolution", "Optuna, TPE"]
-    assert all(0.4 < row[1] <= 1.0 for row in searched)
+    assert len(result.promises) == 3
 
 
-def test_how_many_ranges_held_is_counted_again() -> None:
-    for models, count in HELD.items():
-        assert sum(one.held for one in suite.left_out(models, measured_table())) == count
+def test_how_many_ranges_held_is_what_an_estimate_says() -> None:
+    assert sum(one.held for one in suite.left_out("rule", measured_table())) == held()

@@ -28,11 +28,10 @@ def test_the_answer_comes_first_and_the_tables_behind_details() -> None:
     assert first.startswith("forearm-pockets: 9 units (encapsulating 14 mm), 125 Hz, flat drive, forearm")
     data = crosstalk(load_array(NINE))
     assert answer.strip() == crosstalk_lines(data)[0]
-    assert "35 % (23 to 45) reaches the middle of its nearest neighbour (A1 to A2, 20 mm apart)" in answer
+    assert "35 % (11 to 39) reaches the middle of its nearest neighbour (A1 to A2, 20 mm apart)" in answer
     assert "B2 gets the most" in out
     assert "%" not in out.splitlines()[-1]
     _, more, _ = run(NINE, "--details", "--frequency", "100:200:50", "--masses")
-    assert more.count("consistent") == 1
     assert "150" in more
     assert "change the sum at B2 by x 1.0" in more
 

@@ -32,7 +32,7 @@ def test_public_names_are_loaded_without_cad():
 
 
 def test_the_example_of_the_docstring_runs():
-    assert doctest.testmod(response).attempted == 6
+    assert doctest.testmod(response).attempted == 14
     assert doctest.testmod(response).failed == 0
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.curve import layered_block
-from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels, stored
 from unitcad.attenuation.edge.inputs_seen import changed, inputs_seen
 from unitcad.attenuation.edge.level import nominal, stacked
+from unitcad.attenuation.edge.models import MODELS, edge_levels, stored
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.validation import load
 
@@ -40,7 +40,7 @@ def asked(spec, path: str) -> float | None:
 
 
 @pytest.mark.parametrize("name", SPECS)
-@pytest.mark.parametrize("model", ["bush", "paper"])
+@pytest.mark.parametrize("model", ["published", "corrected"])
 def test_slopes_are_those_of_specs_that_were_changed(name: str, model: str) -> None:
     spec = spec_of(name)
     variant = estimate_input(spec)
@@ -61,13 +61,13 @@ def test_slopes_are_those_of_specs_that_were_changed(name: str, model: str) -> N
 
 
 def test_slopes_by_formula() -> None:
-    """The divider: x/(1 + x) with x = kappa n E2/E1. The paper: the exponents along the walls."""
+    """The divider: x/(1 + x) with x = kappa n E2/E1. published: the exponents along the walls."""
     blocks = estimate_spec(load("encapsulating"))["models"]
-    x = stored()["fitted"]["kappa"] * 2 * 355 / 15
+    x = stored()["divider"]["kappa"] * 2 * 355 / 15
     slopes = {"layers.0.youngs_modulus_kpa": x / (1 + x), "layers.1.youngs_modulus_kpa": -x / (1 + x)}
-    assert blocks["fitted"]["inputs_seen"]["by"] == pytest.approx(slopes, abs=1e-4)
-    paper = blocks["paper"]["inputs_seen"]["by"]
-    (exponents,) = (one["exponents_s_wave"] for one in blocks["paper"]["readings"] if one["eta"] == "loss_modulus")
+    assert blocks["divider"]["inputs_seen"]["by"] == pytest.approx(slopes, abs=1e-4)
+    paper = blocks["published"]["inputs_seen"]["by"]
+    (exponents,) = (one["exponents_s_wave"] for one in blocks["published"]["readings"] if one["eta"] == "loss_modulus")
     assert [paper[f"layers.{i}.wall_mm"] for i in (0, 1)] == pytest.approx([-e for e in exponents], abs=1e-4)
     assert paper["estimate.frequency_hz"] == pytest.approx(-sum(exponents), abs=1e-4)
 
@@ -80,11 +80,25 @@ def test_each_input_is_seen_or_named_as_not_seen(name: str) -> None:
         assert model in MODELS
         assert {*seen["by"], *seen["not_seen"]} == set(changed(estimate_input(spec)))
         assert not set(seen["by"]) & set(seen["not_seen"])
-    bush = estimate_spec(spec)["models"]["bush"]["inputs_seen"]["by"]
-    assert {"diameter_mm", "motor.thickness_mm"} <= set(bush)
-    # Layer 1 reaches a filled gap's motor whatever its wall, and one layer's modulus cancels.
-    assert ("layers.0.wall_mm" in bush) == (name != "filled")
-    assert ("layers.0.youngs_modulus_kpa" in bush) == (not name.startswith("single"))
+    models = estimate_spec(spec)["models"]
+    assert not models["rule"]["inputs_seen"]["by"]  # beyond the measured ratio of moduli, or one layer alone
+    assert "layers.0.wall_mm" in models["published"]["inputs_seen"]["by"]
+
+
+def test_a_slope_has_the_pairs_that_were_measured_and_a_range_with_zero_if_they_contradict() -> None:
+    models = estimate_spec(load("encapsulating"))["models"]
+    tested = models["published"]["inputs_seen"]["tested"]
+    slope = models["published"]["inputs_seen"]["by"]["layers.1.youngs_modulus_kpa"]
+    outer = tested["layers.1.youngs_modulus_kpa"]
+    assert (outer["agree"], outer["of"]) == (0, 2)
+    assert (outer["low"], outer["high"]) == (slope, pytest.approx(np.log(0.156 / 0.0886) / np.log(355 / 250), abs=1e-4))
+    for name, one in tested.items():
+        assert one["low"] <= 0 <= one["high"], name
+    single = estimate_spec(load("single-embedded"))["models"]["published"]["inputs_seen"]["tested"]
+    assert single["layers.0.youngs_modulus_kpa"]["of"] == 3
+    stiff = ["layers.0.material=dragon-skin-30", "layers.1.material=ecoflex-00-10"]
+    untested = estimate_spec(load("embedded", stiff))["models"]["published"]["inputs_seen"]["tested"]
+    assert {one["of"] for one in untested.values()} == {0}
 
 
 def test_another_model_s_slopes_come_from_the_same_function() -> None:

@@ -103,6 +103,4 @@ def test_the_edge_level_does_not_know_the_drive() -> None:
     flat, axial = (estimate_spec(load("encapsulating", [f"motor.drive={drive}"])) for drive in ("flat", "axial"))
     for model, block in flat["models"].items():
         assert block["edge_level"] == axial["models"][model]["edge_level"]
-    assert "not_of_this_drive" in axial["models"]["bush"]
-    assert "not_of_this_drive" not in flat["models"]["bush"]
     assert (flat["variant"]["motor_drive"], axial["variant"]["motor_drive"]) == ("flat", "axial")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from unitcad.casting.troubles import troubles, troubles_markdown
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import entry_in, fields_of, table_in
+from unitcad.spec.raw import RawSpec
 from unitcad.validation import load
 
 PAGE = Path(__file__).parents[2] / "docs" / "troubleshooting.md"
@@ -33,7 +33,7 @@ def test_a_set_lists_what_it_can_have() -> None:
 def test_the_keys_to_change_are_keys_of_a_spec() -> None:
     for trouble in troubles():
         for table, key in re.findall(r"\b([a-z]+)(?:\.0)?\.([a-z_]+)\b", trouble.spec):
-            of = fields_of(AskedSpec)[table].type
+            of = fields_of(RawSpec)[table].type
             kind = table_in(of) or table_in(entry_in(of))
             assert kind
             assert key in fields_of(kind), (table, key)

@@ -8,17 +8,22 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tomli_w
+from scipy import stats
 from typer.testing import CliRunner
 
-from unitcad.attenuation.edge.closed_form import transmission_only
+from unitcad.attenuation.edge.closed_form import crossings, published_path
+from unitcad.attenuation.edge.models import COMPARED
+from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimating import estimate_input
+from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.lab.fit_files import contents
 from unitcad.lab.fitting import fit_lab, load_fit_lab
+from unitcad.validation import load
 
 UNITS = [
     {"name": "a", "spec": "embedded", "level": {"value": 0.11, "low": 0.1, "high": 0.12}},
@@ -40,12 +45,13 @@ def test_the_shipped_lab_says_that_it_is_synthetic_and_gives_the_same_bytes() ->
     assert made == contents(fit_lab(lab))
     fit = tomllib.loads(made["lab-fit.toml"])
     assert fit["units"] == 3
-    assert set(fit["model"]) == {"bush", "fitted", "paper", "consistent", "crossings"}
-    assert "null" in made["fit.md"]
+    assert set(fit["model"]) == set(COMPARED)
+    assert fit["leads"] == "rule"
+    assert "baseline" in made["fit.md"]
     assert "Synthetic" in made["fit.md"]
     data = json.loads(made["fit.json"])
     assert len(data["units"]) == 12
-    assert set(data["by_moduli"]) == {"dynamic", "quasi-static", "data sheet"}
+    assert set(data["by_moduli"]) == {"small-strain", "quasi-static", "data sheet"}
 
 
 def test_the_units_on_which_the_models_differ_most_come_first() -> None:
@@ -56,12 +62,12 @@ def test_the_units_on_which_the_models_differ_most_come_first() -> None:
     assert {row["unit"] for row in rows} == {unit.name for unit in lab.units}
     assert [row["factor"] for row in rows] == sorted((row["factor"] for row in rows), reverse=True)
     for row in rows:
-        assert set(row["levels"]) == {"bush", "fitted", "paper", "consistent", "crossings"}
+        assert set(row["levels"]) == set(COMPARED) - {"baseline"}
         assert row["factor"] == pytest.approx(max(row["levels"].values()) / min(row["levels"].values()), rel=1e-5)
         unit = next(unit for unit in lab.units if unit.name == row["unit"])
         others = replace(lab, units=tuple(other for other in lab.units if other is not unit))
         without = fit_lab(others).fit.model["crossings"].constants["s"]
-        path = transmission_only(nominal(estimate_input(unit.spec, unit.frequency_hz)))
+        path = crossings(nominal(estimate_input(unit.spec, unit.frequency_hz)))
         assert row["levels"]["crossings"] == pytest.approx(without * float(path[0]), rel=1e-4)
     page = contents(result)["fit.md"]
     assert f"| {rows[0]['unit']} |" in page.partition("## Units on which the models differ most")[2]
@@ -134,7 +140,7 @@ def test_a_silicone_without_a_modulus_leaves_that_source_out(tmp_path: Path) -> 
     with pytest.raises(Refusal, match="no modulus is known"):
         fit_lab(load_fit_lab(_written(tmp_path, unit=units)))
     made = fit_lab(load_fit_lab(_written(tmp_path, unit=units, moduli="quasi-static")))
-    assert made.by_source["dynamic"].reason.startswith("unit.2.layers.0")
+    assert made.by_source["small-strain"].reason.startswith("unit.2.layers.0")
     assert made.fit.moduli == "quasi-static"
     assert "ecoflex-00-50" in contents(made)["fit.md"]
 
@@ -143,8 +149,87 @@ def test_the_command_writes_four_files_and_prints_the_null(tmp_path: Path) -> No
     out = tmp_path / "fit"
     done = CliRunner().invoke(app, ["fit", _written(tmp_path), "-o", str(out)])
     assert done.exit_code == 0, done.output
-    assert "null" in done.output
+    assert "baseline" in done.output
+    assert "rule leads" in done.output
     assert done.output.strip().splitlines()[-1] == str(out)
     assert sorted(file.name for file in out.iterdir()) == ["fit.json", "fit.md", "fit.svg", "lab-fit.toml"]
     shown = CliRunner().invoke(app, ["fit", _written(tmp_path), "--json"])
     assert json.loads(shown.output)["fit"] == tomllib.loads((out / "lab-fit.toml").read_text())
+
+
+def test_units_that_do_not_determine_q_are_named(tmp_path: Path) -> None:
+    """Controls alone: nothing states a softer inside does, and the fit says so."""
+    names = ("ecoflex-00-10", "dragon-skin-30")
+    units = [
+        {
+            "name": f"u{i}{j}",
+            "spec": "single-embedded",
+            "set": {"layers.0.material": names[i]},
+            "level": {"value": 0.4 + 0.03 * (i + 2 * j)},
+        }
+        for i in (0, 1)
+        for j in range(3)
+    ]
+    result = fit_lab(load_fit_lab(_written(tmp_path, unit=units, with_paper=False)))
+    assert result.fit.model["rule"].at_bound == "q"
+    assert result.fit.model["rule"].constants["q"] == 1.0
+    assert "rule: the units do not determine q" in contents(result)["fit.md"]
+
+
+def thick(folder: Path, scatter: float) -> str:
+    """Write a lab of eight made-up units whose level falls with the wall, as the published model has it."""
+    rng = np.random.default_rng(3)
+    own = {"like": "ecoflex-00-10", "youngs_modulus_kpa": 15, "loss_factor": 1.0}
+    units = []
+    for i, wall in enumerate((1.0, 1.5, 2.5, 4.0, 6.0, 8.0, 10.0, 12.0)):
+        changes = {"layers.0.material": "lossy", "layers.0.wall_mm": wall, "diameter_mm": 45.0}
+        spec = load("embedded", {"materials.lossy": own, **changes})
+        level = 0.2 * float(published_path(nominal(estimate_input(spec)))[0]) * np.exp(scatter * rng.normal())
+        units.append({"name": f"u{i}", "spec": "embedded", "set": changes, "level": {"value": level}})
+    return _written(folder, unit=units, materials={"lossy": own})
+
+
+def test_a_lab_where_thickness_matters_overturns_the_rule(tmp_path: Path) -> None:
+    """By the written rule: told apart from rule and baseline on the lab's own units, each left out."""
+    result = fit_lab(load_fit_lab(thick(tmp_path, 0.05)))
+    assert result.fit.leads == "published"
+    judged = {name: np.abs(one.errors[one.own]) for name, one in result.chosen.judged.items()}
+    for other in ("rule", "baseline"):
+        assert judged["published"].mean() < judged[other].mean()
+        assert stats.wilcoxon(judged["published"], judged[other]).pvalue < 0.05
+    assert result.chosen.order[0] == "published"
+    assert "published leads." in contents(result)["fit.md"]
+    (tmp_path / "lab-fit.toml").write_text(contents(result)["lab-fit.toml"])
+    lossy = {"materials.lossy": {"like": "ecoflex-00-10", "youngs_modulus_kpa": 15, "loss_factor": 1.0}}
+    common = {
+        **lossy,
+        "layers.0.material": "lossy",
+        "diameter_mm": 45.0,
+        "estimate.fit": str(tmp_path / "lab-fit.toml"),
+    }
+    thin, wide = (
+        estimate_spec(load("embedded", {**common, "layers.0.wall_mm": wall}))["answer"] for wall in (2.0, 9.0)
+    )
+    assert thin["model"] == "published"
+    assert thin["level"] > 1.5 * wide["level"]
+    assert "By published fitted to 8 units of bench and the paper's nine." in thin["lines"][0]
+
+
+def test_a_lab_whose_units_scatter_about_the_rule_keeps_it(tmp_path: Path) -> None:
+    assert fit_lab(load_fit_lab(thick(tmp_path, 0.8))).fit.leads == "rule"
+
+
+def test_a_lab_s_own_units_draw_the_range_of_their_neighbours(tmp_path: Path) -> None:
+    """The residual of the lab's unit enters at its own lengths; at others the range is wider."""
+    fit = fit_lab(load_fit_lab(_written(tmp_path))).fit
+    at, near, far = (
+        predictive_of([estimate_input(load("embedded", {"diameter_mm": d}))], fit) for d in (14.0, 15.0, 60.0)
+    )
+    model = COMPARED["rule"]
+    own = np.array(list(fit.model["rule"].constants.values()))
+    plain = float(model.logs(nominal(estimate_input(load("embedded"))), own)[0])
+    residual = np.log(0.11) - plain
+    assert fit.measured[0].residual == pytest.approx(residual, abs=1e-5)
+    assert at.centre[0] == pytest.approx(plain + 0.5 * residual, abs=1e-3)
+    assert abs(far.centre[0] - plain) < abs(near.centre[0] - plain) < abs(at.centre[0] - plain)
+    assert at.below[0] < near.below[0] < far.below[0]

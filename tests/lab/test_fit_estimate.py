@@ -12,8 +12,8 @@ import tomli_w
 from scipy import stats
 from typer.testing import CliRunner
 
-from unitcad.attenuation.edge.fitted_models import stored
 from unitcad.attenuation.edge.lab_fit import predictive
+from unitcad.attenuation.edge.models import stored
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input, estimate_spec, fit_of, frequency_table_of_spec
@@ -42,13 +42,18 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file: P
         one, before = fit["model"][model], plain["models"][model]
         assert "predictive" not in before
         s = one["constants"]["s"] / stored()[model]["s"]
-        if model != "fitted":
+        if model in ("published", "corrected"):
             assert block["edge_level"]["value"] == pytest.approx(s * before["edge_level"]["value"], rel=1e-5)
         g = np.ones(1)
-        if model == "fitted":
+        if model == "divider":
             x = one["constants"]["kappa"] * 355 / 15
             assert block["edge_level"]["value"] == pytest.approx(one["constants"]["s"] / (1 + x), rel=1e-8)
             g = np.array([-x / (1 + x), 1.0])
+        if model == "rule":
+            assert block["edge_level"]["value"] == pytest.approx(
+                one["constants"]["s"] * one["constants"]["q"], rel=1e-5
+            )
+            g = np.ones(2)
         scale = one["discrepancy"] * np.sqrt(1 + g @ np.array(one["covariance"]) @ g)
         centre = np.log(block["edge_level"]["value"])
         ends = np.exp(stats.t.ppf([0.1, 0.9], one["degrees_of_freedom"], centre, scale))
@@ -60,13 +65,14 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file: P
         assert error["left_out"]["low"] < one["left_out"] < error["left_out"]["high"]
         assert (error["own_left_out"], error["own_by_stored"]) == (one["own_left_out"], one["own_by_stored"])
         assert error["held_80"] == one["held"]
-        assert error["null"] == fit["null"]["left_out"]
+        assert error["baseline"] == fit["model"]["baseline"]["left_out"]
         assert block["table_error"] == before["table_error"]  # of the stored constants, and said to be
         assert "fit_error" not in before
     assert data["table_error"]["constants"].startswith("the stored ones")
     assert "constants" not in plain["table_error"]
     assert data["fit"]["name"] == "synthetic-bench"
-    assert data["fit"]["left_out"]["null"]["geometric_mean"] == pytest.approx(1.51, abs=0.01)
+    assert data["fit"]["left_out"]["baseline"]["geometric_mean"] == fit["model"]["baseline"]["left_out"]
+    assert data["fit"]["leads"] == data["answer"]["model"] == "rule"
     assert [own["value"] for own in data["own_measured"]] == [0.098]
     assert data["measured"]["level"] == plain["measured"]["level"]
     thicker = load(spec, {"layers.0.wall_mm": 1.3})
@@ -74,7 +80,7 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file: P
     table = frequency_table_of_spec(spec, [100.0])
     assert table["fit"] == {key: data["fit"][key] for key in ("file", "sha256", "name")}
     rows = table["frequencies"]
-    assert rows[0]["edge_level"]["bush"]["value"] == pytest.approx(data["models"]["bush"]["edge_level"]["value"])
+    assert rows[0]["edge_level"]["rule"]["value"] == pytest.approx(data["models"]["rule"]["edge_level"]["value"])
 
 
 def test_a_spec_names_its_fit_and_stands_alone(fit_file: Path, tmp_path: Path) -> None:
@@ -114,15 +120,15 @@ def test_builds_follow_the_fit(fit_file: Path, text: str, tmp_path: Path) -> Non
 def test_the_terminal_shows_fit_range_and_own_measurement(fit_file: Path) -> None:
     done = CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--details"])
     assert done.exit_code == 0
-    for words in ("P10 to P90", "measured here", "synthetic-bench", "null x 1.51", "error by the lab's fit"):
+    for words in ("P10 to P90", "measured here", "synthetic-bench", "rule leads", "error by the lab's fit"):
         assert words in done.output
     own = fit_of(load("embedded", {"estimate.fit": str(fit_file)}))
     assert own is not None
     by_fit = done.output.split("error by the lab's fit")[1]
-    for name in ("bush", "fitted", "paper", "consistent"):
+    for name in ("rule", "divider", "published", "corrected"):
         assert f"x {own.model[name].left_out:.2f}" in by_fit
     assert "9.8 %" in done.output.splitlines()[1]
-    assert "The 80 % range by" in done.output.splitlines()[1]
+    assert "By a rule fitted to 3 units of synthetic-bench and the paper's nine" in done.output
     shown = json.loads(CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--json"]).output)
     assert len(shown["fit"]["sha256"]) == 64
 
@@ -138,8 +144,8 @@ def test_a_sweep_s_table_takes_the_fit(fit_file: Path, tmp_path: Path) -> None:
         Path("templates/embedded.toml").read_text() + '\n[estimate]\nfit = "lab-fit.toml"\n'
     )
     sweep = load_sweep(tmp_path / "s.toml")
-    levels = next(iter(evaluate(sweep, sweep.count))).levels["bush"]
-    exact = estimate_spec(load(str(tmp_path / "u.toml")))["models"]["bush"]["edge_level"]["value"]
+    levels = next(iter(evaluate(sweep, sweep.count))).levels["published"]
+    exact = estimate_spec(load(str(tmp_path / "u.toml")))["models"]["published"]["edge_level"]["value"]
     assert levels[0] == pytest.approx(exact)
 
 
@@ -158,13 +164,13 @@ def _bad(text: str, *path: object, value: object) -> str:
 @pytest.mark.parametrize(
     ("path", "value", "says"),
     [
-        (("model", "bush"), None, "model.bush: is required"),
-        (("model", "bush", "constants"), {"kappa": 1.0}, "must be s"),
-        (("model", "bush", "constants", "s"), -1.0, "model.bush.constants.s"),
-        (("model", "bush", "degrees_of_freedom"), 0, "degrees_of_freedom"),
-        (("model", "fitted", "covariance"), [[1.0]], "needs 2 rows"),
-        (("model", "fitted", "covariance"), [[1.0, 3.0], [3.0, 1.0]], "is no covariance"),
-        (("model", "bush", "discrepancy"), 0.0, "discrepancy"),
+        (("model", "published"), None, "model.published: is required"),
+        (("model", "published", "constants"), {"kappa": 1.0}, "must be s"),
+        (("model", "published", "constants", "s"), -1.0, "model.published.constants.s"),
+        (("model", "published", "degrees_of_freedom"), 0, "degrees_of_freedom"),
+        (("model", "divider", "covariance"), [[1.0]], "needs 2 rows"),
+        (("model", "divider", "covariance"), [[1.0, 3.0], [3.0, 1.0]], "is no covariance"),
+        (("model", "published", "discrepancy"), 0.0, "discrepancy"),
         (("format",), 2, "format"),
         (("moduli",), "quasi-static", "quasi-static moduli"),
         (("surprise",), 1, "surprise"),

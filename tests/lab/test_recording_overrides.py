@@ -1,4 +1,4 @@
-"""`[[recording.own]]`: values of `[recording]` that some records of a campaign have for themselves."""
+"""`[[recording.override]]`: values of `[recording]` that some records of a campaign have for themselves."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def campaign(folder, recording):
 
 
 BASE = '[recording]\ntime_column = "clock"\ntime_unit = "ms"\nchannel = "laser"\n'
-OWN = '[[recording.own]]\nrecords = ["m*.mat"]\nrate_hz = 5000\nchannel = "disp"\n'
+OWN = '[[recording.override]]\nrecords = ["m*.mat"]\nrate_hz = 5000\nchannel = "disp"\n'
 
 
 def test_records_of_two_loggers_are_one_campaign(folder):
@@ -50,7 +50,7 @@ def test_a_motor_off_record_may_have_its_own(folder):
     time = np.arange(8000) / 4000
     hum = np.column_stack([0 * time, 3 * np.cos(2 * np.pi * 50 * time)]).astype("<f4")
     wavfile.write(folder / "off.wav", 4000, hum)
-    own = '[[recording.own]]\nrecords = ["off.wav"]\nchannel = 2\nrate_hz = 4000\n'
+    own = '[[recording.override]]\nrecords = ["off.wav"]\nchannel = 2\nrate_hz = 4000\n'
     result = campaign(folder, BASE + OWN + own + '[blank]\nrecords = ["off.wav"]\n')
     assert dict(result.mains)[1] == pytest.approx(3.0, rel=1e-3)
 
@@ -58,15 +58,19 @@ def test_a_motor_off_record_may_have_its_own(folder):
 @pytest.mark.parametrize(
     ("own", "field", "nearest"),
     [
-        ('records = ["m?.mta"]\nrate_hz = 5000\n', "recording.own.0.records.0", "m3.mat"),
-        ('records = ["m1.mat"]\n', "recording.own.0", None),
-        ("records = []\nrate_hz = 5000\n", "recording.own.0.records", None),
-        ('records = ["m*.mat"]\nmotor_channel = 2\n', "recording.own.0.motor_channel", None),
-        (OWN[18:] + '[[recording.own]]\nrecords = ["m2.mat"]\nchannel = 2\n', "recording.own.1.records.0", None),
-        ('records = ["m*.mat"]\nrate_hz = 5000\nchannel = "dsp"\n', "recording.own.0.channel", "disp"),
+        ('records = ["m?.mta"]\nrate_hz = 5000\n', "recording.override.0.records.0", "m3.mat"),
+        ('records = ["m1.mat"]\n', "recording.override.0", None),
+        ("records = []\nrate_hz = 5000\n", "recording.override.0.records", None),
+        ('records = ["m*.mat"]\nmotor_channel = 2\n', "recording.override.0.motor_channel", None),
+        (
+            OWN[23:] + '[[recording.override]]\nrecords = ["m2.mat"]\nchannel = 2\n',
+            "recording.override.1.records.0",
+            None,
+        ),
+        ('records = ["m*.mat"]\nrate_hz = 5000\nchannel = "dsp"\n', "recording.override.0.channel", "disp"),
     ],
 )  # fmt: skip
 def test_what_can_not_be_meant_is_refused(folder, own, field, nearest):
     with pytest.raises(Refusal) as refusal:
-        campaign(folder, f"{BASE}[[recording.own]]\n{own}")
+        campaign(folder, f"{BASE}[[recording.override]]\n{own}")
     assert (refusal.value.field, refusal.value.nearest) == (field, nearest)

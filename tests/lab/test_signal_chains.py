@@ -9,7 +9,7 @@ from scipy.stats import ttest_ind, ttest_rel
 
 from benchmarks.accuracy.synthetic_records import LENGTH_S, PLAIN, RATE, Scenario, synthetic
 from unitcad.errors import Refusal
-from unitcad.lab.chains import paper
+from unitcad.lab.chains import bandpass
 from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.chains.line import Mains, fit_line
 from unitcad.lab.measuring import level
@@ -141,9 +141,9 @@ def test_the_papers_chain_has_the_gain_that_it_states(zero_phase, hz):
     """A long steady line through the filters themselves, not through their frequency response."""
     chain = ChainTable(zero_phase=zero_phase, trim_s=4.0)
     time = np.arange(20000) / RATE
-    found = paper.amplitude(chain, 2.0 * np.cos(2 * np.pi * hz * time + 0.3), RATE)
-    assert found == pytest.approx(2.0 * paper.gain(chain, hz), abs=2e-4)
-    assert (paper.gain(chain, hz) < 1e-6) == (hz in (100.0, 150.0))
+    found = bandpass.amplitude(chain, 2.0 * np.cos(2 * np.pi * hz * time + 0.3), RATE)
+    assert found == pytest.approx(2.0 * bandpass.gain(chain, hz), abs=2e-4)
+    assert (bandpass.gain(chain, hz) < 1e-6) == (hz in (100.0, 150.0))
 
 
 def test_a_levels_interval_is_welchs():

@@ -15,7 +15,7 @@ from recordings import RATE
 from scipy.io import wavfile
 from typer.testing import CliRunner
 
-from unitcad.attenuation.edge.fitted_models import path_of
+from unitcad.attenuation.edge.closed_form import published_path
 from unitcad.attenuation.edge.lab_fit import unit_key
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.cli import app
@@ -68,9 +68,9 @@ def test_measured_walls_stand_in_for_the_spec_s(tmp_path: Path) -> None:
     assert {file.file: file.sha256 for file in lab.inputs}[CAST] == sha256(tmp_path / CAST)
     fit = fit_lab(lab).fit
     walls = ["layers.0.wall_mm=1.4", "layers.1.wall_mm=1.1"]
-    own = 0.06 / float(path_of("bush")(nominal(estimate_input(load("encapsulating", walls))))[0])
-    weight = 1 / (1 + (one.error / fit.model["bush"].discrepancy) ** 2)
-    stored, found = fit.model["bush"].stored["s"], fit.model["bush"].constants["s"]
+    own = 0.06 / float(published_path(nominal(estimate_input(load("encapsulating", walls))))[0])
+    weight = 1 / (1 + (one.error / fit.model["published"].discrepancy) ** 2)
+    stored, found = fit.model["published"].stored["s"], fit.model["published"].constants["s"]
     assert np.log(found) == pytest.approx((0.9 * np.log(stored) + weight * np.log(own)) / (0.9 + weight), abs=2e-3)
     assert fit.measured[0].key == unit_key(estimate_input(load("encapsulating")))
     assert fit.measured[0].source == "as typed, walls as measured, 1.4, 1.1 mm"
@@ -86,7 +86,7 @@ def test_measured_walls_stand_in_for_the_spec_s(tmp_path: Path) -> None:
         ({"cavity": 2, "spec": "encapsulating"}, None, "unit.0.cast", "excludes spec"),
         ({"cavity": 2, "cast": None, "spec": "encapsulating"}, None, "unit.0.cavity", "there is no cast"),
         ({"cast": None}, None, "unit.0.spec", "is required, or cast"),
-        ({"cavity": 2, "set": {"layers.0.wall_mm": 1.0}}, None, "unit.0.set", "the record says what was cast"),
+        ({"cavity": 2, "set": {"layers.0.wall_mm": 1.0}}, None, "unit.0.set", "the record has the spec that was cast"),
         ({"cavity": 2}, lambda d: d.update(version=2), "unit.0.cast", "version = 2: must be at most 1"),
         ({"cavity": 2}, lambda d: d.pop("spec"), "unit.0.cast", "spec: is required here"),
         ({"cavity": 2}, lambda d: d["spec"].update(diameter_mm=3), "unit.0.cast", "diameter_mm"),

@@ -1,6 +1,7 @@
 """A film that closes the skin side: drawn below z = 0, cast in a tray, its silicone bought, its steps at the end."""
 
 import math
+from pathlib import Path
 
 import pytest
 from casting_rules import broken_rules
@@ -86,7 +87,7 @@ def test_refused_with_a_value_that_is_accepted():
         load("encapsulating", ["skin_mm=0.1"])
     assert (refused.value.field, refused.value.nearest) == ("skin_mm", 0.3)
     with pytest.raises(Refusal, match="draws its own skin side"):
-        load("custom/strap-lugs", ["skin_mm=0.5"])
+        load(str(Path(__file__).parents[2] / "templates/custom/strap-lugs.toml"), ["skin_mm=0.5"])
     asked = load_array("forearm-pockets").asked
     with pytest.raises(Refusal) as refused:
         load_array({**asked, "unit": {**asked["unit"], "skin_mm": 0.5}})

@@ -59,11 +59,11 @@ def test_each_row_shows_its_section(visit):
 
 def test_levels_are_per_cent_with_the_models_typical_error(visit, walls):
     errors = json.loads((walls / "batch.json").read_text())["estimate"]["typical_error"]
-    for shown, row in zip(column(visit, "edge_bush, %"), variants(walls), strict=True):
+    for shown, row in zip(column(visit, "edge_published, %"), variants(walls), strict=True):
         level, low, high = (float(word) for word in shown.replace("(", "").replace(")", "").replace("to ", "").split())
-        assert level == pytest.approx(100 * row["edge_bush"], rel=0.06)
-        assert low == pytest.approx(100 * row["edge_bush"] / errors["bush"], rel=0.06)
-        assert high == pytest.approx(100 * row["edge_bush"] * errors["bush"], rel=0.06)
+        assert level == pytest.approx(100 * row["edge_published"], rel=0.06)
+        assert low == pytest.approx(100 * row["edge_published"] / errors["published"], rel=0.06)
+        assert high == pytest.approx(100 * row["edge_published"] * errors["published"], rel=0.06)
     for shown in column(visit, "layer2_volume_mm3"):
         assert len(shown.replace(".", "")) <= 3
 
@@ -73,16 +73,18 @@ def test_a_filter_takes_what_a_cell_shows(visit):
     visit.page.fill('input[name="filter-layer2_volume_mm3"]', volume)
     assert column(visit, "layer2_volume_mm3") == [volume]
     visit.page.fill('input[name="filter-layer2_volume_mm3"]', "")
-    visit.page.fill('input[name="filter-edge_bush"]', "> 7")
+    visit.page.fill('input[name="filter-edge_rule"]', "> 7")
     assert {name.split(":")[0] for name in column(visit, "name")} == {"embedded"}
 
 
 def test_a_model_is_plotted_only_against_what_it_reads(visit):
     assert visit.page.input_value('select[name="plot-x"]') == "layers.1.wall_mm"
-    assert visit.page.input_value('select[name="plot-y"]') == "edge_bush"
+    assert visit.page.input_value('select[name="plot-y"]') == "edge_published"
     assert "4 of 4 points" in visit.page.inner_text("#plot .tip")
-    assert visit.page.locator('select[name="plot-y"] option:disabled').all_inner_texts() == ["edge_fitted"]
-    assert "edge_fitted, whose model does not read layers.1.wall_mm" in visit.page.inner_text("#plot .unread")
+    disabled = visit.page.locator('select[name="plot-y"] option:disabled').all_inner_texts()
+    assert disabled == ["edge_rule", "edge_divider"]
+    unread = visit.page.inner_text("#plot .unread")
+    assert "edge_rule, edge_divider, whose model does not read layers.1.wall_mm" in unread
     assert "typical error" in visit.page.inner_text("#plot .note")
     visit.page.select_option('select[name="plot-y"]', "layer2_volume_mm3")
     assert visit.page.locator("#plot .note").count() == 0
@@ -103,5 +105,5 @@ def test_pins_set_variants_side_by_side(visit, walls):
     assert told["layers.0.cap_mm"] == ["–", "1.25"]
     assert "layers.1.wall_mm" not in told
     answers = [json.loads((walls / v["folder"] / "estimate.json").read_text())["answer"] for v in variants(walls)]
-    assert told["Estimate"] == [answers[0]["lines"][0], answers[2]["lines"][0]]
-    assert "edge_bush, %" in told
+    assert told["Estimate"] == [answers[0]["headline"], answers[2]["headline"]]
+    assert "edge_rule, %" in told

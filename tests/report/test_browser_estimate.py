@@ -21,9 +21,9 @@ OPEN = """() => document.querySelectorAll("#estimate details").forEach((node) =>
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory):
     """The folder of a unit estimated by closed forms and, with few draws, by finite elements."""
-    from unitcad.attenuation.mechanics import prior_range
+    from unitcad.attenuation.fem import prior_range
 
-    models = 'estimate.models=["bush","fitted","paper","mechanics"]'
+    models = 'estimate.models=["rule","divider","published","fem"]'
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(prior_range, "range_block", partial(prior_range.range_block, draws=DRAWS))
         patch.setattr(prior_range, "FINENESS", 0.5)
@@ -79,8 +79,24 @@ def test_both_drives_are_drawn_and_stand_in_the_table(visit, estimate):
     assert ratio[-1] > 100  # far out a sideways force moves more skin
 
 
+def test_two_lines_lead_and_the_rest_is_folded(running, solved, estimate):
+    seen = Visit(running, solved / "report.html")
+    answer, shown = estimate["answer"], seen.page.inner_text("#estimate")
+    for line in (answer["headline"], answer["lines"][1], answer["lines"][0][len(answer["headline"]) :].strip()):
+        assert line in shown
+    assert "How sure?" in shown
+    assert answer["details"][0] not in shown
+    seen.page.get_by_text("How sure?").click()
+    assert answer["details"][0] in seen.page.inner_text("#estimate")
+    seen.page.wait_for_selector("#estimate .plot canvas")
+    width = seen.page.eval_on_selector("#estimate .plot canvas", "(node) => node.getBoundingClientRect().width")
+    assert width > 300  # drawn although it was folded
+    assert seen.errors == seen.console == []
+    seen.close()
+
+
 def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit, estimate):
-    levels = estimate["mechanics"]["levels"]
+    levels = estimate["fem"]["levels"]
     chart = visit.page.locator("#estimate figure.ranges", has_text=f"of {DRAWS} draws")
     bars = chart.locator(".row:not(.scale)").evaluate_all(
         """(rows) => rows.map((row) => {
@@ -113,15 +129,21 @@ def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit, estimate):
 
 def test_the_inputs_that_a_model_sees(visit, estimate):
     head, *rows = cells(visit, "Inputs that a model sees")
-    blocks = [estimate["models"][name]["inputs_seen"] for name in ("bush", "fitted", "paper")]
-    blocks += estimate["mechanics"]["inputs_seen"]
+    blocks = [estimate["models"][name]["inputs_seen"] for name in ("rule", "divider", "published")]
+    blocks += estimate["fem"]["inputs_seen"]
     assert len(head) == 1 + len(blocks)
     largest = []
     for name, *shown_cells in rows:
         for cell, block in zip(shown_cells, blocks, strict=True):
             assert (cell == "not seen") == (name not in block["by"])
             if cell != "not seen":
-                assert float(cell.replace("−", "-")) == pytest.approx(block["by"][name], rel=6e-3)
+                slope, _, rest = cell.replace("−", "-").partition(" (")
+                assert float(slope) == pytest.approx(block["by"][name], rel=6e-3)
+                tested = block.get("tested", {}).get(name)
+                assert bool(rest) == bool(tested)
+                if tested:
+                    agree = f"{tested['agree']} of {tested['of']} agree" if tested["of"] else "untested"
+                    assert rest.endswith(f"; {agree})")
         largest.append(max(abs(block["by"].get(name, 0.0)) for block in blocks))
     assert largest == sorted(largest, reverse=True)
     assert {"layers.0.wall_mm", "tissue thickness", "motor mass"} <= {row[0] for row in rows}

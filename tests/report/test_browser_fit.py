@@ -26,6 +26,7 @@ def fit_page(fitted, tmp_path_factory):
 @pytest.fixture
 def visit(running, fit_page):
     seen = Visit(running, fit_page)
+    seen.page.get_by_text("How sure?").click()
     yield seen
     assert seen.errors == []
     assert seen.console == []
@@ -34,17 +35,17 @@ def visit(running, fit_page):
 
 def test_the_fit_s_own_error_stands_beside_the_stored_constants_one(visit, fitted):
     table = visit.page.locator('.scroll[aria-label="Error by the fit of synthetic-bench"] table')
-    assert table.is_visible()  # not among the folded tables
+    assert table.is_visible()  # under "How sure?", not among the folded tables
     rows = [row.split("\t") for row in table.locator("tbody tr").all_inner_texts()]
-    assert [row[0] for row in rows][-1] == "Null"
-    for name in ("bush", "paper", "consistent", "fitted"):
+    assert "(baseline)" in rows[-1][0]
+    for name in ("rule", "published", "corrected", "divider"):
         one = fitted.fit.model[name]
         row = next(row for row in rows if f"({name})" in row[0])
         assert float(row[1]) == pytest.approx(one.left_out, rel=6e-3)
         assert one.own_left_out is not None
         assert float(row[3]) == pytest.approx(one.own_left_out, rel=6e-3)
         assert row[5] == one.held
-    assert float(rows[-1][1]) == pytest.approx(fitted.fit.null.left_out, rel=6e-3)
+    assert float(rows[-1][1]) == pytest.approx(fitted.fit.model["baseline"].left_out, rel=6e-3)
 
 
 def test_range_measurement_and_name_of_the_fit_are_there(visit, fitted):

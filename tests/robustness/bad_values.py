@@ -10,13 +10,13 @@ from typing import Any
 import msgspec
 
 from unitcad import catalogue
-from unitcad.spec.asked import AskedSpec
+from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import text_of
 from unitcad.sweeps.sweep import Range, SweepFile
 from unitcad.validation import put
 
 SCHEMAS = {
-    kind: msgspec.json.schema(table) for kind, table in {"spec": AskedSpec, "sweep": SweepFile, "range": Range}.items()
+    kind: msgspec.json.schema(table) for kind, table in {"spec": RawSpec, "sweep": SweepFile, "range": Range}.items()
 }
 ENTRY = {"materials": "ecoflex-00-30", "motors": "LCM0720A3463F", "printers": "fdm-0.4"}
 """The free tables of a spec, and what an entry of each starts from."""

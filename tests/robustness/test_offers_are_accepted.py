@@ -97,7 +97,7 @@ def test_moulds_that_are_refused_name_a_length_that_is_accepted(name):
     ],
 )
 def test_a_core_too_narrow_names_what_widens_it(changes, field, nearest):
-    with pytest.raises(Refusal, match="the core must hold the filament's hole") as caught:
+    with pytest.raises(Refusal, match="the core must have room for the filament's hole") as caught:
         load("single-encapsulating", changes)
     assert (caught.value.field, caught.value.nearest) == (field, nearest)
     load("single-encapsulating", {**changes, field: nearest})

@@ -6,7 +6,6 @@ import csv
 import itertools
 import json
 import xml.etree.ElementTree as ElementTree
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ import pytest
 
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.curve import layered_block
-from unitcad.attenuation.edge.predictive import predictive_of
+from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.receivers import unit_mass
 from unitcad.casting.procedure import procedure
 from unitcad.errors import Refusal
@@ -25,19 +24,17 @@ from unitcad.search import design_files, explanation, proposals
 from unitcad.search.candidates import Candidates, candidates, grid, sequences_of, spec_data
 from unitcad.search.design_files import front
 from unitcad.search.explanation import explain
-from unitcad.search.proposals import Inversion, invert, name_of, refined
-from unitcad.search.ranking import kinds
+from unitcad.search.proposals import Inversion, invert, name_of
+from unitcad.search.ranking import EQUAL, kinds
 from unitcad.search.target_file import Target, load_target, target_of
 from unitcad.validation import from_data, load
 
-PAPER = ["crossings", "fitted", "paper"]
 
-
-def _target(models: list[str] | None = None, vary: dict[str, Any] | None = None, **goals: Any) -> Target:
+def _target(vary: dict[str, Any] | None = None, **goals: Any) -> Target:
     data: dict[str, Any] = {"target": {"edge_max": 0.06, **goals}, "vary": vary or {}}
     if goals.get("edge_max", 0) is None:
         del data["target"]["edge_max"]
-    return target_of({**data, **({"estimate": {"models": models}} if models else {})})
+    return target_of(data)
 
 
 @pytest.fixture(scope="module")
@@ -48,22 +45,27 @@ def known() -> Inversion:
 
 def test_the_answer_that_is_known(known: Inversion) -> None:
     best = known.data["proposals"]
-    found = [(one["design"], one["materials"][1], round(one["probability"], 2)) for one in best]
-    assert found[:3] == [
-        ("encapsulating", "dragon-skin-30", 0.79),
-        ("encapsulating", "dragon-skin-10-medium", 0.52),
-        ("embedded", "dragon-skin-30", 0.10),
+    found = [(one["design"], one["materials"][1], one["nearest_other"]) for one in best]
+    assert found[:2] == [
+        ("encapsulating", "dragon-skin-10-medium", False),
+        ("encapsulating", "dragon-skin-30", False),
     ]
-    assert all(one["materials"][0] == "ecoflex-00-10" for one in best)
-    ends = [100 * best[0]["edge"][end] for end in ("p10", "p90")]
-    assert ends == pytest.approx([2.6, 7.4], abs=0.1)
-    of_others = [kind.most for kind in kinds(known.found, known.rows)[3:]]
-    assert max(of_others) < 0.045
-    assert all("gain nothing" in one["lengths_gain"] for one in best)
+    assert all(one["nearest_other"] for one in best[2:])
+    assert [one["equal_to"] for one in best[:2]] == [None, 1]
+    for one in best:
+        expected = predictive_of([estimate_input(spec) for spec in known.specs if spec.name == one["name"]])
+        assert one["probability"] == pytest.approx(expected.at_most(0.06)[0], rel=1e-6)
+    assert all("only ones within the limits" in one["lengths_gain"] for one in best)
     assert set(known.data["skipped"]) == {"ecoflex-00-30", "ecoflex-00-50"}
-    assert [one["measured"]["level"] for one in best[:3]] == [0.0517, 0.04, 0.156]
-    assert all(one["checks"] > 20 and one["relies_on"] == [] for one in best)
-    assert best[0]["walls_mm"] == [1.25, 1.25]
+    assert [one["measured"]["level"] for one in best[:2]] == [0.04, 0.0517]
+    assert all(one["checks"] > 20 for one in best)
+    assert all(one["relies_on"] == [] for one in best[:2])
+
+
+def rows_of(table: Candidates, design: str, materials: tuple[str, ...]) -> list[int]:
+    """Return the rows of a design and of silicones from the inside out."""
+    kinds = [(table.lengths(row).design, table.materials(row)) for row in range(table.count)]
+    return [row for row, kind in enumerate(kinds) if kind == (design, materials)]
 
 
 @pytest.fixture(scope="module")
@@ -121,40 +123,35 @@ def test_crosstalk_is_that_of_the_layered_curve(found: Candidates) -> None:
     assert found.crosstalk[found.geometry == 0] == pytest.approx(at_pitch)
 
 
-def test_no_search_finds_a_better_candidate_than_the_grid_and_its_refinement() -> None:
-    """Random lengths, each judged by its own spec: none beats the best of the grid refined."""
-    target = _target(vary={"layers": [2], "wall_mm": [1.1, 1.8], "diameter_mm": [13.0, 15.0], "step_mm": 0.35})
-    table = candidates(target)
-    row = int(np.argmax(table.probability))
-    better = refined(table, row)
-    best = max(float(table.probability[row]), float(better.probability[0]) if better else 0.0)
-    rng, tried = np.random.default_rng(3), []
-    for _ in range(150):
-        walls = rng.uniform(1.1, 1.8, 2).tolist()
-        lengths = replace(
-            table.lengths(row), walls=tuple(walls), caps=tuple(walls), diameter=float(rng.uniform(13.0, 15.0))
-        )
-        try:
-            spec = from_data(spec_data(target, lengths, table.materials(row)))
-        except Refusal:
-            continue
-        tried.append(predictive_of([estimate_input(spec)]).at_most(0.06)[0])
-    assert len(tried) > 30
-    assert max(tried) < best + 0.02
+def test_kinds_that_the_evidence_cannot_tell_apart_are_equal_and_the_easier_one_is_first() -> None:
+    made = invert(_target(edge_max=0.06), check=False)
+    every = kinds(made.found, made.rows)
+    groups = [[kind for kind in every if kind.group == g] for g in sorted({kind.group for kind in every})]
+    for group, after in itertools.pairwise(groups):
+        assert max(kind.most for kind in group) - min(kind.most for kind in group) < EQUAL
+        assert min(kind.most for kind in group) > max(kind.most for kind in after) - 1e-12
+    first, second = made.data["proposals"][:2]
+    assert second["equal_to"] == first["rank"]
+    assert first["cure_hours"] < second["cure_hours"]  # Dragon Skin 10 cures in 5 h, Dragon Skin 30 in 16 h
 
 
-def test_refinement_finds_what_lies_between_the_steps() -> None:
-    """A limit on mass between two steps: the best lies on it."""
-    target = _target(vary={"layers": [2], "wall_mm": [1.1, 2.1], "step_mm": 0.5}, mass_max_g=1.08)
-    made = invert(target, check=False)
-    kind = ("encapsulating", ("ecoflex-00-10", "dragon-skin-10-medium"))
-    second = next(one for one in made.data["proposals"] if (one["design"], tuple(one["materials"])) == kind)
-    of_kind = [row for row in made.rows if (made.found.kind(row)[0], made.found.materials(row)) == kind]
-    assert second["refined"]
-    assert second["lengths_gain"].endswith("this one lies between the steps")
-    assert second["probability"] > made.found.probability[of_kind].max() + 0.02
-    assert 1.05 < second["mass_g"] <= 1.08
-    assert all(round(wall / 0.05, 6) == round(wall / 0.05) for wall in second["walls_mm"])
+def test_lengths_are_not_ranked_and_the_measured_ones_stand_for_their_kind() -> None:
+    """Three tenths of a millimetre of wall change no median; only the range is wider."""
+    made = invert(_target({"layers": [2], "wall_mm": [1.0, 2.0], "step_mm": 0.25}), check=False)
+    for one in made.data["proposals"][:2]:
+        assert one["walls_mm"] == [1.25, 1.25]
+        assert "the evidence does not rank them" in one["lengths_gain"]
+    soft = rows_of(made.found, "encapsulating", ("ecoflex-00-10", "dragon-skin-30"))
+    centres = np.exp(made.found.predictive.centre[soft])
+    assert centres.max() / centres.min() < 1.25  # the residual of the measured one, and no slope
+    assert set(made.data["leads"]) == {"model", "by", "ranks", "does_not_rank"}
+
+
+def test_walls_of_two_millimetres_do_not_bring_an_open_ring_to_six_per_cent() -> None:
+    """15.6 % was measured at 1.25 mm: no model may make 6 % of it by thicker walls."""
+    table = candidates(_target({"layers": [2], "wall_mm": [2.0, 2.0]}))
+    for row in rows_of(table, "embedded", ("ecoflex-00-10", "dragon-skin-30")):
+        assert table.probability[row] < 0.1
 
 
 @pytest.mark.parametrize(
@@ -173,9 +170,9 @@ def test_refinement_finds_what_lies_between_the_steps() -> None:
 )
 def test_an_impossible_target_is_refused_with_the_nearest_that_is_possible(goals: dict[str, Any], field: str) -> None:
     with pytest.raises(Refusal, match="none of") as refused:
-        invert(_target(PAPER, **goals), check=False)
+        invert(_target(**goals), check=False)
     assert refused.value.field == field
-    assert invert(_target(PAPER, **_changed(goals, refused.value)), check=False).data["proposals"]
+    assert invert(_target(**_changed(goals, refused.value)), check=False).data["proposals"]
 
 
 def _changed(goals: dict[str, Any], refused: Refusal) -> dict[str, Any]:
@@ -201,12 +198,11 @@ def test_what_is_offered_for_several_impossible_targets_is_accepted_together(tar
         goals |= {"edge_max": level} if i % 3 else {"edge_max": level, "edge_min": 0.9 * level}
         if "pitch_mm" in goals:
             goals["crosstalk_ratio_max"] = float(np.exp(rng.uniform(np.log(0.02), 0.0)))
-        models = PAPER if i % 2 else None
         try:
-            invert(_target(models, **goals), check=False)
+            invert(_target(**goals), check=False)
         except Refusal as refused:
             refusals, several = refusals + 1, several + bool(refused.others)
-            assert invert(_target(models, **_changed(goals, refused)), check=False).data["proposals"], goals
+            assert invert(_target(**_changed(goals, refused)), check=False).data["proposals"], goals
     assert refusals > targets / 2
     assert several > targets / 6
 
@@ -216,7 +212,7 @@ def test_limits_that_exclude_each_other_are_named_together() -> None:
         Refusal, match=r"target\.mass_max_g = 0\.3: none of .* with target\.cure_hours_max = "
     ) as refused:
         invert(_target(mass_max_g=0.3, cure_hours_max=1.0), check=False)
-    assert [one.field for one in refused.value.others] == ["target.cure_hours_max"]
+    assert "target.cure_hours_max" in [one.field for one in refused.value.others]
 
 
 def test_a_pitch_at_which_units_overlap_is_answered_with_one_that_keeps_the_crosstalk() -> None:
@@ -256,7 +252,7 @@ def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch: pytest.
 
     for module in (proposals, explanation):
         monkeypatch.setattr(module, "castability", judged)
-    made = invert(_target(PAPER))
+    made = invert(_target())
     assert all(one["walls_mm"][0] != 1.25 for one in made.data["proposals"])
     assert made.data["not_castable"][0]["failed"] == ["C300 layer1: 0.1 against 0.2 mm"]
     out = explain(made, made.data["not_castable"][0]["name"])
@@ -278,30 +274,28 @@ def test_what_was_never_measured_is_said() -> None:
             "vary": {"layers": [2], "wall_mm": [1.5, 1.5]},
         }
     )
-    notes = " | ".join(invert(target, check=False).data["proposals"][0]["relies_on"])
-    assert "motor" in notes
-    assert "diameter and walls (not read by crossings)" in notes
-    assert "frequency (not read by any model here)" in notes
+    notes = invert(target, check=False).data["proposals"][0]["relies_on"]
+    assert set(notes) >= {"motor", "diameter", "walls", "frequency"}
 
 
-def test_the_models_that_differ_are_named_and_the_measured_unit_of_the_kind_stands_beside() -> None:
-    best = invert(_target(), check=False).data["proposals"][0]
-    assert set(best["by_model"]) == {"bush", "crossings"}
+def test_the_measured_unit_of_the_kind_stands_beside() -> None:
+    vary = {"wall_mm": [1.5, 1.5]}
+    best = invert(_target(vary), check=False).data["proposals"][0]
     assert best["measured"] is None
-    assert best["measured_sibling"]["level"] == 0.0517
-    assert best["measured_sibling"]["probability"] < best["probability"]
+    assert best["measured_sibling"]["level"] == 0.04
 
 
 def test_reasons_of_what_is_not_among_the_proposals(known: Inversion) -> None:
     assert explain(known, "encapsulating-e10-d30-1.25-1.25")["reasons"] == []
     same = explain(known, "encapsulating")
-    assert (same["rank"], same["reasons"]) == (1, [])
+    assert (same["listed"], same["reasons"]) == (2, [])
     three = explain(known, "three-layer")["reasons"]
     assert any("vary.layers has no 3" in line for line in three)
-    other = explain(known, "embedded-e10-d30-1.5-1.5")["reasons"]
+    varied = invert(_target({"layers": [2], "wall_mm": [1.25, 1.75], "step_mm": 0.25}), check=False)
+    other = explain(varied, "encapsulating-e10-d30-1.5-1.5")["reasons"]
     assert "best of its kind" in other[0]
     last = explain(known, "embedded-d10-e10-1.25-1.25")["reasons"]
-    assert "4 kinds come before it" in last[0]
+    assert "kinds come before it" in last[0]
     assert any("not at hand" in line for line in explain(known, "motor-10mm")["reasons"])
     with pytest.raises(Refusal, match="--explain = 'nothing'"):
         explain(known, "nothing")
@@ -367,7 +361,7 @@ def test_the_command_writes_its_folder_and_explains(run: Any, tmp_path: Path) ->
     done = run("design", "published", "--no-check", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "out/design-published"
-    assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target; probability 0.79, 2.5 %" in done.stdout
+    assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the target; probability 0.8" in done.stdout
     made = {path.name for path in (tmp_path / "out/design-published").iterdir() if not path.name.startswith("front-")}
     assert made == {"design.html", "design.md", "design.json", "ranking.csv", "specs"}
     as_json = json.loads(run("design", "published", "--no-check", "--json", cwd=tmp_path).stdout)

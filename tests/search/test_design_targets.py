@@ -42,10 +42,9 @@ from unitcad.search.target_file import load_target, shipped, target_of
         ({"vary": {"layers": [1, 9]}}, "vary.layers.1", "at most 2", 2),
         ({"vary": {"layers": [2, 2]}}, "vary.layers.1", "is there twice", None),
         ({"vary": {"layers": [2], "step_mm": 0.01}}, "vary.step_mm", "more than 20000 sets of lengths", 0.02),
-        ({"estimate": {"models": ["bushes"]}}, "estimate.models.0", "not known; closest: bush", "bush"),
         ({"estimate": {"fit": "none.toml"}}, "estimate.fit", "none.toml", None),
         ({"spec": {"layers": {}}}, "spec.layers", "not known", None),
-        ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "stands in at_hand.motors", None),
+        ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "is in at_hand.motors", None),
     ],
 )
 def test_what_is_refused(data: dict[str, Any], field: str, limit: str, nearest: object) -> None:

@@ -33,13 +33,13 @@ class Quick(Connection):
 
 
 def behind_a_guard(app, client):
-    """Run a client, given a function that connects it, of an app behind a gate that lets one request in."""
+    """Run a client, given a function that connects it, of an app behind a guard that lets one request in."""
 
     async def both():
         listening = socket.create_server(("127.0.0.1", 0))
-        gate = RequestGuard(app, TOKEN, frozenset({"x:1"}), "cookie", AccessKeys(TOKEN), Limits(requests=1))
+        guard = RequestGuard(app, TOKEN, frozenset({"x:1"}), "cookie", AccessKeys(TOKEN), Limits(requests=1))
         config = uvicorn.Config(
-            gate, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_graceful_shutdown=1
+            guard, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_graceful_shutdown=1
         )
         server = uvicorn.Server(config)
         running = asyncio.create_task(server.serve(sockets=[listening]))

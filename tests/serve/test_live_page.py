@@ -332,7 +332,7 @@ EDIT = """(draw) => {
     main.value = String(rest < 0.2 ? -rest : Number(main.value || 1) * (0.5 + rest));
     main.dispatchEvent(new Event("input"));
   } else {
-    main.value = ["", "[1, 2]", "x", "[", '["bush"]', "fill"][Math.floor(rest * 6)];
+    main.value = ["", "[1, 2]", "x", "[", '["rule"]', "fill"][Math.floor(rest * 6)];
     main.dispatchEvent(new Event("change"));
   }
 }"""

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 from running import serving
-from unitcad.serve.gate import BODY_S, LARGEST_BODY
-from unitcad.serve.keys import Keys
 
+from unitcad.serve.access_keys import AccessKeys
+from unitcad.serve.request_guard import BODY_S, LARGEST_BODY
 from unitcad.validation import templates
 
 HOSTS = ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "0.0.0.0", "[::]"]
@@ -113,7 +113,7 @@ def test_a_folder_s_key_opens_its_files_alone(tmp_path, text):
         (tmp_path / "out" / file).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "out" / file).write_text("{}")
     with serving(tmp_path, "embedded", environment={"UNITCAD_TOKEN": "a-token-of-the-lab"}) as own:
-        address = Keys("a-token-of-the-lab").address("one/report.html")
+        address = AccessKeys("a-token-of-the-lab").address("one/report.html")
         key = address.partition("/")[0]
         for file in ("one/report.html", "one/deep/base.stl"):
             status, _, headers = own.send(f"/files/{key}/{file}", headers=OPENED)
@@ -156,7 +156,7 @@ def test_no_path_leads_out_of_a_result(tmp_path, text):
     (one / "link.html").symlink_to(tmp_path / "secret.toml")
     (one / "linked").symlink_to(tmp_path)
     with serving(tmp_path, "embedded", environment={"UNITCAD_TOKEN": "a-token-of-the-lab"}) as own:
-        key = Keys("a-token-of-the-lab").address("one/fine.json").partition("/")[0]
+        key = AccessKeys("a-token-of-the-lab").address("one/fine.json").partition("/")[0]
         assert own.send(f"/files/{key}/one/fine.json")[0] == 200
         for path in [*PATHS, *(f"{key}/{path}" for path in PATHS), *(f"{key}/one/{path}" for path in PATHS)]:
             line = f"GET /files/{path} HTTP/1.1\r\nHost: 127.0.0.1:{own.port}\r\nX-Unitcad-Token: {own.token}\r\n\r\n"

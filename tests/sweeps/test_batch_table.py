@@ -38,7 +38,7 @@ SWEEPS = {
     ),
     "moduli": (
         "encapsulating",
-        {"estimate.moduli": ["dynamic", "quasi-static"], "layers.0.material": ["ecoflex-00-10", "dragon-skin-30"]},
+        {"estimate.moduli": ["small-strain", "quasi-static"], "layers.0.material": ["ecoflex-00-10", "dragon-skin-30"]},
     ),
     "own silicone": (
         "encapsulating",
@@ -50,7 +50,7 @@ SWEEPS = {
     ),
     "models": (
         "encapsulating",
-        {"estimate.models": [["paper"], ["paper", "fitted"]], "layers.0.material": SILICONES[::2]},
+        {"estimate.models": [["published"], ["published", "rule"]], "layers.0.material": SILICONES[::2]},
     ),
 }
 
@@ -76,7 +76,7 @@ def test_the_table_is_what_single_estimates_give(name, tmp_path, monkeypatch):
         spec = sweep.spec(i)
         expected = summary(estimate_spec(spec, layered=lambda asked: {}))["models"]
         assert (row["index"], row["design"], row["diameter_mm"]) == (i, spec.design, spec.diameter_mm)
-        for model in ("paper", "consistent", "fitted"):
+        for model in ("rule", "published", "corrected", "divider"):
             single = expected.get(model, {}).get("edge")
             if single is None:
                 assert row.get(f"edge_{model}") is None
@@ -113,7 +113,7 @@ def test_the_command_writes_the_same_table_each_time_and_no_folders(tmp_path):
     with open(tmp_path / "a" / "variants.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 50
-    assert sum(bool(row["edge_fitted"]) for row in rows) == 2 * 9  # three silicones have a small-strain modulus
+    assert sum(bool(row["edge_rule"]) for row in rows) == 2 * 9  # three silicones have a small-strain modulus
     assert unitcad("batch", "thickness", "--only", "estimate", "-o", tmp_path / "a").returncode == 2
 
 

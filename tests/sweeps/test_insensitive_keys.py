@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
-from unitcad.sweeps.unread_keys import swept_estimate, warnings
 
-from unitcad.attenuation.edge.fitted_models import MODELS, assessments
+from unitcad.attenuation.edge.models import MODELS, assessments
 from unitcad.cli import app
+from unitcad.sweeps.insensitive_keys import swept_estimate, warnings
 from unitcad.sweeps.sweep import from_file, load_sweep
 
 
@@ -20,12 +20,12 @@ def swept(base="encapsulating", mode="product", **values):
 def unread(sweep):
     found = swept_estimate(sweep, sweep.count)
     assert found is not None
-    return {model: keys for model, keys in found.not_read.items() if keys}
+    return {model: keys for model, keys in found.insensitive.items() if keys}
 
 
-def test_the_walls_of_the_shipped_sweep_do_not_enter_the_divider():
+def test_the_walls_of_the_shipped_sweep_do_not_enter_rule_and_divider():
     walls = ["layers.0.wall_mm", "layers.1.wall_mm"]
-    assert unread(load_sweep("thickness")) == {"fitted": walls}
+    assert unread(load_sweep("thickness")) == {"rule": walls, "divider": walls}
 
 
 def test_the_reading_keys_are_those_that_move_a_level():
@@ -55,14 +55,14 @@ def test_keys_of_tooling_casting_and_files_are_no_matter_of_the_estimate():
 
 @pytest.mark.parametrize("mode", ["zip", "cases"])
 def test_keys_that_vary_together_are_told_apart(mode):
-    """The modulus moves every model's level; the wall beside it moves none of the divider's."""
+    """The side of the softer layer moves every model's level; the wall beside it moves none of rule's and divider's."""
     names, walls = ["ecoflex-00-10", "dragon-skin-10-medium"], [1.25, 1.5]
     if mode == "zip":
         sweep = swept(mode="zip", layers__0__material=names, layers__0__wall_mm=walls)
     else:
         cases = [{"layers.0.material": n, "layers.0.wall_mm": w} for n, w in zip(names, walls, strict=True)]
         sweep = from_file({"base": "encapsulating", "sweep": {"mode": "cases", "cases": cases}}, Path(), "s")
-    assert unread(sweep) == {"fitted": ["layers.0.wall_mm"]}
+    assert unread(sweep) == {"rule": ["layers.0.wall_mm"], "divider": ["layers.0.wall_mm"]}
 
 
 def test_a_level_that_is_not_known_says_nothing():
@@ -79,15 +79,15 @@ def test_a_batch_of_units_without_estimates_has_none(tmp_path):
 def test_the_terminal_warns_and_batch_json_tells(tmp_path):
     done = CliRunner().invoke(app, ["batch", "thickness", "--only", "estimate", "-o", str(tmp_path / "b")])
     assert done.exit_code == 0
-    warning = "warning: fitted does not read layers.0.wall_mm and layers.1.wall_mm: its level stays the same"
+    warning = "warning: rule and divider do not read layers.0.wall_mm and layers.1.wall_mm: their level stays the same"
     assert warning in done.output
     told = json.loads((tmp_path / "b" / "batch.json").read_text())["estimate"]
     assert told["not_measured"] == {"layers.0.wall_mm": 1.25, "layers.1.wall_mm": 1.25}
-    assert told["not_read"] == {
-        "bush": [],
-        "fitted": ["layers.0.wall_mm", "layers.1.wall_mm"],
-        "paper": [],
-        "consistent": [],
+    assert told["insensitive"] == {
+        "rule": ["layers.0.wall_mm", "layers.1.wall_mm"],
+        "divider": ["layers.0.wall_mm", "layers.1.wall_mm"],
+        "published": [],
+        "corrected": [],
     }
     for model, typical in told["typical_error"].items():
         assert typical == pytest.approx(assessments()[model].left_out.geometric_mean, rel=1e-5)
@@ -122,10 +122,11 @@ def test_a_control_s_wall_is_that_of_the_measured_controls():
     assert found.not_measured == {"layers.0.wall_mm": 2.5}
 
 
-def test_units_without_a_level_say_nothing_of_what_models_read():
-    """Of three layers no length was measured, and no model has an error."""
+def test_a_wall_of_two_layers_is_the_one_that_was_measured():
     sweep = from_file({"base": "three-layer", "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "three")
-    assert swept_estimate(sweep, sweep.count) is None
+    three = swept_estimate(sweep, sweep.count)
+    assert three is not None
+    assert three.not_measured == {}
     both = {"base": ["three-layer", "encapsulating"], "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}
     sweep = from_file(both, Path(), "both")
     found = swept_estimate(sweep, sweep.count)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from unitcad.accuracy.responses import REFERENCE, respond
-from unitcad.attenuation.edge.fitted_models import assessments, edge_levels, in_order, stored
 from unitcad.attenuation.edge.inputs_seen import changed, ends
+from unitcad.attenuation.edge.models import assessments, edge_levels, in_order, stored
 from unitcad.attenuation.edge.variant_units import stacked
 from unitcad.attenuation.inputs import EstimateInput, body
 from unitcad.estimating import closed_forms, fit_of

@@ -10,7 +10,7 @@ from unitcad.accuracy.timing import Timing, interleaved
 from unitcad.cache import MemoryStore
 from unitcad.pipeline.make import Progress, Subject, forget
 from unitcad.pipeline.manifest import Manifest
-from unitcad.spec.asked import OUTPUTS
+from unitcad.spec.raw import OUTPUTS
 
 Request = tuple[Sequence[str], Sequence[str], bool]
 """Outputs, formats, checks."""

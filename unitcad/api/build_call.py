@@ -17,7 +17,7 @@ from unitcad.pipeline.write import PAGE, Built, held
 from unitcad.pipeline.write import build as build_whole
 from unitcad.report import write_report
 from unitcad.spec import Spec
-from unitcad.spec.asked import OUTPUTS, Format
+from unitcad.spec.raw import OUTPUTS, Format
 from unitcad.validation import Changes, Source
 
 
@@ -32,9 +32,28 @@ class Buildable(Protocol):
 
 @dataclass(frozen=True, repr=False)
 class BuildResult(Built):
-    """A built variant, or several units together: its folder, its manifest and the unit's spec.
+    """A built variant, or an array of units.
 
-    `manifest` is manifest.json as data: parts, mould checks, mesh checks, skipped outputs; mm, mm2 and mm3.
+    Attributes
+    ----------
+    folder : Path
+        Folder of the result.
+    manifest : dict
+        manifest.json as data: parts (mm, mm2, mm3), ``mould_checks``, mesh checks, ``skipped`` outputs and files.
+    ok : bool
+        Whether every check passed.
+    spec : Spec
+        Spec of the unit.
+    volumes : dict of str to float
+        Volume of each body's mesh, mm3, by name.
+
+    Examples
+    --------
+    >>> import tempfile, unitcad
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     built = unitcad.build("single-embedded", out, formats="stl", only="unit")
+    >>> [part["name"] for part in built.manifest["parts"]]
+    ['layer1', 'motor', 'fpcb']
     """
 
     spec: Spec
@@ -83,15 +102,44 @@ def build(
     report: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> BuildResult:
-    """Build a unit and its moulds, or an array of units, into a folder below `out`, and return the result.
+    """Build a unit and its moulds, or an array of units.
 
-    `source` and `set` are as for `unitcad.load`; `source` may also be the name, file or data of an array, or an array
-    that `unitcad.arrays.load_array` returned. `formats` ("stl", "3mf", "step", "svg", "png",
-    "glb") and `only` ("unit", "moulds", "estimate", "casting") choose the outputs. Without `check` mould checks and
-    mesh checks are skipped. `report` writes report.html, one offline page. `progress` is called with the name of each
-    step.
-    `BuildResult.ok` tells whether every check passed; volumes and sizes of the result are in mm3 and mm.
-    Raises Refusal or UnitcadError before anything is written.
+    Parameters
+    ----------
+    source : str, path, dict, Spec, Variant or Array
+        Name of a template, path of a TOML file (with a path separator or ending in .toml), or a spec's data.
+    set : dict or sequence of str, optional
+        Changes by dotted path: ``{"layers.0.wall_mm": 1.2}`` or ``["layers.0.wall_mm=1.2"]``. Lengths in mm.
+    out : path, default "out"
+        Folder in which the result's folder is made.
+    formats : str or sequence of str, optional
+        Any of "stl", "3mf", "step", "svg", "png", "glb". Default: those of the spec.
+    only : str or sequence of str, optional
+        Outputs: any of "unit", "moulds", "estimate", "casting". Default: all.
+    check : bool, default True
+        Run the mould checks and the mesh checks.
+    report : bool, default False
+        Write report.html, one offline page.
+    progress : callable, optional
+        Called with the name of each step.
+
+    Returns
+    -------
+    BuildResult
+        The folder and its manifest. A failed check is no exception: see ``ok``.
+
+    Raises
+    ------
+    Refusal, UnitcadError
+        For an invalid spec or argument, before anything is written.
+
+    Examples
+    --------
+    >>> import tempfile, unitcad
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     built = unitcad.build("single-embedded", out, formats="stl", only="unit")
+    >>> built.ok, round(built.volumes["layer1"])
+    (True, 181)
     """
     into, say = Path(path("out", out)), progress or _silent
     wanted = load_subject(source, set)

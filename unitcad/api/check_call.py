@@ -29,7 +29,26 @@ _MOST_CODES = 5
 
 @dataclass(frozen=True, repr=False)
 class CheckResult:
-    """The reports of some files, one a file, in order."""
+    """The reports of some files.
+
+    Attributes
+    ----------
+    reports : tuple of FileReport
+        One report a file, in order.
+    verdict : str
+        The worst verdict: "error", "warning" or "pass".
+    ok : bool
+        Whether no file has an error; warnings do not count.
+    findings : tuple of Finding
+        The findings of all files.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> result = unitcad.check("missing.stl")
+    >>> result.verdict, result.findings[0].code
+    ('error', 'F012')
+    """
 
     reports: tuple[FileReport, ...]
 
@@ -80,11 +99,48 @@ def check(
 ) -> CheckResult:
     """Check mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB, and STEP with an extra.
 
-    `files` are files, folders or globs. `printer`, a name of the catalogue or an entry, asks for the rules of fit and
-    printability. `unit` ("mm", "in" and so on) is that of formats that have none. `select` and `ignore` are prefixes
-    of codes; `shells` is the number expected; with `strict`, crossings too shallow for any printer are errors.
-    `timeout` is in seconds a file. With `jobs` above 1 worker processes check the files. Faults of a file, and missing
-    files, are findings in the result; lengths in mm. Raises Refusal or UnitcadError for an invalid argument.
+    Parameters
+    ----------
+    *files : path
+        Files, folders or globs.
+    printer : str or Printer, optional
+        A printer of the catalogue or an entry. Adds the rules of fit and printability (S002, D).
+    unit : str, optional
+        Unit of formats that have none: "mm", "in" and so on. Default: mm.
+    select, ignore : sequence of str, optional
+        Prefixes of codes; the longest prefix that fits decides.
+    shells : int, optional
+        Number of shells expected (G005).
+    strict : bool, default False
+        Treat crossings and folds too shallow for any printer as errors.
+    strict_3mf : bool, default False
+        Follow the 3MF specification to the letter.
+    max_faces : int, optional
+        Most faces of a file. Default: 10,000,000.
+    timeout : float, optional
+        Most seconds a file. Default: 600.
+    jobs : int, default 1
+        Number of worker processes.
+
+    Returns
+    -------
+    CheckResult
+        One report a file. A missing or damaged file is a finding, not an exception. Lengths in mm.
+
+    Raises
+    ------
+    Refusal, UnitcadError
+        For an invalid argument.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile, unitcad
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = pathlib.Path(folder, "open.obj")
+    ...     _ = file.write_text("v 0 0 0\\nv 9 0 0\\nv 0 9 0\\nv 0 0 9\\nf 1 3 2\\nf 1 2 4\\nf 2 3 4\\n")
+    ...     result = unitcad.check(file)
+    >>> result.ok, [finding.code for finding in result.findings]
+    (False, ['T001'])
     """
     if printer is not None:
         if isinstance(printer, str):

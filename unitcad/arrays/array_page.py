@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from html import escape
@@ -26,11 +25,6 @@ from unitcad.spec import read_toml
 from unitcad.text import number
 
 CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg", "crosstalk-edge.svg"), "circuit.svg"
-MODELS = {
-    "bush": "bush takes each layer for a bonded rubber bush, for a motor that moves sideways",
-    "crossings": "crossings weakens the motion only at each boundary between two layers",
-}
-"""Descriptions of the models that an estimate's answer names."""
 LARGEST = 8_000_000
 """Bytes of a drawing or picture, at most."""
 SIDES = ("skin-side", "bent", "back")
@@ -220,12 +214,7 @@ def _units(folder: Path, manifest: ArrayManifest) -> str:
         page = f"{unit}/{PAGE}" if (folder / unit / PAGE).is_file() else f"{unit}/casting.md"
         rows.append(f'<tr><td><a href="{escape(page)}">{escape(unit)}</a></td><td>{count[unit]}</td></tr>')
     level = manifest["estimate"]
-    answer = level["answer"] if level else ""
-    said = f"<p>{escape(answer)}</p>" if answer else ""
-    if named := [words for model, words in MODELS.items() if re.search(rf"\b{model}\b", answer)]:
-        said += (
-            f'<p class="note">Models of the level at the edge: {escape("; ".join(named))}. docs/model.md has all.</p>'
-        )
+    said = "".join(f"<p>{escape(line)}</p>" for line in level["lines"]) if level else ""
     return f"<table><thead><tr><th>unit</th><th>places</th></tr></thead><tbody>{''.join(rows)}</tbody></table>{said}"
 
 

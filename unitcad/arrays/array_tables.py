@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from unitcad.catalogue import entries as kinds
-from unitcad.spec.asked import CastingTable, EstimateTable, Length, MouldsTable, OutputTable, Table
+from unitcad.spec.raw import CastingTable, EstimateTable, Length, MouldsTable, OutputTable, Table
 
 Construction = Literal["pockets", "back-sheet"]
 Cast = Literal["flat", "curved"]

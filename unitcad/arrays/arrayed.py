@@ -85,7 +85,7 @@ from unitcad.pipeline.plan import (
 )
 from unitcad.pipeline.subjects import Compound
 from unitcad.spec import Spec, read_toml
-from unitcad.spec.asked import Format
+from unitcad.spec.raw import Format
 from unitcad.validation import Changes
 
 

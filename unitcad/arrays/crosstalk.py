@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.arrays.array import Array
-from unitcad.attenuation.crosstalk import Reading, decay, ends
-from unitcad.attenuation.edge.estimates import not_of_this_drive
+from unitcad.attenuation.crosstalk import RANGE, Reading, contact, decay, ends
 from unitcad.attenuation.inputs import Drive, EstimateInput, body
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
 from unitcad.errors import Refusal
@@ -23,16 +22,9 @@ from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.text import listed, number, some
 
 BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
-SHAPE = (0.82, 1.14)
-"""Finite elements of eight units follow the bare disc's decay within these factors, from 9 to 30 mm, axial drive."""
 MOST_LOADED = 100
 """Units whose masses are taken into account at once."""
 DIGITS = 6
-RANGE = (
-    "body's moduli, damping and thicknesses and the frequency to either end of their ranges, one kind at a time; and "
-    f"times {SHAPE[0]:g} to {SHAPE[1]:g}, within which finite elements of eight units follow the decay from 9 to 30 mm "
-    "under an axial drive (nearer, farther and under a sideways drive that is not checked)"
-)
 ASSUMPTIONS = [
     "The decay is that of the bare, laterally uniform skin under each unit's own motor; the other units, the sheet and "
     "the circuit are not on it.",
@@ -143,19 +135,27 @@ class Told:
 
     def of(
         self, drive: Drive | None = None, hertz: float | None = None, end: dict[str, int] | None = None
-    ) -> dict[str, float]:
-        """Return the nearest neighbour's decay to centre and edge, and the sums at the worst place."""
+    ) -> dict[str, np.ndarray]:
+        """Return the nearest neighbour's decay to centre and edge, and the sums at the worst place.
+
+        Each is (3,): of bare skin, and times the least and the largest factor of `contact`.
+        """
         if self.nearest is None:
-            return {"nearest_centre": 0.0, "nearest_edge": 0.0, "sum": 0.0, "root_sum_of_squares": 0.0}
+            return dict.fromkeys(("nearest_centre", "nearest_edge", "sum", "root_sum_of_squares"), np.zeros(3))
         pairs, (i, j) = self.units.pairs, self.nearest
         others = np.delete(np.arange(pairs.count), self.worst)
         distances = np.append(pairs.centre[others, self.worst], [pairs.centre[i, j], pairs.edge[i, j]])
-        found = self.units.decays(np.append(others, [i, i]), distances, drive, hertz, end)
+        drivers = np.append(others, [i, i])
+        found = self.units.decays(drivers, distances, drive, hertz, end)
+        own = [self.units.inputs[kind] for kind in self.units.kind[drivers]]
+        away = distances - [500.0 * one.diameter for one in own]
+        factors = np.array([contact(drive or one.drive, mm) for one, mm in zip(own, away, strict=True)]).T
+        found = found * np.concatenate([np.ones((1, found.size)), factors])
         return {
-            "nearest_centre": float(found[-2]),
-            "nearest_edge": float(found[-1]),
-            "sum": float(found[:-2].sum()),
-            "root_sum_of_squares": float(np.linalg.norm(found[:-2])),
+            "nearest_centre": found[:, -2],
+            "nearest_edge": found[:, -1],
+            "sum": found[:, :-2].sum(axis=1),
+            "root_sum_of_squares": np.linalg.norm(found[:, :-2], axis=1),
         }
 
 
@@ -169,7 +169,7 @@ def crosstalk(
 
     `matrix`: the decay between each two units by drive, rows the unit that drives, to the other's centre and nearest
     edge, null for itself, at the units' own frequencies; `sums`: the sum at each place; `band`: the same at the
-    nearest neighbour and the worst place over frequencies (Hz); `absolute`: a range over the models; `masses`: with the
+    nearest neighbour and the worst place over frequencies (Hz); `absolute`: a range; `masses`: with the
     masses of the others on the skin. Raises Refusal for a unit without an estimate, a frequency that no body takes,
     and for masses of more than `MOST_LOADED` units.
     """
@@ -188,7 +188,7 @@ def crosstalk(
     say("crosstalk: range")
     varied = {str(end): end for one in units.inputs for end in ends(one)}.values()
     answers = [told.of(), *(told.of(end=end) for end in varied)]
-    ranged = {key: _quantity(*[one[key] for one in answers]) for key in answers[0]}
+    ranged = {key: _quantity(np.array([one[key] for one in answers])) for key in answers[0]}
     names = [place.name for place in array.places]
     data: dict[str, Any] = {
         "array": array.name,
@@ -232,11 +232,14 @@ def crosstalk(
     data["band"] = [
         {
             "frequency_hz": hertz,
-            **{drive: {key: round(one, DIGITS) for key, one in told.of(drive, hertz).items()} for drive in matrices},
+            **{
+                drive: {key: round(float(one[0]), DIGITS) for key, one in told.of(drive, hertz).items()}
+                for drive in matrices
+            },
         }
         for hertz in band
     ]
-    data["absolute"] = _absolute(units, own[..., 0], told.worst)
+    data["absolute"] = _absolute(units, own[..., 0], told.worst, ranged)
     if masses:
         say("crosstalk: masses")
         data["masses"] = _masses(units)
@@ -248,11 +251,10 @@ def _sums(matrix: np.ndarray) -> dict[str, np.ndarray]:
     return {"sum": matrix.sum(axis=0), "root_sum_of_squares": np.sqrt((matrix**2).sum(axis=0))}
 
 
-def _quantity(value: float, *others: float) -> dict[str, float]:
-    """Return a value with its range: the least and largest of it and `others`, times `SHAPE`."""
-    every = (value, *others)
-    low, high = SHAPE[0] * min(every), SHAPE[1] * max(every)
-    return {key: round(float(one), DIGITS) for key, one in (("value", value), ("low", low), ("high", high))}
+def _quantity(every: np.ndarray) -> dict[str, float]:
+    """Return a value with its range, of `Told.of` at the nominal body and at the ends, a row each."""
+    ends = {"value": every[0, 0], "low": every[:, 1].min(), "high": every[:, 2].max()}
+    return {key: round(float(one), DIGITS) for key, one in ends.items()}
 
 
 def _nearest(units: Decays, own: np.ndarray) -> tuple[int, int] | None:
@@ -265,38 +267,26 @@ def _nearest(units: Decays, own: np.ndarray) -> tuple[int, int] | None:
     return i, j
 
 
-def _absolute(units: Decays, own: np.ndarray, worst: int) -> dict[str, Any]:
-    """Return the amplitude at the worst place from the others, in motors' amplitudes: a range over the models.
+def _absolute(units: Decays, own: np.ndarray, worst: int, ranged: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+    """Return the amplitude at the worst place from the others, in motors' amplitudes, as a range.
 
-    The models' levels at the edge, each to the ends of its inputs' ranges, times the nominal decay.
+    The 80 % ranges of the units' levels at the edge, all at one end, times the decay at the same end of its range.
     """
-    blocks = [estimate_spec(unit, layered=lambda variant: {})["models"] for unit in units.array.units]
-    by_model: dict[str, dict[str, float]] = {}
-    for model in blocks[0]:
-        levels = [block[model]["edge_level"] for block in blocks]
-        if any(not_of_this_drive(one, [model]) for one in units.inputs) or any(one["low"] is None for one in levels):
-            continue
-        low, high = (np.array([levels[kind][key] for kind in units.kind]) for key in ("low", "high"))
-        by_model[model] = {
-            f"{name}_{key}": round(float(_sums(own * level[:, None])[name][worst]), DIGITS)
-            for name in ("sum", "root_sum_of_squares")
-            for key, level in (("low", low), ("high", high))
-        }
+    answers = [estimate_spec(unit, (), layered=lambda variant: {})["answer"] for unit in units.array.units]
     block: dict[str, Any] = {
         "place": units.array.places[worst].name,
         "unit": "of the motor's amplitude",
-        "range": "models' levels at the edge to the ends of their inputs' ranges; nominal decay",
+        "range": "80 % ranges of the levels at the edge, times the range of the decay",
+        **dict.fromkeys(("sum", "root_sum_of_squares")),
     }
-    for name in ("sum", "root_sum_of_squares"):
-        if not by_model:
-            block[name] = None
-            continue
-        low = min(one[f"{name}_low"] for one in by_model.values())
-        high = max(one[f"{name}_high"] for one in by_model.values())
-        block[name] = {"low": low, "high": high}
-    if not by_model:
-        block["reason"] = "no model gives a level for every unit"
-    return {**block, "by_model": by_model}
+    if any(one["p10"] is None for one in answers):
+        return {**block, "reason": "the level of a unit is not known"}
+    for end, point in (("low", "p10"), ("high", "p90")):
+        level = np.array([one[point] for one in answers])[units.kind]
+        for name, sums in _sums(own * level[:, None]).items():
+            part = ranged[name][end] / max(ranged[name]["value"], 1e-300)
+            block[name] = {**(block[name] or {}), end: round(float(sums[worst]) * part, DIGITS)}
+    return block
 
 
 def _masses(units: Decays) -> dict[str, Any]:
@@ -387,8 +377,8 @@ def crosstalk_csv(array: Array, band: Sequence[float] = BAND_HZ) -> bytes:
 
 
 IN_BRACKETS = (
-    "In brackets is the range: tissue moduli, damping, thicknesses and frequency taken to both ends of their ranges, "
-    "and how far finite elements differ from the computed decay."
+    "In brackets is the range: tissue moduli, damping, thicknesses and frequency at both ends of their ranges, "
+    "and a unit that sticks to the skin or rests on it."
 )
 ALIKE = 1e-3
 """Sums that differ by less, as a share, are called alike."""
@@ -483,8 +473,8 @@ def _absolute_line(block: Mapping[str, Any]) -> str:
         return f"No absolute level: {block['reason']}."
     said = [f"{number(100 * one['low'], 2)} to {number(100 * one['high'], 2)} %" for one in (root, phase)]
     return (
-        f"At {block['place']} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase: the "
-        "models of the level at a unit's edge differ so much."
+        f"At {block['place']} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase: so "
+        "wide are the ranges of the level at a unit's edge and of the decay."
     )
 
 

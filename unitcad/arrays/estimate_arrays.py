@@ -91,7 +91,7 @@ def estimate_arrays(
     for one in compared:
         screen.print(ratio_line(one), soft_wrap=True)
     if not details:
-        typer.echo("--details prints the sum at each unit, the pairs, the band, each model's range and the assumptions")
+        typer.echo("--details prints the sum at each unit, the pairs, the band and the assumptions")
 
 
 def _print_details(data: Mapping[str, Any]) -> None:
@@ -103,8 +103,6 @@ def _print_details(data: Mapping[str, Any]) -> None:
         screen.print(_matrix(data, names))
     if data["band"] and len(names) > 1:
         screen.print(_band(data))
-    if data["absolute"]["by_model"]:
-        screen.print(_models(data["absolute"]))
     ranges = f"In brackets: {data['range']}."
     for line in (ranges, *data["assumptions"], f"Distances are {data['distances']}."):
         screen.print(f"  {line}", soft_wrap=True)
@@ -147,18 +145,4 @@ def _band(data: Mapping[str, Any]) -> Table:
             cells += [number(100 * one[key], 2) for key in ("nearest_centre", "nearest_edge")]
             cells += [number(one[key], 2) for key in ("root_sum_of_squares", "sum")]
         table.add_row(f"{row['frequency_hz']:g}", *cells)
-    return table
-
-
-def _models(absolute: Mapping[str, Any]) -> Table:
-    """Tabulate each model's range at the worst place."""
-    table = Table(
-        "model", "root of squares %", "in phase %", title=f"at {absolute['place']}, % of the motor's amplitude"
-    )
-    for model, one in absolute["by_model"].items():
-        cells = []
-        for key in ("root_sum_of_squares", "sum"):
-            low, high = (number(100 * one[f"{key}_{end}"], 2) for end in ("low", "high"))
-            cells.append(low if low == high else f"{low} to {high}")
-        table.add_row(model, *cells)
     return table

@@ -27,7 +27,7 @@ from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import Shape, cut, cylinder, moved, rotated
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, to_json, with_formats
-from unitcad.spec.effective import CastLayer
+from unitcad.spec.resolved import CastLayer
 
 SHEET = "sheet"
 

@@ -1,9 +1,9 @@
-"""What of a unit's motion reaches a neighbour: the skin there over the skin at the unit's edge, with a range."""
+"""Crosstalk, a unit's motion at a neighbour: the skin there over the skin at the unit's edge, with a range."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,8 +12,19 @@ from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.layered.response import components
 
 RANGE = (
-    "moduli, damping and thicknesses of the body and the frequency to either end of their ranges, one kind at a time"
+    "moduli, damping and thicknesses of the body and the frequency to either end of their ranges, one kind at a time; "
+    "and what a unit on the skin changes, bonded or resting, by finite elements (`CONTACT`)"
 )
+CONTACT_MM = (0.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
+CONTACT: dict[Drive, tuple[tuple[float, ...], tuple[float, ...]]] = {
+    "flat": ((1.0, 0.82, 0.66, 0.48, 0.34, 0.23, 0.19, 0.14), (1.0,) * 8),
+    "axial": ((1.0, 0.83, 0.84, 0.9, 0.9, 0.9, 0.9, 0.9), (1.0, 1.0, 1.05, 1.47, 1.5, 1.5, 1.58, 2.14)),
+}
+"""Factors between |u| over that at the edge and bare skin's, least and largest, at `CONTACT_MM` from the edge.
+
+Finite elements of the paper's two designs with four pairs of silicones each, skin that sticks to the unit or lets it
+slide, 100 to 150 Hz, against the layered solver (`python -m benchmarks.accuracy skin` makes them again).
+"""
 Reading = Literal["u", "u_z"]
 _RTOL = 1e-3
 
@@ -21,8 +32,8 @@ _RTOL = 1e-3
 def crosstalk_ratio(variant: EstimateInput, pitch: float, spread: bool = True) -> Quantity:
     """Return |u| of the bare skin at `pitch` (m) from the unit's middle over |u| at its edge, under its motor's drive.
 
-    The layered half-space's own decay; the unit and its neighbour are not on it. low and high: `RANGE`, without
-    `spread` none. Raises `Refusal` for values that no body has.
+    The layered half-space's own decay. low and high: `RANGE`, without `spread` none. Raises `Refusal` for values that
+    no body has.
     """
 
     def ratio(end: dict[str, int]) -> float:
@@ -31,12 +42,19 @@ def crosstalk_ratio(variant: EstimateInput, pitch: float, spread: bool = True) -
     value = ratio({})
     if not spread:
         return Quantity(value)
-    others = [ratio(end) for end in ends(variant)]
-    return Quantity(value, min(value, *others), max(value, *others))
+    every = [value, *(ratio(end) for end in ends(variant))]
+    low, high = (float(factor) for factor in contact(variant.drive, 1e3 * (pitch - variant.diameter / 2.0)))
+    return Quantity(value, low * min(every), high * max(every))
+
+
+def contact(drive: Drive, mm: float | np.ndarray) -> tuple[Any, Any]:
+    """Return the least and the largest factor of `CONTACT` at distances from a unit's edge, mm; 1 inside it."""
+    low, high = (np.interp(mm, CONTACT_MM, factors) for factors in CONTACT[drive])
+    return low, high
 
 
 def ends(variant: EstimateInput) -> list[dict[str, int]]:
-    """Return what `RANGE` names, each kind at its low and its high end, as `decay` takes it."""
+    """Return the inputs that `RANGE` names, each kind at its low and its high end, as `decay` takes it."""
     ranged = variant.frequency.ends[0] < variant.frequency.ends[1]
     kinds = ["moduli", "damping", "thicknesses", *(["frequency"] if ranged else [])]
     return [{kind: end} for kind in kinds for end in (0, 1)]

@@ -1,4 +1,4 @@
-"""What an estimate is made from: a variant in SI units, each uncertain number with its range."""
+"""Inputs of an estimate: a variant in SI units, each uncertain number with its range."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Drive = Literal["flat", "axial"]
 
 
 class Quantity(msgspec.Struct, frozen=True):
-    """A number and the range that it may lie in. No value but a range: nobody measured it, `note` says where from.
+    """A number and its range. A range without a value: nobody measured it, `note` has the source.
 
     Neither value nor range: not known, `note` is the reason.
     """
@@ -37,7 +37,7 @@ class Quantity(msgspec.Struct, frozen=True):
 
     @property
     def ends(self) -> tuple[float, float]:
-        """(low, high); the value where no range is given."""
+        """(low, high); the value if there is no range."""
         return (
             self.middle if self.low is None else self.low,
             self.middle if self.high is None else self.high,
@@ -60,7 +60,7 @@ class SiliconeLayer(msgspec.Struct, frozen=True):
 
 
 class LayerShape(msgspec.Struct, frozen=True):
-    """Where a layer of the unit ends, m: its outer radius, the height of its top and its cap (0: an open ring)."""
+    """Outer lengths of a layer of the unit, m: its radius, the height of its top and its cap (0: an open ring)."""
 
     outer_radius: float
     top: float
@@ -78,7 +78,7 @@ class Pad(msgspec.Struct, frozen=True):
 class Geometry(msgspec.Struct, frozen=True):
     """A unit's lengths in m, of the section through its axis; z = 0 is the skin, heights count away from it.
 
-    cavity_radius   where Layer 1 begins; equal to the motor's radius if Layer 1 reaches the motor
+    cavity_radius   inner radius of Layer 1; equal to the motor's radius if Layer 1 reaches the motor
     core_height     top of the cavity, under the first cap
     layers          inside out
     motor_mass      kg
@@ -97,7 +97,7 @@ class Geometry(msgspec.Struct, frozen=True):
 
     @property
     def gap(self) -> float:
-        """Width of the ring of air between motor and Layer 1, m; 0 where the gap is filled."""
+        """Width of the ring of air between motor and Layer 1, m; 0 if the gap is filled."""
         return self.cavity_radius - self.motor_radius
 
 
@@ -134,7 +134,7 @@ class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
     frequency: Quantity
     amplitude: float | None = None
     drive: Drive = "flat"
-    moduli: Literal["dynamic", "quasi-static"] = "dynamic"
+    moduli: Literal["small-strain", "quasi-static"] = "small-strain"
 
     @property
     def motor_diameter(self) -> float:

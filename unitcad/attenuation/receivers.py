@@ -50,7 +50,7 @@ class Patch:
 def influence(medium: LayeredMedium, patches: Sequence[Patch], omega: float, rtol: float = 1e-4) -> np.ndarray:
     """Return G at omega (rad/s) in m/N, shape (n, 3, n, 3): mean motion (x, y, z) of each patch per newton on each.
 
-    rtol as `LayeredMedium.response`; the means add about 5e-4 of the largest entry. Raises `Refusal` where patches
+    rtol as `LayeredMedium.response`; the means add about 5e-4 of the largest entry. Raises `Refusal` if patches
     overlap.
     """
     n = len(patches)

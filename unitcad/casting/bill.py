@@ -1,4 +1,4 @@
-"""The bill of materials: what to print, cut, buy and weigh for one set of moulds and one casting of it."""
+"""The bill of materials: items to print, cut, buy and weigh for one set of moulds and one casting of it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from unitcad.text import cell, number
 
 @dataclass(frozen=True)
 class Item:
-    """One line: how many of what, how it is made or lies on the printer, and a remark; `least_ml`: of a container."""
+    """One line: number and item, how it is made or placed on the printer, and a remark; `least_ml`: of a container."""
 
     item: str
     quantity: float
@@ -61,7 +61,7 @@ def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
 
 
 def grouped(items: Iterable[Item]) -> dict[str, list[Item]]:
-    """Return a bill by what a person does: print, buy, have."""
+    """Return a bill by activity: print, buy, have."""
     groups: dict[str, list[Item]] = {"print": [], "buy": [], "have": []}
     for item in items:
         groups["print" if item.made.startswith("printed") else "buy" if item.made == "bought" else "have"].append(item)
@@ -127,7 +127,7 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
 
 
 def injecting(batches: Sequence[Batch]) -> Iterator[Item]:
-    """List what pours under a lid take, each with its mix."""
+    """List the items for pours under a lid, each with its mix."""
     size = max(batch.mix.syringe_size_ml for batch in batches)
     tip = number(batches[0].moulds.spec.moulds.sprue_mm, 3)
     yield Item("syringe", len(batches), "piece", "bought", f"{number(size, 3)} ml, tip up to {tip} mm")
@@ -135,7 +135,7 @@ def injecting(batches: Sequence[Batch]) -> Iterator[Item]:
 
 
 def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], after: int = 0) -> Iterator[Item]:
-    """List what pours and steps take; `after`: mixes after the pours."""
+    """List the items for pours and steps; `after`: mixes after the pours."""
     pours, cups = len(moulds.plan.steps), moulds.plan.of_kind("cup")
     yield Item("mixing cups and sticks", pours + after, "set", "bought", "no latex, no sulphur clay")
     yield Item("gloves", pours, "pair", "bought", "nitrile or vinyl")
@@ -163,7 +163,7 @@ def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchSt
 def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tuple[Body, ...]]:
     """Return the bodies of each of the printer's plates by its 3MF: `stem`.3mf, or numbered if there are several.
 
-    In their order, each on the first plate where it lies beside what is there.
+    In their order, each on the first plate with room for it.
     """
     bed_x, bed_y = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
     filled: list[dict[Body, tuple[float, float]]] = []

@@ -1,6 +1,6 @@
-"""The cast record: what was weighed, timed and measured when a spec was cast, as the bench page saves it.
+"""The cast record: weights, times and measures of a casting, as the bench page saves it.
 
-A JSON file, its keys ending in their units. A list may be empty and a number null where nobody looked.
+A JSON file, its keys ending in their units. A list may be empty and a number null if nobody looked.
 
     {"format": "unitcad cast record", "version": 1, "spec_name": "demo", "spec_hash": "0f3a91c27b5e",
      "cast_on": "2026-03-14",
@@ -20,7 +20,7 @@ from msgspec import Meta
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import convert
-from unitcad.spec.asked import Table
+from unitcad.spec.raw import Table
 
 FORMAT = "unitcad cast record"
 ENDING = ".cast.json"
@@ -85,7 +85,7 @@ class CastUnit(Table, frozen=True, kw_only=True):
     notes: Annotated[tuple[Line, ...], Meta(max_length=200, description="remarks")] = ()
 
     def wall_mm(self, layer: int) -> tuple[float, ...]:
-        """Return what was measured of a layer's wall (from 1), mm; () where nothing was."""
+        """Return the measured thicknesses of a layer's wall (from 1), mm; () for none."""
         return next((wall.places_mm for wall in self.walls if wall.layer == layer), ())
 
 
@@ -107,18 +107,18 @@ class CastRecord(Table, frozen=True, kw_only=True):
     notes: Annotated[tuple[Line, ...], Meta(max_length=200, description="remarks")] = ()
 
     def unit(self, cavity: int) -> CastUnit | None:
-        """Return the unit of a cavity; None where the record has none."""
+        """Return the unit of a cavity; None if the record has none."""
         return next((unit for unit in self.units if unit.cavity == cavity), None)
 
 
 def read_cast_record(path: Path, *, links: bool = True) -> CastRecord:
     """Return the record in a JSON file; without `links` a symbolic link is refused.
 
-    Raises UnitcadError where the file can't be read, Refusal for the first value that is not valid.
+    Raises UnitcadError if the file can't be read, Refusal for the first value that is not valid.
     """
     data = files.read_json(path, largest=LARGEST, links=links)
     if not isinstance(data, dict):
-        raise UnitcadError(f"{path}: is not a cast record: it holds no table")
+        raise UnitcadError(f"{path}: is not a cast record: it has no table")
     if data.get("format") != FORMAT:
         raise UnitcadError(f"{path}: is not a cast record: its key format is not {FORMAT!r}")
     return cast_record(data)

@@ -49,7 +49,7 @@ JAWS = 4.0
 
 @dataclass(frozen=True)
 class Fit:
-    """One feature of the coupon: the printer's key that it settles, what to choose, the value of each station (mm)."""
+    """One feature of the coupon: the printer's key that it settles, the choice, the value of each station (mm)."""
 
     feature: str
     key: str
@@ -57,7 +57,7 @@ class Fit:
     values_mm: tuple[float, ...]
 
     def toml(self, station: int) -> str:
-        """Return the line of TOML for a station (from 0), to stand under [printers.NAME] with like = the printer."""
+        """Return the line of TOML for a station (from 0), under [printers.NAME] with like = the printer."""
         return f"{self.key} = {self.values_mm[station]:g}"
 
 
@@ -85,9 +85,9 @@ class Coupon:
         self.pitch = 2 * self.handle + JAWS
         bears = "until it sits, no leaf cracked" if self.leaf else "until it sits"
         rows = (
-            ("recess", "plinth_clearance_mm", "least where the plug drops in"),
+            ("recess", "plinth_clearance_mm", "least at which the plug drops in"),
             ("ribs", "rib_interference_mm", f"most that the plug is pressed through by hand {bears}"),
-            ("window", "window_clearance_mm", "least where the greased tongue slides"),
+            ("window", "window_clearance_mm", "least at which the greased tongue slides"),
             ("hole", "filament_hole_mm", "least that takes the filament by hand"),
             ("wall", "least_wall_mm", "thinnest that stands closed and stiff"),
             ("number", "engraving_stroke_mm", "narrowest that reads"),
@@ -107,16 +107,16 @@ class Coupon:
         ]
 
     def x(self, station: int) -> float:
-        """Return where a station (from 0) lies along x."""
+        """Return x of a station (from 0)."""
         return MARGIN + self.pitch * (station + 0.5)
 
     def y(self, feature: str) -> float:
-        """Return where the stations of a feature lie along y."""
+        """Return y of a feature's stations."""
         behind = self.ribbed and feature not in ("recess", "ribs")
         return _ROWS[feature] + (2 * self.handle + 6.0 if behind else 0.0)
 
     def bodies(self) -> tuple[Body, ...]:
-        """Draw the pieces as they lie on the bed: the plate, the plug (a plinth on a handle) and the tongue."""
+        """Draw the pieces as placed on the bed: the plate, the plug (a plinth on a handle) and the tongue."""
         half = self.handle
         taper = moved(turned(self._taper(0.0), "x", 2), 0, 0, 4 + self.height)
         plug = union((box(-half, half, -half, half, 0, 4), taper))
@@ -222,7 +222,7 @@ class Coupon:
 
 
 def write(printer: Printer, out: Path) -> Path:
-    """Write `out`/coupon-<printer>; return that folder. Raises UnitcadError where it can't be written."""
+    """Write `out`/coupon-<printer>; return that folder. Raises UnitcadError if it can't be written."""
     folder, coupon, parts = out / f"coupon-{printer.name}", Coupon(printer), []
     try:
         folder.mkdir(parents=True, exist_ok=True)

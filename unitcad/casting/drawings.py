@@ -1,4 +1,4 @@
-"""What pictures of the procedure show beside the pieces: arrows, tape, grease, paper, card, screwdrivers."""
+"""Additions to the pieces in pictures of the procedure: arrows, tape, grease, paper, card, screwdrivers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0
 CARD, PAPER, GREASE, INK = (0.45, 0.72, 0.38), (0.96, 0.93, 0.62), (0.98, 0.72, 0.16), (0.10, 0.10, 0.12)
 TAB = (0.93, 0.90, 0.78)
 CLEAR = 5.0
-"""Between a piece that is lifted off and what it was on, mm."""
+"""Between a piece that is lifted off and its place, mm."""
 Offset = tuple[float, float, float]
 DOWN = (0.0, 0.0, -1.0)
 BESIDE = 3.0
@@ -34,12 +34,12 @@ HELD = 60.0
 """Length of a cup's side that one strip of tape holds down, mm (assumed)."""
 TAPE_WIDTH, TAPE_THICKNESS, BELOW_RIM = 8.0, 0.4, 0.8
 ON_PLATE = 0.75
-"""Share of the pad under a grip, at least, that lies on the plate: it does not tip over the plate's edge."""
+"""Least share of the pad under a grip on the plate: it does not tip over the plate's edge."""
 
 
 @dataclass(frozen=True)
 class Extra:
-    """Something beside the pieces: an arrow, tape, silicone; its colour (three numbers 0 to 1), and how it is moved."""
+    """An addition to the pieces: an arrow, tape, silicone; its colour (three numbers 0 to 1), and how it is moved."""
 
     shape: Shape
     colour: tuple[float, float, float]
@@ -47,7 +47,7 @@ class Extra:
 
 
 def cast_colour(moulds: MouldSet, pour: int) -> tuple[float, float, float]:
-    """Return the colour of what pour (from 1) casts: that of the body that it becomes."""
+    """Return the colour of the silicone of a pour (from 1): that of its body."""
     own = (body.colour for body in moulds.unit if body.made == "cast" and body.step == pour)
     return next(own, layer_colour(pour - 1))
 
@@ -75,13 +75,13 @@ def tails(moulds: MouldSet) -> list[tuple[Cell, int]]:
 
 
 def on_tongues(moulds: MouldSet, length: float, colour: tuple[float, float, float]) -> tuple[Extra, ...]:
-    """Draw grease, or a pen's mark, on `length` mm of every tongue beside the cup's wall."""
+    """Draw grease, or a pen's mark, on `length` mm of every tongue next to the cup's wall."""
     wall = moulds.plan.layout.cup[0]
     return _sleeves(moulds, 0.15, colour, [(cell.y, s * wall, s * (wall + length)) for cell, s in tails(moulds)])
 
 
 def tabs(moulds: MouldSet, out: float = 0.0) -> tuple[Extra, ...]:
-    """Draw the folded tape on every tongue that is cut, where it is pulled out by `out` mm; none on printed ones."""
+    """Draw the folded tape on every tongue that is cut, pulled out by `out` mm; none on printed ones."""
     lay = moulds.plan.layout
     if grip_of(moulds) == "grip":
         return ()
@@ -93,7 +93,7 @@ def tabs(moulds: MouldSet, out: float = 0.0) -> tuple[Extra, ...]:
 def _sleeves(
     moulds: MouldSet, thick: float, colour: tuple[float, float, float], places: Sequence[tuple[float, float, float]]
 ) -> tuple[Extra, ...]:
-    """Draw what is round tongues, a film in height and `thick` in width: their y, and from where to where along x."""
+    """Draw a coat round tongues, a film in height and `thick` in width: their y, and both ends along x."""
     exit = moulds.dimensions.exit
     if not exit:
         return ()
@@ -120,7 +120,7 @@ def paper_in_slit(moulds: MouldSet) -> tuple[Extra, ...]:
 def screwdrivers(lifted: float, edge: float, low: float) -> tuple[Extra, ...]:
     """Draw a screwdriver at either end along x, an arrow down on each handle.
 
-    Its tip is at `low` under what is lifted, which ends at x = `lifted`, and it leaves the base at x = `edge`.
+    Its tip is at `low` under the lifted piece, which ends at x = `lifted`, and it leaves the base at x = `edge`.
     """
     blade = box(lifted - 1, edge + 4, -3, 3, low, low + 0.9)
     handle = moved(turned(Revolve(polygon((0, 0), (2.2, 0), (2.2, 9), (0, 9))), "y", 1), edge + 4, 0, low + 0.45)
@@ -135,9 +135,9 @@ def screwdrivers(lifted: float, edge: float, low: float) -> tuple[Extra, ...]:
 
 
 def spirit_level(half: float, z: float, plate: tuple[float, float], bottom: float) -> tuple[Extra, ...]:
-    """Draw a spirit level that lies along x on what is `half` wide to either side and ends at `z`.
+    """Draw a spirit level along x on a surface at `z` that is `half` wide to either side.
 
-    Paper lies under a corner of the base, whose half sizes are `plate` and whose underside is at `bottom`.
+    Paper is under a corner of the base, whose half sizes are `plate` and whose underside is at `bottom`.
     """
     long, (x, y) = min(1.5 * half, 30.0), plate
     return (
@@ -148,10 +148,10 @@ def spirit_level(half: float, z: float, plate: tuple[float, float], bottom: floa
 
 
 def tape_places(moulds: MouldSet) -> tuple[float, ...]:
-    """Return where the strips of tape on the front and the back of a cup begin along x, mm.
+    """Return x of the first edge of each strip of tape on the front and the back of a cup, mm.
 
-    One for each `HELD` mm of it, the outer two at its ends, the others beside filaments, which leave in the middle.
-    Each piece of a split tool that reaches these sides has one; where it is too narrow, the strip reaches over a seam.
+    One for each `HELD` mm of it, the outer two at its ends, the others next to filaments, which leave in the middle.
+    Each piece of a split tool that reaches these sides has one; if it is too narrow, the strip reaches over a seam.
     """
     plan, half = moulds.plan, moulds.plan.layout.cup[0]
     left, right, count = CORNER_RADIUS - half, half - MARK - TAPE_WIDTH, math.ceil(2 * half / HELD)
@@ -179,9 +179,9 @@ def tape_places(moulds: MouldSet) -> tuple[float, ...]:
 
 
 def side_places(moulds: MouldSet) -> tuple[float, ...]:
-    """Return where strips on the two other sides begin along y, mm: for pieces in rows between others, clear of slots.
+    """Return y of the first edge of strips on the two other sides, mm: for pieces between others, clear of slots.
 
-    () where every piece that has an outer edge reaches the front or the back.
+    () if every piece that has an outer edge reaches the front or the back.
     """
     half, beside = moulds.plan.layout.cup[1], PRY_HALF_WIDTH + 1.0
     places: set[float] = set()
@@ -193,7 +193,7 @@ def side_places(moulds: MouldSet) -> tuple[float, ...]:
 
 
 def _pieces(moulds: MouldSet, axis: Axis, half: float) -> Iterator[Interval]:
-    """Yield from where to where each piece of split tools goes along an axis, at the two edges along it."""
+    """Yield both ends of each piece of split tools along an axis, at the two edges along it."""
     for split in moulds.plan.splits:
         lines = [seam.line for seam in split.seams if seam.across == axis]
         ends = sorted((min(line[0][0], line[-1][0]), max(line[0][0], line[-1][0])) for line in lines)
@@ -201,7 +201,7 @@ def _pieces(moulds: MouldSet, axis: Axis, half: float) -> Iterator[Interval]:
 
 
 def _most_on(low: float, high: float, places: Sequence[float]) -> float:
-    """Return the place whose strip lies most on a piece, the nearest to its middle of those alike."""
+    """Return the place whose strip overlaps a piece most, the nearest to its middle of those alike."""
 
     def rank(at: float) -> tuple[float, float, float]:
         return max(low - at, at + TAPE_WIDTH - high, 0.0), abs(at + TAPE_WIDTH / 2 - (low + high) / 2), at
@@ -246,7 +246,7 @@ class Prop:
 
 
 def grip_of(moulds: MouldSet) -> str:
-    """Return what a tongue is pulled by: a printed one's grip, or the tab of tape on one that is cut."""
+    """Return the handle of a tongue: a printed one's grip, or the tab of tape on one that is cut."""
     return "tab" if any(tool.made == "cut" for tool in moulds.plan.of_kind("tongue")) else "grip"
 
 

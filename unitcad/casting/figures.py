@@ -31,28 +31,28 @@ CONTAINER = 4.0
 """Volume of the degassing container over the mix: silicone foams up under vacuum (maker's advice: 3 to 4 times)."""
 VACUUM_INHG, KPA_PER_INHG = 29.0, 3.386389
 MIXING_MIN, DEGASSING_MIN, POURING_MIN = 3.0, 3.0, 2.0
-"""What the pot life is spent on before and after the bubbles (assumed: usual practice)."""
+"""Parts of the pot life spent before and after the bubbles (assumed: usual practice)."""
 LAY_IN_MIN, WEIGH_MIN, STRIKE_MIN, PULL_MIN, LIFT_MIN, PEEL_MIN, PER_CAVITY_MIN = 5.0, 5.0, 1.0, 1.0, 2.0, 3.0, 0.5
-"""A person's time for steps that there are several of (assumed), as all `minutes` and waits of the time line.
-Laying in, pulling and peeling are for one cavity; `PER_CAVITY_MIN` is what each further one takes to pour."""
+"""A person's time for repeated steps (assumed), as all `minutes` and waits of the time line.
+Laying in, pulling and peeling are for one cavity; `PER_CAVITY_MIN` is the pouring time of each further one."""
 BAKE_H = 8.0
 STRIKE_AGAIN_MIN = 10.0
-"""When what has wept or sunk is topped up and struck off again (assumed)."""
+"""Time at which leaked or sunk silicone is topped up and struck off again (assumed)."""
 ADHESIVE_CURE_H = 24.0
 """A one-part silicone adhesive cures 2 mm deep in a day (maker's sheet of Momentive IS5628E)."""
 HELD_BACK_ML = 0.5
-"""What a syringe's tip and plunger keep of the silicone drawn in (assumed: a 5 to 10 ml syringe, a wide tip)."""
+"""Silicone that remains in a syringe's tip and plunger (assumed: a 5 to 10 ml syringe, a wide tip)."""
 WITHOUT_VACUUM = 0.25
 """Share of the pot life in which bubbles must rise out by themselves (assumed): after it silicone is too thick."""
 FDM_RATE = 950.0
 """Volume of the pieces, solid, that a filament printer makes in a minute, mm3 for each mm of its layers' height."""
 FDM_ERROR = 0.64, 1.22
-"""PrusaSlicer's time over what that rate gives, least and most: eight sets of units and six of arrays were sliced.
+"""PrusaSlicer's time over that of this rate, least and most: eight sets of units and six of arrays were sliced.
 Thick pieces are mostly infill and print faster."""
 RESIN_LAYER_S = 10.0
-"""What a resin printer takes for a layer, s (assumed)."""
+"""Time of a resin printer for a layer, s (assumed)."""
 MOST_ERROR_PCT = 5.0
-"""What a scale may do to the ratio before a cure suffers (assumed)."""
+"""Error of the ratio by the scale at which a cure begins to suffer (assumed)."""
 DATASHEET_C = 23.0
 DOUBLING_K = 10.0
 """A cure runs twice as fast for every 10 K (assumed: the usual rule of thumb, no bulletin gives it)."""
@@ -60,7 +60,7 @@ DOUBLING_K = 10.0
 
 @dataclass(frozen=True)
 class Figure:
-    """One number: what it is, its value and unit, and where it comes from (a source, a formula, or 'assumed: ...')."""
+    """One number: its name, value and unit, and its origin (a source, a formula, or 'assumed: ...')."""
 
     name: str
     value: float
@@ -80,9 +80,9 @@ SYRINGES_ML = 5.0, 10.0, 20.0, 30.0, 60.0, 100.0
 
 @dataclass(frozen=True)
 class Mix:
-    """Grams of one pour: in all cavities (and channels), to weigh in, of each part, and what half a digit does.
+    """Grams of one pour: in all cavities (and channels), to weigh in, of each part, and the error by half a digit.
 
-    `millilitres` is all that is mixed, `syringe_ml` what has to be drawn in for an injected pour, 0 for an open one.
+    `millilitres` is the whole mix, `syringe_ml` the volume to draw in for an injected pour, 0 for an open one.
     """
 
     net_g: float
@@ -96,17 +96,17 @@ class Mix:
 
     @property
     def syringe_size_ml(self) -> float:
-        """The smallest syringe that holds all that is mixed, else the largest there is, ml."""
+        """The smallest syringe for the whole mix, otherwise the largest there is, ml."""
         return next((size for size in SYRINGES_ML if size >= self.millilitres), SYRINGES_ML[-1])
 
 
 def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
-    """Return what to weigh for `volume_mm3` of silicone; errors are half the scale's digit over the smaller part."""
+    """Return the weights for `volume_mm3` of silicone; errors are half the scale's digit over the smaller part."""
     casting, ratio = spec.casting, float(material.mix_ratio)
     net = volume_mm3 * float(material.density_g_cm3) / 1000
     density = float(material.density_g_cm3)
     syringe = net / density + HELD_BACK_ML if spec.moulds.pour == "injected" else 0.0
-    # What stays in the mixing cup is the waste; what stays in the syringe comes on top.
+    # The waste remains in the mixing cup; the rest in the syringe comes on top.
     total = max(net * (1 + casting.waste) + (HELD_BACK_ML * density if syringe else 0.0), casting.minimum_mix_g)
     share = ratio / (1 + ratio)
     smaller = min(share, 1 - share)
@@ -120,7 +120,7 @@ def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
 def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float:
     """Return the seconds that a bubble takes through a depth by Stokes' law, at the viscosity just mixed: optimistic.
 
-    v = 2/9 (density of silicone) g radius^2 / viscosity; the air's own density is left out.
+    v = 2/9 (density of silicone) g radius^2 / viscosity; the air's own density is ignored.
     """
     density, viscosity = 1000 * float(material.density_g_cm3), float(material.mixed_viscosity_cps) / 1000
     speed = 2 / 9 * density * GRAVITY * (bubble_mm / 2000) ** 2 / viscosity
@@ -138,7 +138,7 @@ def at_room(value: float, room_c: float) -> float:
 
 
 def weep_mm3(moulds: MouldSet, step: Step, material: Material) -> float:
-    """Return what flows out beside the tongues of one cell during the whole pot life without grease, mm3.
+    """Return the silicone that flows out past the tongues of one cell during the whole pot life without grease, mm3.
 
     Plane Poiseuille flow through the gaps round the tongue, each gap^3 width pressure / (12 viscosity length).
     """
@@ -165,7 +165,7 @@ def print_min(spec: Spec, solid_mm3: float, tallest_mm: float) -> float:
 
 
 def window_length(moulds: MouldSet, step: Step) -> float:
-    """Return how far a tongue lies in the wall of a pour's cup, mm."""
+    """Return the length of a tongue inside the wall of a pour's cup, mm."""
     lay = moulds.plan.layout
     return lay.cup[0] - max(abs(cell.x) for cell in lay.cells) - moulds.plan.dimensions.radii[step.index - 1]
 
@@ -190,9 +190,9 @@ def holding_ratio(moulds: MouldSet, step: Step) -> float:
 
 
 def wall_range(spec: Spec, layer: int, off_axis_mm: float) -> tuple[float, float]:
-    """Return the thinnest and thickest wall of a layer (from 0) whose cups stand up to `off_axis_mm` off the axis, mm.
+    """Return the thinnest and thickest wall of a layer (from 0) whose cups are up to `off_axis_mm` off the axis, mm.
 
-    Layer 1 lies between the core and one cup position, each further layer between two.
+    Layer 1 is between the core and one cup position, each further layer between two.
     """
     off = off_axis_mm * (1 if layer == 0 else 2)
     wall = spec.layers[layer].wall_mm
@@ -210,7 +210,7 @@ class AfterPours:
 
 @dataclass(frozen=True)
 class Batch:
-    """The silicone of one pour: `volume_mm3` is that of what it casts, `cells` how many units it is poured for."""
+    """The silicone of one pour: `volume_mm3` is that of its layer, `cells` the number of units."""
 
     moulds: MouldSet
     step: Step
@@ -220,7 +220,7 @@ class Batch:
 
     @cached_property
     def mix(self) -> Mix:
-        """What to weigh for all cavities and channels."""
+        """Weights for all cavities and channels."""
         poured = self.volume_mm3 * len(self.step.layer) / self.moulds.pieces(self.step.name)
         return mix(self.moulds.spec, self.silicone, poured + self.channels_mm3)
 
@@ -251,9 +251,9 @@ class Batch:
 
     @property
     def rest_min(self) -> float:
-        """How long bubbles rise by themselves without a vacuum; 0 where an open pour would wait in vain.
+        """How long bubbles rise by themselves without a vacuum; 0 if an open pour would wait in vain.
 
-        In a syringe what does not rise in time still gathers at its tip: the whole allowance is waited.
+        In a syringe bubbles that do not rise in time still gather at its tip: wait the whole allowance.
         """
         allowed, injected = WITHOUT_VACUUM * self.pot_min, self.moulds.spec.moulds.pour == "injected"
         return min(self.rise_min, allowed) if injected or self.rise_min <= allowed else 0.0
@@ -348,7 +348,7 @@ class Batch:
 
 
 def walls(moulds: MouldSet) -> tuple[Figure, ...]:
-    """Return how far the cups stand off the core's axis, and what that makes of the walls."""
+    """Return how far the cups are off the core's axis, and the resulting walls."""
     spec, made, free = moulds.spec, eccentricity(moulds), eccentricity(moulds, with_ribs=False)
     lengths, cups = (
         spec.moulds,
@@ -389,9 +389,9 @@ Assumed: a line more or less; of a leaf, a tenth of its thickness.
 
 @dataclass(frozen=True)
 class Eccentricity:
-    """The most that a bore stands off the core's axis, mm, where the gap is printed as drawn, and where it is not.
+    """The largest distance of a bore from the core's axis, mm, if the gap is printed as drawn, and if it is not.
 
-    `off_mm` is what the printer's play makes the gap wider or narrower by, per side.
+    `off_mm` is the gap's error by the printer's play, per side.
     """
 
     ribs: int
@@ -420,7 +420,7 @@ def shift_per_depth(standing: tuple[Rib, ...], cells: tuple[tuple[float, float],
     """Return the greatest shift of a cell's bore, over the depth of the ribs, for every choice of their strengths."""
     outward = -np.array([rib.inwards for rib in standing], dtype=float)
     at = np.array([(rib.x, rib.y) for rib in standing])
-    # What a shift (x, y) and a small turn of the cup take from each rib's depth, along its normal.
+    # Change of each rib's depth by a shift (x, y) and a small turn of the cup, along its normal.
     rows = np.column_stack([outward, at[:, 0] * outward[:, 1] - at[:, 1] * outward[:, 0]])
     strengths = np.array(list(product((1 - UNEVEN, 1 + UNEVEN), repeat=len(standing))))
     weighted = rows * strengths[:, :, None]
@@ -460,7 +460,10 @@ class UnitHeight:
 
 
 def off_grid(moulds: MouldSet) -> list[OffGrid]:
-    """Return the tooling's own edges that are off the grid. Cups lie upside down: heights count from their rims."""
+    """Return the tooling's own edges that are off the grid.
+
+    Cups are printed upside down: heights count from their rims.
+    """
     spec, dims, plan, (bottom, top) = moulds.spec, moulds.plan.dimensions, moulds.plan, moulds.plate
     layer, exit = spec.moulds.layer_mm, dims.exit
     edges = [
@@ -491,7 +494,7 @@ def off_grid(moulds: MouldSet) -> list[OffGrid]:
 
 
 def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
-    """Return the cavity's depth and every layer's height over what it is cast on, where layers make another of them."""
+    """Return the cavity's depth and every layer's height over its ground, if the printer's layers change them."""
     dims, concentric, layer = moulds.plan.dimensions, moulds.plan.concentric, moulds.spec.moulds.layer_mm
     seat = -moulds.plate[0]
     below = dims.core_height, _whole(seat + dims.core_height, layer) - _whole(seat, layer)

@@ -16,11 +16,11 @@ from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
 
 SIZE, MANY = (540, 360), (540, 560)
-"""Of a picture, px; of the pieces where tools are printed in several."""
+"""Size of a picture, px; of that of the pieces if tools are printed in several."""
 _GAP = 9.0
 """Between pieces laid out side by side, mm."""
 _Key = tuple[Placed | Extra, bool]
-"""What a view shows, and whether it is of the unit, not of its moulds."""
+"""The content of a view, and whether it is of the unit, not of its moulds."""
 
 
 def pictures(moulds: MouldSet) -> dict[str, bytes]:
@@ -32,8 +32,8 @@ def pictures(moulds: MouldSet) -> dict[str, bytes]:
 class BenchPictures:
     """The pictures of a set's procedure, each drawn when it is asked for.
 
-    Views of one kind show things that stand alike, from one side, at one scale: what is drawn for one of them serves
-    all. Ask for `names` in their order, or backwards.
+    Views of one kind show like scenes, from one side, at one scale: a drawing made for one of them serves all. Ask for
+    `names` in their order, or backwards.
     """
 
     def __init__(self, moulds: MouldSet) -> None:
@@ -71,7 +71,7 @@ def _keys(view: View) -> list[_Key]:
 
 
 def _solids(moulds: MouldSet, item: Placed | Extra, unit: bool) -> Iterator[Surface]:
-    """Yield the meshes of what a view shows, of a layer one a cell, there where it has it."""
+    """Yield the meshes of a view's content, in place; a layer has one mesh a cell."""
     near = 0.0 if unit else min(cell.y for cell in moulds.plan.layout.cells)
     for shape, colour in shapes(moulds, item, unit):
         solid = realise(shape, moulds.segments)

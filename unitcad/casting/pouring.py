@@ -1,4 +1,4 @@
-"""What a person does from an empty mould to a unit with its motor in, step by step, and what to measure."""
+"""The steps from an empty mould to a unit with its motor in, and the measures to take."""
 
 from __future__ import annotations
 
@@ -57,14 +57,14 @@ class Face:
 
 @dataclass(frozen=True)
 class BondFace:
-    """A face of a tool whose cast bonds later: `to` says what to. Silicone does not bond where agent was."""
+    """A face of a tool whose cast bonds later, to `to`. Silicone does not bond where agent was."""
 
     face: Face
     to: str
 
 
 def bond_faces(moulds: MouldSet) -> tuple[BondFace, ...]:
-    """Return every face of the tools that forms what bonds later, or that lies beside it in a later pour."""
+    """Return every face of the tools that forms a bonding face, or that is next to one in a later pour."""
     plan, last = moulds.plan, moulds.plan.steps[-1]
     found = []
     for step in plan.steps:
@@ -73,8 +73,8 @@ def bond_faces(moulds: MouldSet) -> tuple[BondFace, ...]:
         if step.lid:
             found.append((step.lid, "underside", "circuit" if step is last else f"layer {step.index + 1}"))
     if not plan.concentric and not plan.pins and len(plan.steps) > 1:
-        # Its bore may meet a layer that is cured already, where the last one has to bond; a back sheet's, whose cups
-        # stand on pins, meets none.
+        # Its bore may meet a layer that is cured already, to which the last one has to bond; a back sheet's, whose cups
+        # are on pins, meets none.
         found.append((last.cup, "bore", f"layer {last.index - 1}"))
     found.append(("base", "core", "motor"))
     if len(plan.steps) > 1:
@@ -83,7 +83,7 @@ def bond_faces(moulds: MouldSet) -> tuple[BondFace, ...]:
 
 
 def agent_faces(moulds: MouldSet, step: Step) -> tuple[Face, ...]:
-    """Return the faces that may get release agent before a pour: the last cup's bore, where nothing bonds later."""
+    """Return the faces that may get release agent before a pour: the last cup's bore, if nothing bonds to it later."""
     bore = Face(step.cup, "bore")
     bonds = any(bond.face == bore for bond in bond_faces(moulds))
     return () if bonds or step is not moulds.plan.steps[-1] else (bore,)
@@ -94,7 +94,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     moulds, step, n = batch.moulds, batch.step, batch.step.index
     plan, spec, tongues = moulds.plan, moulds.spec, moulds.plan.standing(step, "tongue")
     cells, the_tongue = len(plan.layout.cells), "the tongue" if len(tongues) == 1 else "each tongue"
-    # Each cavity has a groove, which stops beside a window.
+    # Each cavity has a groove, which stops next to a window.
     groove = "the groove" if len(step.layer) == 1 else "the grooves round the cavities"
 
     def picture(name: str) -> str:
@@ -148,7 +148,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     elif faces:
         where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)
         agent = f"Release agent, if any, thinly and only on {where}, away from the {holds(moulds)}."
-    # What centres the cup: ribs, or a push as for the cup before.
+    # Ribs centre the cup, or a push as for the cup before.
     if ribs(spec, plan.layout):
         on = "on and press it down evenly until it sits; its ribs centre it."
     elif plan.pins:
@@ -269,7 +269,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
 
 
 def recovery(moulds: MouldSet, layer: int) -> str:
-    """Say where a layer stays when its cup goes, and what to do if it does not."""
+    """Say where a layer stays when its cup is lifted, and what to do if it does not."""
     stays = f"Layer {layer} should stay on the {holds(moulds)}"
     back = "from the skin's side" if layer == len(moulds.plan.steps) else "and put it back"
     return f"{stays}: if it comes off in the cup, push it out {back}."
@@ -314,7 +314,7 @@ def lid_held(step: Step, picture: str) -> BenchStep:
 
 
 def _tongue_home(moulds: MouldSet, pour: int, the_tongue: str, picture: str) -> BenchStep:
-    """Say how the tongues come to stand, how to see that they do, and what bears their grips."""
+    """Say how the tongues are set, how to check it, and what bears their grips."""
     marked, grip, one = len(moulds.plan.steps) > 1 and pour == 1, grip_of(moulds), the_tongue == "the tongue"
     if pour == 1:
         mark = f" Mark {'it' if one else 'each'} with a pen at the cup's wall." if marked else ""
@@ -431,7 +431,7 @@ def cure(batch: Batch, touched: str, cast: str, picture: str) -> BenchStep:
 
 
 def never_pushed(spec: Spec, inner: Material) -> str:
-    """Say what pulling a filament does, and what pushing it would: `inner` is Layer 1's silicone."""
+    """Describe the effect of pulling a filament, and of pushing it: `inner` is Layer 1's silicone."""
     tear = float(inner.tensile_mpa) * math.pi * (spec.moulds.filament_mm / 2) ** 2
     return f"it lets air in under the unit. Never push it through: {number(tear, 2)} N tear {inner.name} (computed)."
 
@@ -496,7 +496,7 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
 
 
 def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
-    """Describe how motor and circuit go in after casting; nothing where they were laid in."""
+    """Describe how motor and circuit go in after casting; nothing if they were laid in."""
     if moulds.design.laid_in:
         return
     fittings, casting = assembly(moulds), moulds.spec.casting
@@ -575,7 +575,7 @@ def _by_layer(silicones: Sequence[Material], layers: Iterable[int]) -> list[Mate
 
 
 def assembly(moulds: MouldSet) -> tuple[Fitting, ...]:
-    """Describe how motor and circuit go into the body, or into the mould: in the design's words, where it has any."""
+    """Describe how motor and circuit go into the body, or into the mould: in the design's words, if it has any."""
     if moulds.assembly:
         return moulds.assembly
     spec, design, leaves = moulds.spec, moulds.design, lead(moulds)
@@ -599,10 +599,10 @@ def assembly(moulds: MouldSet) -> tuple[Fitting, ...]:
 
 
 def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float | None) -> Iterator[str]:
-    """Name what to measure on the first part, and what it should be.
+    """Name the measures of the first part, and their expected values.
 
     `masses_g`: of each layer of one unit, trimmed. `slot_height`: of the slot as the slicer makes the tongue (mm), None
-    where it is the drawn one.
+    if it is the drawn one.
     """
     spec, dims, off, exit = moulds.spec, moulds.plan.dimensions, eccentricity(moulds), moulds.plan.dimensions.exit
     over = f", with the skin {shown(dims.heights[-1] + dims.skin, 2)} mm" if dims.skin else ""
@@ -635,12 +635,12 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
 
 
 def lead(moulds: MouldSet) -> str:
-    """Return what leads out of the silicone."""
+    """Return the name of the part that leads out of the silicone."""
     return "tail" if moulds.spec.fpcb else "wires" if moulds.spec.wires else ""
 
 
 def holds(moulds: MouldSet) -> str:
-    """Return what the silicone is cast on: "core"; moulds by complement need not have one."""
+    """Return the tool that the silicone is cast on: "core"; moulds by complement need not have one."""
     return "core" if moulds.plan.concentric else "base"
 
 

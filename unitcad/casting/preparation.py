@@ -1,4 +1,4 @@
-"""The steps from the printer to an empty mould, and what to print."""
+"""The steps from the printer to an empty mould, and the plates to print."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 PERIMETERS = 3
 SPARE = 2.0
-"""What a piece of filament is longer than its way through base and core, mm."""
+"""Extra length of a piece of filament over its way through base and core, mm."""
 FOOT_MM = 0.2
 MEASURED_MM = 0.05
 """Difference of a measured length from the drawn one from which it is worth to build again (assumed)."""
@@ -73,7 +73,7 @@ class Printing:
 def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Printing:
     """Return the plates to print, and how. `solid_mm3`: volume of all printed pieces, solid.
 
-    `tallest_mm`: height of a piece that may stand higher than core and blade.
+    `tallest_mm`: height of a piece that may be higher than core and blade.
     """
     spec, plan, lengths, resin = moulds.spec, moulds.plan, moulds.spec.moulds, in_resin(moulds)
     printed = [tool for tool in plan.pieces if tool.made == "printed"]
@@ -226,7 +226,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
 
 
 def level(text: str) -> BenchStep:
-    """Say how level the mould must lie, and how to see it."""
+    """Say how level the mould must be, and how to see it."""
     return BenchStep("Level the bench", text, picture_path("level"), minutes=5.0, needs=("level", "paper"))
 
 
@@ -332,7 +332,7 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
         f"face that silicone touches: tape over the underside of the {below}{around} and over the ends of the seam"
     )
     if upper:
-        # The pins hold the pieces of each cup, but where no unit stands between a seam of the base and one of a cup.
+        # The pins join the pieces of each cup, except if no unit is between a seam of the base and one of a cup.
         x, y = plan.layout.plate
         same = []
         for seam in base.seams if plan.tool(base.tool).kind == "base" else ():
@@ -362,5 +362,5 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
 
 
 def inner(split: Split) -> bool:
-    """Tell whether a piece lies between others on all sides."""
+    """Tell whether a piece is between others on all sides."""
     return min(split.columns, len(split.pieces) // split.columns) > 2

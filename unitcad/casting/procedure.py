@@ -1,4 +1,4 @@
-"""The casting procedure as data: what a person does, in order, with every figure's source; `written` writes it."""
+"""The casting procedure as data: the steps in order, with every figure's source; `written` writes it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from unitcad.validation import warnings
 
 @dataclass(frozen=True)
 class Pour:
-    """One pour: its figures, the verdict on bubbles, what the person does, and the drawing of it assembled.
+    """One pour: its figures, the verdict on bubbles, the steps, and the drawing of it assembled.
 
     `agent`: the faces that may get release agent before it. `degassing_min`: in the vacuum; 0 without one.
     Times are those of the room. `drawing` is the section, each step's picture is in 3D.
@@ -72,12 +72,11 @@ class Procedure:
     `earliest_finish_min`: from the first step, the pieces just printed, until the units are out of the mould, of which
     `bench_min` with a person at the bench; `time_line` goes on until the motor is in.
 
-    `makes`: what comes out; `last`: what `assembly` does.
+    `makes`: the product; `last`: the purpose of `assembly`.
     `bonds` are the tools' faces that must never get release agent.
     `tunnels`: the cups whose windows resin may cure shut.
-    `eccentricity` is that of the cups on the core, `without_ribs` what it would be without what centres them; None
-    where there are no cups.
-    `walls` is () where the tooling is not concentric: nothing tells which of its walls a cup's play changes.
+    `eccentricity` is that of the cups on the core, `without_ribs` the one without ribs or pins; None without cups.
+    `walls` is () if the tooling is not concentric: which of its walls a cup's play changes is then unknown.
     """
 
     name: str

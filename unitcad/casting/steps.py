@@ -1,4 +1,4 @@
-"""One step of a procedure: what to do, what it looks like, what it needs, how long it takes; and steps added up."""
+"""One step of a procedure: instruction, picture, needs, time; and steps added up."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from unitcad.text import listed, number
 
 @dataclass(frozen=True)
 class BenchStep:
-    """What a person does at once.
+    """One action of a person.
 
     title     two or three words
     text      the whole instruction
-    picture   path of the picture of this state in the result's folder; "" where nothing of the mould is to be seen
-    kind      what the bench page adds to it: fields for grams, the pot life's or the cure's timer
+    picture   path of the picture of this state in the result's folder; "" if it shows nothing of the mould
+    kind      addition of the bench page: fields for grams, the pot life's or the cure's timer
     minutes   a person's time at the bench
-    wait_min  what passes after it before the next step
-    needs     tools and consumables that it takes, by their names in `NEEDS`
-    short     the text where an earlier pour had the step too: its number and what differs; filled in by `shortened`
+    wait_min  waiting time before the next step
+    needs     tools and consumables, by their names in `NEEDS`
+    short     the text if an earlier pour had the step too: its number and the differences; filled in by `shortened`
     """
 
     title: str
@@ -42,7 +42,7 @@ _MOST_NEW = 0.8
 
 
 def shortened(steps: Iterable[BenchStep]) -> list[BenchStep]:
-    """Return the steps of a whole procedure, numbered from 1; what an earlier step says has a short text."""
+    """Return the steps of a whole procedure, numbered from 1; repeated steps have a short text."""
     found: list[BenchStep] = []
     earlier: dict[str, list[tuple[int, set[str]]]] = {}
 
@@ -130,7 +130,7 @@ def duration(minutes: float) -> str:
 
 
 def in_short(procedure: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a line each: pours and times, what to mix, and what goes wrong in a pour.
+    """Yield a line each: pours and times, the mixes, and warnings about a pour.
 
     `procedure` is a `Procedure` as plain data, as casting.json has it.
     """

@@ -1,8 +1,7 @@
-"""What each picture of the procedure shows: which pieces stand where, which one moves, what holds or fills them.
+"""Content of each picture of the procedure: the pieces in their places, the moving one, tape and fillings.
 
-Data: `pictures` draws it. Meshed here is only what tells a place: a lid's channels, an array's motors, what is
-laid into a curved base.
-A view's name is the name of its file.
+Data: `pictures` draws it. Meshed here are only parts that define a place: a lid's channels, an array's motors, inserts
+of a curved base. A view's name is the name of its file.
 """
 
 from __future__ import annotations
@@ -71,9 +70,9 @@ class Placed:
 class View:
     """One picture. Views of one `eye` and `group` share their scale.
 
-    `names` stand beside the points that they name; pieces laid out side by
-    side are named by their own names. `turned`: the picture upside down, as what lies on its back is seen.
-    What is moved has an arrow, back to its place (`way` -1) or on (1); none where it stays there (0).
+    `names` are next to the points that they name; pieces laid out side by side are named by their own names. `turned`:
+    the picture upside down, for parts on their back. A moved part has an arrow, back to its place (`way` -1) or on (1);
+    none if it stays (0).
     """
 
     parts: tuple[Placed, ...]
@@ -86,7 +85,7 @@ class View:
 
 
 def placed(these: Iterable[Body | Step], x: float = 0.0, z: float = 0.0, half: bool = False) -> tuple[Placed, ...]:
-    """Return pieces, or what pours cast, in their places or beside them."""
+    """Return pieces, or cast layers, in their places or next to them."""
     return tuple(Placed(each.name, (x, 0.0, z), half) for each in these)
 
 
@@ -113,13 +112,13 @@ def _arrows(moulds: MouldSet, view: View) -> Iterator[Extra]:
         (x0, y0, z0), (x1, _, z1) = np.min(boxes, axis=0)[:3].tolist(), np.max(boxes, axis=0)[3:].tolist()
         x, z = (x0 + x1 + dx) / 2, (z0 + z1 + dz) / 2
         if not dz:
-            # What slides has it above, where it is.
+            # A sliding part has it above.
             x, z = x + dx / 2, z1 + 3.0
         yield arrow((view.way * dx, 0.0, view.way * dz), x, y0 + dy - 4.0 * (dz != 0), z, 0.6 * math.hypot(dx, dz))
 
 
 def shapes(moulds: MouldSet, item: Placed | Extra, unit: bool) -> list[tuple[Shape, tuple[float, float, float]]]:
-    """Return the shapes of what a view shows, not moved, and their colours; `unit`: of the unit, not of its moulds."""
+    """Return the shapes of a view's content, not moved, and their colours; `unit`: of the unit, not of its moulds."""
     if isinstance(item, Extra):
         return [(item.shape, item.colour)]
     plan = moulds.plan
@@ -138,7 +137,7 @@ def picture_path(name: str) -> str:
 
 
 def level_on(moulds: MouldSet) -> Step:
-    """Return the first pour on whose rim a level lies flat: nothing on the base stands higher."""
+    """Return the first pour whose rim takes a level: nothing on the base is higher."""
     steps, core = moulds.plan.steps, moulds.dimensions.core_height
     return next((step for step in steps if step.rim >= core - 1e-9), steps[-1])
 
@@ -184,7 +183,7 @@ def _level(
     bottom: float,
     group: Group = "moulds",
 ) -> View:
-    """Return the view of a level on what ends at `z`, and of paper under a corner of the base."""
+    """Return the view of a level on a surface at `z`, and of paper under a corner of the base."""
     names = Name("level", (0.0, -4.0, z + 2)), Name("paper", (-plate[0] - 4, -plate[1], bottom))
     return View(parts, spirit_level(half, z, plate, bottom), group=group, names=names)
 
@@ -285,7 +284,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
         back, strikers = -0.55 * cup_x, held
         blades = placed(plan.of_kind("blade"), back, step.rim - (*before, step)[0].rim)
         if not plan.concentric and plan.dimensions.core_height > step.rim:
-            # A strip as wide as the cavity, since what stands on the base is in the blade's way.
+            # A strip as wide as the cavity, since parts on the base are in the blade's way.
             half, blades = plan.dimensions.radii[step.index - 1], ()
             strikers = *held, Extra(box(0.0, 0.8, -half, half, step.rim, step.rim + 12.0), CARD, (back, 0.0, 0.0))
         yield "strike", View((*closed, *poured, *blades), strikers)
@@ -315,10 +314,10 @@ def _injected(
     band: float,
     group: Group = "moulds",
 ) -> Views:
-    """Yield the views of a lid that is held down, filled and cured; a band lies at x = `band`."""
+    """Yield the views of a lid that is held down, filled and cured, with a band at x = `band`."""
     names = (Name("rubber band", (band, 0.0, step.top + 1)),)
     yield "lid-held", View(closed, held, group=group, names=names)
-    # Of the second cavity, where there are several: clear of the syringe. The vent nearest the eye.
+    # Of the second cavity, if there are several: clear of the syringe. The vent nearest the eye.
     count = len(step.channels) // len(step.layer)
     first = count if len(step.channels) > count else 0
     sprue, *vents = (_middle(moulds, shape, top=True) for shape in step.channels[first : first + count])
@@ -360,7 +359,7 @@ def _way_out(moulds: MouldSet) -> Views:
 
 
 def _motor_in(moulds: MouldSet) -> Views:
-    """Yield the views of motor and circuit going in: a unit that opens to the skin lies on its back."""
+    """Yield the views of motor and circuit going in: a unit that opens to the skin is on its back."""
     inside = [body for body in (*moulds.unit, *moulds.laid_later) if body.made != "cast"]
     if not inside or moulds.design.laid_in:
         return
@@ -414,7 +413,7 @@ def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
 
 
 def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> Views:
-    """Yield the views of a set whose last pour stands on a base of its own, round a limb.
+    """Yield the views of a set whose last pour has a base of its own, round a limb.
 
     `cast_flat`: the set of the flat tools, `flat`: its views.
     """
@@ -425,7 +424,7 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
         elif view.group in ("moulds", "under", "cut"):
             yield name, view
     count = len(plan.layout.cells)
-    # What is laid in, pour by pour, in the order of the cells; and the way in which the unit of each cell is drawn off.
+    # Inserts, pour by pour, in the order of the cells; and the direction in which the unit of each cell is drawn off.
     laid = [step.earlier[i : i + count] for i in range(0, len(step.earlier), count)]
     drawn_off = [removal for removal in step.removals if removal.piece == CAST]
     by_part = {removal.part: removal.direction for removal in drawn_off}
@@ -485,7 +484,7 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
     yield "peel", View(placed([base]), tuple(extras), group="curved", way=1)
     bodies = {body.name: body for body in (*cast_flat.unit, *cast_flat.laid_later)}
     for name in ("motor-in", "motor-home"):
-        # What lies flat here has the names of what is cast round the limb: it is drawn as its shapes.
+        # Flat parts here have the names of those cast round the limb: they are drawn by their shapes.
         shapes = (Extra(bodies[part.name].shape, bodies[part.name].colour, part.moved) for part in flat[name].parts)
         yield name, replace(flat[name], parts=(), extras=(*shapes, *flat[name].extras), way=0)
 

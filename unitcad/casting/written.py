@@ -69,14 +69,14 @@ def _steps(procedure: Procedure) -> Iterator[BenchStep]:
 def to_json(procedure: Procedure) -> str:
     """Write the procedure as JSON: the same records; numbers to nine significant digits."""
     data = msgspec.to_builtins(procedure)
-    if not all_finite(data):  # msgspec writes what is not finite as null
+    if not all_finite(data):  # msgspec writes numbers that are not finite as null
         raise ValueError("a number of the procedure is not finite")
     rounded = _NINE_DIGITS.decode(msgspec.json.encode(data))
     return msgspec.json.format(msgspec.json.encode(rounded), indent=1).decode() + "\n"
 
 
 def to_markdown(procedure: Procedure) -> str:
-    """Write the procedure for the bench: what to measure, print and have, numbered steps, figures behind a fold."""
+    """Write the procedure for the bench: items to measure, print and have, numbered steps, figures behind a fold."""
     made, cells, printing, written = procedure.makes, procedure.cells, procedure.printing, 0
     cavities = f"{cells} cavit{'y' if cells == 1 else 'ies'}"
     if cells > 1 and made != "unit":
@@ -128,7 +128,7 @@ def to_markdown(procedure: Procedure) -> str:
 
 
 def _measuring(procedure: Procedure) -> Iterator[str]:
-    """Yield what to measure before printing, and how to build again with other sizes."""
+    """Yield the measures to take before printing, and how to build again with other sizes."""
     printing = procedure.printing
     yield from (
         f"- {size.what}: {number(size.value_mm, 3)} mm{f' (assumed; {size.assumed})' if size.assumed else ''}"

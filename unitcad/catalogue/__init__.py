@@ -3,6 +3,13 @@
 The data are TOML files next to this module, read on first use; `entries` has the kinds of their values. A value that
 nobody has measured for us is "assumed" and carries a range. A spec may bring entries of its own (`own`): the same
 tables, in which a plain number has the status "spec".
+
+Examples
+--------
+>>> from unitcad import catalogue
+>>> modulus = catalogue.materials()["ecoflex-00-10"].youngs_modulus_kpa
+>>> modulus.value, modulus.status
+(15.0, 'paper')
 """
 
 from __future__ import annotations
@@ -11,6 +18,7 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
@@ -46,6 +54,7 @@ __all__ = [
     "TissueEntry",
     "Value",
     "choose",
+    "figures",
     "materials",
     "measurements",
     "moduli_by_source",
@@ -63,27 +72,113 @@ _KINDS: dict[type, tuple[str, str]] = {
 
 
 def materials(own: Mapping[str, MaterialEntry] | None = None) -> dict[str, Material]:
-    """Return all silicones by name, a spec's entries before shipped ones of that name.
+    """Return the silicones of the catalogue, with those of a spec.
 
-    Raises `Refusal` for an entry of the spec that is not valid.
+    Parameters
+    ----------
+    own : mapping of str to entry, optional
+        Entries of a spec; they replace shipped ones of the same name.
+
+    Returns
+    -------
+    dict of str to Material
+        The entries by name. Each value has a unit in its name, a status and a source.
+
+    Raises
+    ------
+    Refusal
+        For an invalid entry.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> ecoflex = unitcad.materials()["ecoflex-00-10"]
+    >>> float(ecoflex.density_g_cm3), ecoflex.density_g_cm3.status
+    (1.04, 'datasheet')
     """
     return _entries(Material, own)
 
 
 def motors(own: Mapping[str, MotorEntry] | None = None) -> dict[str, Motor]:
-    """Return all motors by part name. Raises `Refusal` for an entry of the spec that is not valid."""
+    """Return the motors of the catalogue, with those of a spec.
+
+    Parameters
+    ----------
+    own : mapping of str to entry, optional
+        Entries of a spec; they replace shipped ones of the same name.
+
+    Returns
+    -------
+    dict of str to Motor
+        The entries by name. Each value has a unit in its name, a status and a source.
+
+    Raises
+    ------
+    Refusal
+        For an invalid entry.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> thickness = unitcad.motors()["LCM0720A3463F"].thickness_mm
+    >>> thickness.value, thickness.low, thickness.high, thickness.status
+    (2.0, 2.0, 2.65, 'assumed')
+    """
     return _entries(Motor, own)
 
 
 def printers(own: Mapping[str, PrinterEntry] | None = None) -> dict[str, Printer]:
-    """Return all printers by name. Raises `Refusal` for an entry of the spec that is not valid."""
+    """Return the printers of the catalogue, with those of a spec.
+
+    Parameters
+    ----------
+    own : mapping of str to entry, optional
+        Entries of a spec; they replace shipped ones of the same name.
+
+    Returns
+    -------
+    dict of str to Printer
+        The entries by name. Each value has a unit in its name, a status and a source.
+
+    Raises
+    ------
+    Refusal
+        For an invalid entry.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> float(unitcad.printers()["fdm-0.4"].layer_mm)
+    0.2
+    """
     return _entries(Printer, own)
 
 
 def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] | None = None) -> tuple[Tissue, ...]:
-    """Return the layers of a body, skin first, the last one a half-space.
+    """Return the layers of a body under the unit.
 
-    Raises `Refusal` for an unknown name and for a body of the spec that is not valid.
+    Parameters
+    ----------
+    name : str, default "forearm"
+        Name of the body.
+    own : mapping of str to mapping of str to entry, optional
+        Bodies of a spec, each with its layers by name, skin first.
+
+    Returns
+    -------
+    tuple of Tissue
+        The layers from the skin down; the last one is a half-space without thickness.
+
+    Raises
+    ------
+    Refusal
+        For an unknown name, and for an invalid body.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> [layer.name for layer in unitcad.tissue()]
+    ['skin', 'hypodermis', 'muscle', 'bone']
     """
     return _tissue(name, own) if own else _shipped_tissue(name)
 
@@ -115,8 +210,8 @@ def _tissue(name: str, own: Mapping[str, Mapping[str, TissueEntry]]) -> tuple[Ti
 def moduli_by_source() -> dict[str, dict[str, float]]:
     """Return Young's modulus (kPa) of the shipped silicones by source, then by name; silicones without one are skipped.
 
-    "paper": small strain at the operating frequency. "data sheet": static, at 100 %. "tensile, METHOD": slow pulls by
-    others, worked out by each method that could be defended (tensile.toml).
+    "paper": as printed; the instrument is quasi-static. "data sheet": static, at 100 %. "tensile, METHOD": slow pulls
+    by others, worked out by each method that could be defended (tensile.toml).
     """
     known = materials()
     sources = {
@@ -133,6 +228,11 @@ def moduli_by_source() -> dict[str, dict[str, float]]:
 def measurements() -> Measurements:
     """Return the paper's measured amplitudes at the edge, as printed."""
     return msgspec.convert(_raw("measurements.toml"), Measurements)
+
+
+def figures() -> dict[str, Path]:
+    """Return the digitised figures in the catalogue by name: CSV files of unit, distance_mm, value, error, source."""
+    return {file.stem: file for file in sorted((Path(__file__).parent / "figures").glob("*.csv"))}
 
 
 def choose(kind: str, name: str, known: Mapping[str, _Entry]) -> _Entry:

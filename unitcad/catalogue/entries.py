@@ -110,7 +110,16 @@ class Value(Struct, Generic[T], frozen=True, omit_defaults=True, repr_omit_defau
 
 
 class Material(Struct, frozen=True, kw_only=True):
-    """A castable silicone. Times are at 23 °C."""
+    """A castable silicone. Times are at 23 °C.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> mine = unitcad.Material(like="ecoflex-00-10", density_g_cm3=1.06, source="weighed on our scale")
+    >>> spec = unitcad.load("embedded", set={"materials": {"mine": mine}, "layers.0.material": "mine"})
+    >>> spec.layers[0].material
+    'mine'
+    """
 
     name: str
     density_g_cm3: Value[Density]
@@ -222,7 +231,7 @@ def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
         f"{entry.__name__}Entry",
         fields,
         module=__name__,
-        namespace={"__doc__": (entry.__doc__ or "").partition("\n")[0]},
+        namespace={"__doc__": entry.__doc__},
         frozen=True,
         kw_only=True,
         omit_defaults=True,

@@ -1,4 +1,4 @@
-"""Mould checks: one file a code. Every file here that defines CHECK is one; all read a mould set and nothing else."""
+"""Mould checks: one file a code. Every file here that defines CHECK is one; all read only a mould set."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ def mould_checks() -> dict[str, MouldCheck]:
 
 
 def check_moulds(moulds: MouldSet) -> list[MouldFinding]:
-    """Return what all mould checks find on a unit and its moulds, in the order of codes."""
+    """Return the findings of all mould checks on a unit and its moulds, in the order of codes."""
     return [finding for check in mould_checks().values() for finding in check.findings(moulds)]
 
 
 def check_unit(moulds: MouldSet) -> list[MouldFinding]:
-    """Return what the checks find on the unit alone, without moulds: its overlaps."""
+    """Return the findings on the unit without moulds: its overlaps."""
     return overlap.of_unit(moulds)
 
 
 def check_geometry(moulds: MouldSet) -> list[MouldFinding]:
-    """Return what the checks find that read no silicone; variants of one geometry share it."""
+    """Return the findings of the checks that read no silicone; variants of one geometry share them."""
     checks = (check for check in mould_checks().values() if not check.reads_silicone)
     return [finding for check in checks for finding in check.findings(moulds)]

@@ -1,8 +1,8 @@
 """C400: air finds its way out. Every high region of a cavity meets the rim or a vent, level and tilted.
 
 A high region is a peak of the cavity's height function that is a ceiling, not the top of something standing in it. Its
-depth is what separates the peak from the saddle over which it would empty; a dent shallower than a tenth of the layer's
-thinnest part thins it by less than the printer's play does, and counts as none.
+depth is the height from the peak down to the saddle over which it would empty. A dent shallower than a tenth of the
+layer's thinnest part is ignored: it thins the layer by less than the printer's play does.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.profile import GRID_PER_MM
 
 ATTITUDES = ((0.0, 0.0), (TILT_DEG, 0.0), (TILT_DEG, 90.0), (TILT_DEG, 180.0), (TILT_DEG, 270.0))
-"""(tilt, azimuth of the side that is raised), degrees. Vents lie halfway between these azimuths: the worst case."""
+"""(tilt, azimuth of the side that is raised), degrees. Vents are halfway between these azimuths: the worst case."""
 _SAME = 1e-6
 _AT_TOP = 1 / GRID_PER_MM
-"""What snapping may take from the height of the opening, mm."""
+"""Height that snapping may take from the opening, mm."""
 CREVICE = 1e-6
 """A pocket of a smaller share of the cavity is a crevice that rounding leaves between two pieces, as in C100."""
 
@@ -75,7 +75,7 @@ def pockets(cavity: Manifold, top: float) -> list[Pocket]:
 
 
 def pocket_volume(cavity: Manifold, top: float, pocket: Pocket) -> float:
-    """Return the volume of the air that a pocket holds back, mm3."""
+    """Return the volume of the air that a pocket traps, mm3."""
     up, peak = upwards(pocket.tilt, pocket.azimuth), np.asarray(pocket.peak)
     above = cavity.trim_by_plane(tuple(up), float(peak @ up) - pocket.depth + _SAME)
     total = 0.0

@@ -1,7 +1,7 @@
-"""C100: the cavity that tools and earlier layers leave is the layer, and nothing more.
+"""C100: the cavity between tools and earlier layers is the layer, and nothing more.
 
-It compares what was drawn as a unit with what was drawn as tools, and knows of neither how it was drawn. Of bodies from
-a file, films that are no thicker than their facets' distance from the surface are left out.
+It compares the drawn unit with the drawn tools, and does not know how either was drawn. In bodies from a file it
+ignores films that are no thicker than their facets' distance from the surface.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from unitcad.shape import cylinder, moved
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
-    """Compare what silicone can reach with the layer, in every cavity, and in the tray of a skin with the film."""
+    """Compare the space that silicone can reach with the layer, in every cavity, and with the film in a skin's tray."""
     yield from each_cavity(moulds, lambda cavity: _of_cavity(cavity, moulds.facets))
     for tray in moulds.plan.of_kind("tray"):
         solid, dims = moulds.mesh(tray), moulds.plan.dimensions
@@ -36,7 +36,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
 
 def _of_cavity(cavity: Cavity, facets: float) -> Iterator[MouldFinding]:
     drawn, reached = cavity.drawn, cavity.reached
-    # What one has and the other lacks, both ways.
+    # The difference, both ways.
     differ = abs(reached.volume() + drawn.volume() - 2 * (reached ^ drawn).volume())
     if facets and differ > BALANCE * drawn.volume():
         differ = sum(piece.volume() for rest in (reached - drawn, drawn - reached) for piece in thick_pieces(rest))

@@ -1,9 +1,9 @@
-"""C220: what centres a cup on its plinth bears on three faces or more, as deep as is asked for, and stays off the seat.
+"""C220: the ribs that centre a cup bear on three faces or more, with the interference of the spec, and clear the seat.
 
 Measured on the meshes: the patches in which cup and base overlap halfway up the ribs' crests. A patch's narrowest
-extent is the interference, and its direction that of the face that the rib bears on. Where the directions leave less
-than half a turn between any two neighbours, no way is left for the cup to slip aside. Ribs of resin stand on leaves:
-these must bend without breaking, and into the slot behind them. A cup without ribs has a play.
+extent is the interference, and its direction that of the face that the rib bears on. If any two neighbouring directions
+are less than half a turn apart, the cup can't slip aside. Ribs of resin are on leaves, which must bend without
+breaking, into the slot behind them. A cup without ribs has a play.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from unitcad.spec import printer_of
 FACES = 3
 """Faces that ribs bear on, at least: fewer leave a way to slip aside."""
 WIDEST_DEG = 150.0
-"""Angle between neighbouring directions that a cup is held from, at most: at 180 nothing holds it between them."""
+"""Largest angle between neighbouring directions in which a cup is centred: at 180 it can slip aside between them."""
 SAME_DEG = 20.0
 """Directions nearer than this are those of one face."""
 GRID = 3 / GRID_PER_MM
-"""What snapping crest and face to the grid may add to the interference or take from it, mm."""
+"""Change of the interference by snapping crest and face to the grid, mm."""
 FARTHEST, NEAR = 4.0, 1e-4
 """How far a play is looked for, and how finely, mm."""
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
-    """Measure what centres each cup."""
+    """Measure how each cup is centred."""
     lengths = moulds.spec.moulds
     standing = ribs(moulds.spec, moulds.plan.layout)
     for step in moulds.plan.steps:
@@ -58,7 +58,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         directions = _faces(direction for _, direction in held)
         yield at_least("C220", f"{where}: faces that ribs bear on", len(directions), FACES, "")
         gap = max((b - a for a, b in pairwise([*directions, *(d + 360 for d in directions[:1])])), default=360.0)
-        advice = "on that side nothing holds the cup: a rib is missing or too low"
+        advice = "the cup can slip to that side: a rib is missing or too low"
         yield at_most("C220", f"{where}: widest angle between them", gap, WIDEST_DEG, "deg", advice)
         depths = [depth for depth, _ in held] or [0.0]
         asked = lengths.rib_interference_mm
@@ -66,14 +66,14 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         yield at_most("C220", f"{where}: greatest interference of a rib", max(depths), asked + GRID, "mm")
         shared = cup ^ moulds.crushing
         room = -shared.bounding_box()[5] if not shared.is_empty() else -standing[0].head
-        advice = "what is crushed there lifts the cup off its seat"
+        advice = "the crushed rib lifts the cup off its seat"
         yield at_least("C220", f"{where}: from the seat down to a rib", room, -standing[0].head - GRID, "mm", advice)
         if leaf_mm(printer_of(moulds.spec)):
             yield from _bending(moulds, step.cup, max(depths), -room)
 
 
 def _bending(moulds: MouldSet, cup: str, depth: float, contact: float) -> Iterator[MouldFinding]:
-    """Measure how far a cup's leaves are strained, and whether they find room, where ribs bear up to z = `contact`."""
+    """Measure how far a cup's leaves are strained, and whether they find room, if ribs bear up to z = `contact`."""
     lengths, standing = moulds.spec.moulds, ribs(moulds.spec, moulds.plan.layout)
     leaf = thickest_leaf(moulds.solids[cup], standing, lengths.plinth_clearance_mm)
     pushed, arm = farthest_push(depth, lengths.xy_play_mm, lengths.plinth_clearance_mm), leaf.root - contact
@@ -138,5 +138,7 @@ def _travel(wall: CrossSection, plinth: CrossSection, way: tuple[int, int]) -> f
 
 
 CHECK = MouldCheck(
-    "C220", "centring: ribs bear on three faces, as deep as asked for, stay off the seat and break no leaf", findings
+    "C220",
+    "centring: ribs bear on three faces with the spec's interference, clear the seat and break no leaf",
+    findings,
 )

@@ -11,7 +11,7 @@ from unitcad.moulds.mould_set import MouldSet
 
 @dataclass(frozen=True)
 class MouldCheck:
-    """A code, what it demands in one line, and its function. `reads_silicone`: its limit is a material's."""
+    """A code, its demand in one line, and its function. `reads_silicone`: its limit is a material's."""
 
     code: str
     demands: str

@@ -1,11 +1,11 @@
-"""C300: every piece comes out, in the plan's order, without passing through anything that stays.
+"""C300: every piece comes out, in the plan's order, without passing through a piece that stays.
 
-What is already gone is left out. An order that can't be followed is a finding too.
+Removed pieces are ignored. An order that can't be followed is a finding too.
 
-A piece that moves along +z meets what stays if, and only if, somewhere an upward face of the piece lies below (or
-against) a downward face of what stays, on one vertical line. So the test is exact for any polyhedron: project the faces
-along the way, clip each pair of triangles against each other and keep the part where the piece's lies below. No height
-is sampled.
+A piece that moves along +z meets a piece that stays if, and only if, on one vertical line an upward face of the first
+is below (or against) a downward face of the second. So the test is exact for any polyhedron: project the faces along
+the way, clip each pair of triangles against each other and take the part in which the moving piece's is below. No
+height is sampled.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from unitcad.moulds.plan import Step
 from unitcad.moulds.removal import CAST, Removal, Way
 
 BLOCKED = 1e-5
-"""Largest area of facing faces, mm2: what rounding leaves of faces that only touch along an edge."""
+"""Largest area of facing faces, mm2: rounding of faces that only touch along an edge."""
 LEVEL = 1e-9
 """Heights nearer than this are equal, mm."""
 _Named = Sequence[tuple[str, Manifold]]
@@ -37,9 +37,9 @@ _BLOCK = 100_000  # pairs of triangles clipped together
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
-    """Yield the area of every removed piece that runs into what stays, and every step of the order that can't be done.
+    """Yield the blocked area of every removed piece, and every step of the order that can't be done.
 
-    Where pieces overlap, the piece is cut out of what stays first: silicone has taken the tool's real shape.
+    If pieces overlap, the moving piece is cut out of the others first: silicone has taken the tool's real shape.
     """
     overlapping = any(not finding.ok for finding in overlap.findings(moulds))
     facing = cache(_facing)
@@ -60,12 +60,12 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
                 if piece.is_empty():
                     yield _out_of_order(where, "there is no silicone where this part should be")
                     continue
-                # Silicone bends: what is still there lets a part go.
+                # Silicone bends, so a remaining layer lets a part go.
                 silicone = [("layer", whole)] if thick_pieces(whole) else []
             elif removal.piece in there:
                 piece = there.pop(removal.piece)
             else:
-                yield _out_of_order(where, "it is not there: it was taken away before, or does not stand in this pour")
+                yield _out_of_order(where, "it is not there: it was removed before, or is not part of this pour")
                 continue
             areas, way, apart = [], removal.direction, []
             stays = [*there.items(), *silicone]
@@ -85,16 +85,16 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             areas += _areas(facing(piece, way, True), apart) if apart else []
             largest, name = max(areas, default=(0.0, ""))
             where += f" against {name}" if largest > BLOCKED else ""
-            advice = f"something of the piece lies under {name}: the two are drawn with an undercut"
+            advice = f"part of the piece is under {name}: the two are drawn with an undercut"
             yield at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", advice)
         if whole is not None and silicone:
             part = f"{whole.volume():.3g} mm3 of the silicone"
-            yield _out_of_order(f"pour {step.index}: {part} stay", "no part that is taken out holds them")
+            yield _out_of_order(f"pour {step.index}: {part} stay", "no removed part carries them")
         yield from _left(moulds, step, after, there, cast=bool(silicone))
 
 
 def _parted(moulds: MouldSet, silicone: Manifold, removal: Removal) -> tuple[Manifold, Manifold]:
-    """Return the part of the silicone that a removal takes, and what is left of it."""
+    """Return the part of the silicone that a removal takes, and the rest."""
     if removal.within is None:
         return silicone, Manifold()
     part, rest = silicone.split(moulds.mesh_of(removal.within))
@@ -106,8 +106,8 @@ def _together(
 ) -> dict[Removal, float]:
     """Return for the first removals, of pieces that go the same way, the area at which any of them meets anything.
 
-    `first` is the piece of the first removal. All that goes counts as staying too, so what is free here is free in any
-    order. One after the other, a hundred stubs under a plate would each be compared with the whole plate.
+    `first` is the piece of the first removal. Removed pieces count as staying too, so a piece that is free here is free
+    in any order. One after the other, a hundred stubs under a plate would each be compared with the whole plate.
     """
     way, there = removals[0].direction, dict(stays)
     like = takewhile(lambda each: each.direction == way and each.piece in there and each.piece != CAST, removals[1:])
@@ -120,7 +120,7 @@ def _together(
 
 
 def _areas(piece: np.ndarray, others: list[tuple[str, np.ndarray]]) -> list[tuple[float, str]]:
-    """Return the area that is blocked, by name: of all others at once where it is none.
+    """Return the blocked area by name, computed for all others at once if it is zero.
 
     One after the other they would take the square of the cells' number.
     """
@@ -133,10 +133,10 @@ def _areas(piece: np.ndarray, others: list[tuple[str, np.ndarray]]) -> list[tupl
 def _left(
     moulds: MouldSet, step: Step, after: Step | None, there: Iterable[str], *, cast: bool
 ) -> Iterator[MouldFinding]:
-    """Yield a finding for every piece that the order leaves where the next pour, or the unit, can't have it.
+    """Yield a finding for every piece that the order leaves in the way of the next pour, or in the unit.
 
-    `cast`: the silicone is still there. It must be for a next pour that is cast on it, and gone before one that it is
-    laid into; after the last, it is peeled off what stays.
+    `cast`: the silicone is still there. It must be there for a next pour that is cast on it, and removed before one
+    that it is laid into; after the last it is peeled off the remaining pieces.
     """
     for name in there if after or cast else ():
         if moulds.plan.tool(name).removal and name not in (after.tools if after else ()):
@@ -155,17 +155,17 @@ def _out_of_order(where: str, why: str) -> MouldFinding:
 
 
 def blocked(piece: Manifold, stays: Manifold, direction: Way) -> float:
-    """Return the area, mm2, of upward faces of `piece` that lie below downward faces of `stays` along `direction`.
+    """Return the area, mm2, of upward faces of `piece` below downward faces of `stays` along `direction`.
 
-    `direction` is any vector but 0. A face that several others lie above counts once for each of them. Where the two
-    overlap at the start, the piece is cut out of what stays.
+    `direction` is any vector but 0. A face below several others counts once for each of them. If the two overlap at the
+    start, `piece` is cut out of `stays`.
     """
     return _meeting(_facing(piece, direction, True), _facing(stays - piece, direction, False))
 
 
 def _meeting(up: np.ndarray, down: np.ndarray) -> float:
-    """Area of the triangles `up` (n, 3, 3) that lie below, or against, the triangles `down`."""
-    # Of the larger set most lies beside a small piece.
+    """Area of the triangles `up` (n, 3, 3) below, or against, the triangles `down`."""
+    # Most of the larger set is far from a small piece.
     up, down = (up, _in_sight(down, up)) if len(up) < len(down) else (_in_sight(up, down), down)
     if not len(up) or not len(down):
         return 0.0
@@ -205,7 +205,7 @@ def _boxed(triangles: np.ndarray, frame: Frame, higher: float) -> tuple[np.ndarr
 
 
 def _in_the_way(piece: Manifold, stays: Manifold, direction: Way) -> bool:
-    """Tell whether the boxes let the piece meet what stays at all."""
+    """Tell whether the boxes of moving and staying pieces can meet."""
     p, q = piece.bounding_box(), stays.bounding_box()
     for axis, way in enumerate(direction):
         if way >= 0 and q[axis + 3] < p[axis] - LEVEL:
@@ -216,7 +216,7 @@ def _in_the_way(piece: Manifold, stays: Manifold, direction: Way) -> bool:
 
 
 def _facing(solid: Manifold, direction: Way, upwards: bool) -> np.ndarray:
-    """Return the triangles (n, 3, 3) that face along the direction (or against it), in a frame where it is +z."""
+    """Return the triangles (n, 3, 3) that face along the direction (or against it), in a frame whose +z it is."""
     vertices, faces = arrays(solid)
     corners = (vertices @ upright(direction).T)[faces]
     doubled = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -239,7 +239,7 @@ def _overlap(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def _area_below(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the area in plan of each triangle of `first` on or above which its partner of `second` lies."""
+    """Return the area in plan of each triangle of `first` on or below its partner of `second`."""
     polygon = first[:, :, :2]
     sense = np.sign(_cross(second[:, 1] - second[:, 0], second[:, 2] - second[:, 0]))
     for i in range(3):
@@ -253,7 +253,7 @@ def _area_below(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def _clip(polygon: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """Return the part of convex polygons (n, m, 2) where a linear function, given at the corners, is >= 0.
+    """Return the part of convex polygons (n, m, 2) in which a linear function, given at the corners, is >= 0.
 
     Corners that are no longer needed repeat another one, which adds no area; a polygon wholly outside shrinks to one
     point.
@@ -268,7 +268,7 @@ def _clip(polygon: np.ndarray, value: np.ndarray) -> np.ndarray:
     kept = np.stack([inside, crosses], axis=2).reshape(n, 2 * m)
     order = np.argsort(~kept, axis=1, kind="stable")
     count = kept.sum(axis=1)
-    # The first kept corner stands in for those that fall away.
+    # The first kept corner replaces those that fall away.
     index = np.where(np.arange(2 * m) < count[:, None], order, order[:, :1])
     corners = np.take_along_axis(corners, index[..., None], axis=1)
     return corners[:, : max(1, int(count.max(initial=0)))]

@@ -1,4 +1,4 @@
-"""A check of cavities, one after the other: what is found in one holds for every other in like surroundings."""
+"""A check of cavities, one after the other: the findings of one apply to every other in like surroundings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from unitcad.moulds.mould_set import MouldSet
 
 
 def each_cavity(moulds: MouldSet, judge: Callable[[Cavity], Iterable[MouldFinding]]) -> Iterator[MouldFinding]:
-    """Yield what `judge` finds in every cavity; the place that it names begins with the cavity's."""
+    """Yield the findings of `judge` in every cavity; the place that it names begins with the cavity's."""
     judged: dict[int, list[MouldFinding]] = {}
     for cavity in moulds.cavities:
         first = moulds.cavities[cavity.first]

@@ -20,7 +20,7 @@ class FindingRecord(TypedDict):
 
 @dataclass(frozen=True)
 class MouldFinding:
-    """One check at one place: `value` against `limit` in `unit`, whether it holds, and what to change where not."""
+    """One check at one place: `value` against `limit` in `unit`, whether it passes, and the remedy if not."""
 
     code: str
     where: str
@@ -36,17 +36,17 @@ class MouldFinding:
 
 
 def exactly(code: str, where: str, value: float, wanted: float, unit: str) -> MouldFinding:
-    """Return a finding that holds where `value` is `wanted`."""
+    """Return a finding that passes if `value` is `wanted`."""
     return MouldFinding(code, where, bool(value == wanted), float(value), float(wanted), unit)
 
 
 def at_most(code: str, where: str, value: float, limit: float, unit: str, advice: str = "") -> MouldFinding:
-    """Return a finding that holds up to `limit`."""
+    """Return a finding that passes up to `limit`."""
     ok = bool(value <= limit)
     return MouldFinding(code, where, ok, float(value), float(limit), unit, "" if ok else advice)
 
 
 def at_least(code: str, where: str, value: float, limit: float, unit: str, advice: str = "") -> MouldFinding:
-    """Return a finding that holds from `limit` on."""
+    """Return a finding that passes from `limit` on."""
     ok = bool(value >= limit)
     return MouldFinding(code, where, ok, float(value), float(limit), unit, "" if ok else advice)

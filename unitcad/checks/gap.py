@@ -1,10 +1,10 @@
 """C210: faces that must slide have the printer's clearance: skirt and plinth, or pins, tongue and window, lid and cup.
 
-Pins and the slits beside a base's fins have the clearance asked for, and no less than the printer's own play.
+Pins and the slits next to a base's fins have the clearance of the spec, and no less than the printer's own play.
 
-The skirt is measured below the seat, where cup and plinth touch on purpose, and beside its ribs, which reach into the
-plinth; the lid's below the rim. Round corners are polygons of as many sides a turn on both pieces: midway along a facet
-their gap is the clearance's cosine of pi / n. In moulds by complement the gap to what stands on the base is that of
+The skirt is measured below the seat, at which cup and plinth touch on purpose, and next to its ribs, which reach into
+the plinth; the lid's below the rim. Round corners are polygons of as many sides a turn on both pieces: midway along a
+facet their gap is the clearance's cosine of pi / n. In moulds by complement the gap to the parts on the base is that of
 sections: above it the cup may touch its edge.
 """
 
@@ -26,13 +26,13 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pins import PIN_RADIUS, Pins
 from unitcad.shape import cylinder, moved
 from unitcad.shape.profile import GRID_PER_MM
-from unitcad.spec.effective import Moulds
+from unitcad.spec.resolved import Moulds
 
 KNIFE = "the base carries an edge thinner than that clearance: give the silicone over it a corner less sharp"
 THIN = 1e-3
-"""A slice between two heights nearer than this is left out, mm."""
+"""Two heights nearer than this have no slice between them, mm."""
 GRID = 2 / GRID_PER_MM
-"""What snapping two faces to the grid may take from the clearance between them, mm."""
+"""Clearance that snapping two faces to the grid may take, mm."""
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
@@ -48,7 +48,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         if step.cup not in solids:
             if step.lid and step.pins:
                 yield _on_pins(moulds, step.lid, solids[step.lid], base, step.pins)
-            continue  # what stands alone slides on nothing
+            continue  # a part without neighbour slides on nothing
         cup = solids[step.cup]
         beside = cup - moulds.rib_spaces
         if pins:
@@ -86,12 +86,12 @@ def _on_pins(moulds: MouldSet, name: str, piece: Manifold, base: Manifold, pins:
 
 
 def least_play(lengths: Moulds) -> float:
-    """Return what pieces without ribs keep between them: the clearance asked for, or the printer's own play, mm."""
+    """Return the clearance of pieces without ribs, mm: that of the spec, or the printer's own play if larger."""
     return max(lengths.plinth_clearance_mm, lengths.xy_play_mm)
 
 
 def play_missing(moulds: MouldSet) -> list[str]:
-    """Return a sentence where pieces without ribs are drawn with too little play, known before anything is; else []."""
+    """Return a sentence if pieces without ribs have too little play, known before anything is drawn; otherwise []."""
     lengths, plan = moulds.spec.moulds, moulds.plan
     codes = [*(["C210"] if plan.pins else []), *(["C250"] if plan.splits else [])]
     if not codes or lengths.plinth_clearance_mm >= least_play(lengths):
@@ -100,7 +100,7 @@ def play_missing(moulds: MouldSet) -> list[str]:
 
 
 def too_tight(lengths: Moulds) -> str:
-    """Write what to change where pieces have less than `least_play` between them."""
+    """Write the remedy for pieces with less than `least_play` between them."""
     asked, play = lengths.plinth_clearance_mm, lengths.xy_play_mm
     if asked >= play:
         return "the clearance (moulds.plinth_clearance_mm) is missing"

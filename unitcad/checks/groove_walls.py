@@ -1,6 +1,6 @@
-"""C230: what overflows stays in the groove. Floor and walls of a cup's overflow groove are whole.
+"""C230: overflow stays in the groove. Floor and walls of a cup's overflow groove are whole.
 
-Measured on the meshes: a groove is what is hollow in a cup, open at its rim, and holds no silicone of the pour. The
+Measured on the meshes: a groove is a hollow of a cup that is open at its rim and contains no silicone of the pour. The
 distance from it to any other hollow (a hole for a pin, a window, a notch) is its wall. Engraved letters, which are
 shallower than a groove, don't count.
 """
@@ -24,7 +24,7 @@ from unitcad.moulds.plan import Step
 from unitcad.shape.column import Column
 
 SLACK = 0.1
-"""How much wider than what a groove reaches from its cell the part is that it is looked at in, mm."""
+"""Margin round a cell, beyond its groove, within which the groove is examined, mm."""
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
@@ -81,12 +81,12 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
 
 
 def _above(z: float, pieces: list[Manifold]) -> Manifold:
-    """Return what of pieces that don't touch lies above a height."""
+    """Return the part above a height of pieces that don't touch."""
     return Manifold.compose(pieces).trim_by_plane((0, 0, 1), z)
 
 
 def _without(sections: list[CrossSection], silicone: list[Manifold], level: float) -> list[CrossSection]:
-    """Return the sections that hold no silicone."""
+    """Return the sections without silicone."""
     cast = [part for solid in silicone if not (part := solid.slice(level)).is_empty()]
     grown = [part.offset(GRID, JoinType.Miter) for part in cast]
     boxes = np.array([part.bounds() for part in grown]).reshape(-1, 4)
@@ -101,7 +101,7 @@ def _without(sections: list[CrossSection], silicone: list[Manifold], level: floa
 
 
 def _beside(sections: list[CrossSection], silicone: list[Manifold], level: float, land: float) -> list[CrossSection]:
-    """Return the sections that begin where the land round the silicone ends: letters as deep as a groove stand off."""
+    """Return the sections that begin at the end of the land round the silicone; letters are farther off."""
     cast = CrossSection.batch_boolean([solid.slice(level) for solid in silicone], OpType.Add)
     reach = cast.offset(land + 2 * GRID, JoinType.Round)
     return [section for section in sections if not (section ^ reach).is_empty()]
@@ -110,7 +110,7 @@ def _beside(sections: list[CrossSection], silicone: list[Manifold], level: float
 def _tiles(moulds: MouldSet, groove: CrossSection, beside: float, ends: tuple[float, float]) -> list[Column]:
     """Return a column about each of several cells, wider by `beside` than its part of the plate; none for the whole.
 
-    The whole is looked at where the cells' parts don't cover the groove.
+    The whole is examined if the cells' parts don't cover the groove.
     """
     lay = moulds.plan.layout
     if len(lay.cells) == 1:
@@ -124,7 +124,7 @@ def _tiles(moulds: MouldSet, groove: CrossSection, beside: float, ends: tuple[fl
 
 
 def _border(section: CrossSection) -> np.ndarray:
-    """Return points (n, 2) of a section's border, SLACK apart at most: between two cells a side's ends lie nearest."""
+    """Return points (n, 2) of a section's border, SLACK apart at most: between two cells a side's ends are nearest."""
     loops = section.to_polygons()
     starts = np.concatenate(loops)
     sides = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops]) - starts

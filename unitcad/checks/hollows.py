@@ -11,17 +11,17 @@ from unitcad.moulds.plan import Step
 from unitcad.shape.profile import GRID_PER_MM
 
 GRID = 3 / GRID_PER_MM
-"""What snapping two faces to the grid may take from the wall between them, mm."""
+"""Wall thickness that snapping two faces to the grid may take, mm."""
 
 
 def hollows(moulds: MouldSet, piece: str) -> list[Manifold]:
-    """Return what is missing of a piece's convex hull, in connected pieces."""
+    """Return the difference of a piece's convex hull and the piece, in connected pieces."""
     solid = moulds.solids[piece]
     return moulds.once(f"hollows of {piece}", lambda: thick_pieces(solid.hull() - solid))
 
 
 def least_wall(moulds: MouldSet) -> float:
-    """Return the least wall between two hollows, mm: what the printer prints, or a narrower land that is asked for."""
+    """Return the least wall between two hollows, mm: the printer's, or a narrower land of the spec."""
     lengths = moulds.spec.moulds
     return min(lengths.least_wall_mm, lengths.land_mm) - GRID
 

@@ -12,7 +12,7 @@ from unitcad.designs.rib_leaves import LEAF_WIDTH
 from unitcad.moulds.ribs import SLOPE, SQUARE, Rib
 
 BESIDE = 0.4 * LEAF_WIDTH
-"""Where along the face a leaf is measured: clear of the rib in its middle."""
+"""Positions along the face at which a leaf is measured: clear of the rib in its middle."""
 LINE, REACH, STEP = 0.02, 2.5, 0.002
 """Width of a section's strip, how far it reaches behind the face, how finely a root is looked for, mm."""
 
@@ -29,7 +29,7 @@ class Leaf:
 def thickest_leaf(cup: Manifold, standing: Sequence[Rib], clearance: float) -> Leaf:
     """Return the greatest thickness, the least room and the lowest root of the leaves that carry `standing`.
 
-    A leaf that nothing frees has no room, and its root lies at its crest.
+    A leaf without slots has no room, and its root is at its crest.
     """
     level = (standing[0].bottom + standing[0].top) / 2
     section = cup.slice(level)
@@ -52,7 +52,7 @@ def _across(section: CrossSection, rib: Rib, level: float, along: float) -> tupl
 
 
 def _all_free(section: CrossSection, standing: Sequence[Rib], level: float, clearance: float) -> bool:
-    """Tell whether every leaf stands alone at a level: a slot behind it, a slot or an opening on both its sides."""
+    """Tell whether every leaf is free at a level: a slot behind it, a slot or an opening on both its sides."""
     depth, wide = -(clearance + LINE) * SQUARE, LEAF_WIDTH
     for rib in standing:
         if len(_runs(section, rib, level, (0.0, -REACH), (BESIDE, BESIDE + LINE))) < 2:
@@ -71,7 +71,7 @@ def _runs(
     sides: tuple[float, float],
     along: bool = False,
 ) -> list[tuple[float, float]]:
-    """Return where a strip over a face meets material: from and to, outwards of the face, or `along` it, in order."""
+    """Return the sorted intervals in which a strip over a face meets material, outwards of the face or `along` it."""
     (nx, ny), face = rib.inwards, level * SLOPE
     inwards, beside = np.array((nx, ny), float), np.array((-ny, nx), float)
     origin = np.array((rib.x, rib.y)) + inwards * face

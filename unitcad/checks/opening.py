@@ -18,7 +18,7 @@ from unitcad.moulds.pour_opening import LEAST_AREA, LEAST_WIDTH, regions
 from unitcad.shape.profile import GRID_PER_MM
 
 _SNAPPED = 1 / GRID_PER_MM
-"""What snapping to the grid may take from the height of that plane, mm."""
+"""Height that snapping to the grid may take from that plane, mm."""
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
@@ -40,6 +40,4 @@ def _of_cavity(cavity: Cavity) -> Iterator[MouldFinding]:
         yield at_least("C410", f"{where}: narrowest vent", vent, LEAST_WIDTH, "mm", "a lid needs vents of that width")
 
 
-CHECK = MouldCheck(
-    "C410", "opening: what a cavity is filled and vented through is wide enough for silicone and air", findings
-)
+CHECK = MouldCheck("C410", "opening: sprues, vents and open rims are wide enough for silicone and air", findings)

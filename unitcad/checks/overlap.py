@@ -1,8 +1,8 @@
 """C200: no two solids of the unit, of a patch, or of an assembled pour, share volume.
 
-Ribs count as crushed: C220 looks at them. A pocket counts as stretched round its unit: C310 looks at its strain. Films
-of facets are left out of bodies from a file: two facets reach into each other by as much as both lie off the surface
-that they stand for.
+Ribs count as crushed: C220 looks at them. A pocket counts as stretched round its unit: C310 looks at its strain. In
+bodies from a file films of facets are ignored: two facets reach into each other by their distances from the true
+surface.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from unitcad.moulds.plan import Step
 from unitcad.shape import Shape, union
 
 OVERLAP = 1e-6
-"""Largest volume two pieces may share, mm3: what rounding leaves where faces touch."""
+"""Largest volume two pieces may share, mm3: rounding of faces that touch."""
 
 
 def findings(moulds: MouldSet) -> list[MouldFinding]:
-    """Look at the unit, then at each assembled pour: tools, cured layers, what is laid in, and the one being cast.
+    """Look at the unit, then at each assembled pour: tools, cured layers, inserts, and the layer being cast.
 
     The cells of a layer are compared with each other, then count as one solid.
     """
@@ -40,7 +40,7 @@ def _of_all(moulds: MouldSet) -> list[MouldFinding]:
 
 
 def _of_layers(moulds: MouldSet, volumes: _Volumes) -> dict[tuple[str, str], float]:
-    """Return what layers of the unit share by their names, as known from the last pour, where they lie in it so."""
+    """Return the shared volumes of the unit's layers by name, if the last pour has them at the same places."""
     last = moulds.plan.steps[-1]
     cast = [*_earlier(moulds, last), (last.name, last.layer)]
     bodies = {name: body.name for name, shapes in cast for body in moulds.unit if body.shape == union(shapes)}
@@ -55,7 +55,7 @@ def of_unit(moulds: MouldSet, known: Mapping[tuple[str, str], float] | None = No
 
 
 _There = Sequence[tuple[str, Sequence[Manifold]]]
-"""What stands in a pour by name: a layer has a part in every cell."""
+"""The pieces of a pour by name: a layer has a part in every cell."""
 
 
 def _of_pours(moulds: MouldSet, volumes: _Volumes) -> Iterator[MouldFinding]:
@@ -71,7 +71,7 @@ def _of_pours(moulds: MouldSet, volumes: _Volumes) -> Iterator[MouldFinding]:
 
 
 def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, tuple[Shape, ...]]]:
-    """Yield the cured layers of a pour by name, where they lie in it: a layer that was laid in is another solid."""
+    """Yield the cured layers of a pour by name, at their places in it: a layer that was laid in is another solid."""
     start = 0
     for before in moulds.plan.steps[: step.index - 1]:
         there = step.earlier[start : start + len(before.layer)]
@@ -116,8 +116,8 @@ def _findings(where: str, there: _There, volumes: _Volumes) -> list[MouldFinding
 def common_volume(one: Manifold, other: Manifold, facets: float = 0.0) -> float:
     """Return the volume that two solids share, mm3, without films up to `facets` thick.
 
-    Where faces coincide the mesh kernel now and then keeps a part that is not shared, in one order of the two alone:
-    what is found is found in both orders. `other` is cut first: a cup and then the base take half as long that way.
+    If faces coincide the mesh kernel now and then keeps a part that is not shared, but only in one order of the two, so
+    a finding needs both orders. `other` is cut first: a cup and then the base take half as long that way.
     """
     shared = other ^ one
     volume = float(shared.volume())
@@ -129,10 +129,10 @@ def common_volume(one: Manifold, other: Manifold, facets: float = 0.0) -> float:
 
 
 class _Volumes:
-    """The volumes that pairs share: a pair that stands together in several pours, or in like places, is cut once.
+    """The volumes that pairs share: a pair that several pours or like places have in common is cut once.
 
     `alike` has, for small solids of a pour by identity, a value that is the same for those in like surroundings;
-    `known` and `of_names` hold volumes by names; films up to `facets` thick, mm, are left out.
+    `known` and `of_names` have volumes by names; films up to `facets` thick, mm, are left out.
     """
 
     def __init__(self, facets: float, known: Mapping[tuple[str, str], float] | None = None) -> None:
@@ -144,7 +144,7 @@ class _Volumes:
         self._kept: list[Manifold] = []
 
     def shared(self, one: tuple[str, Sequence[Manifold]], other: tuple[str, Sequence[Manifold]]) -> float | None:
-        """Return the volume that two named pieces share, mm3; None where no boxes of theirs meet."""
+        """Return the volume that two named pieces share, mm3; None if none of their boxes meet."""
         (a, parts), (b, others) = one, other
         boxes, beside = (np.array([self._box(part) for part in each]) for each in (parts, others))
         meeting = np.argwhere(_meet(boxes, beside))
@@ -159,7 +159,7 @@ class _Volumes:
             part, a, beside, b = beside, b, part, a
         if id(part) not in self.alike:
             return common_volume(part, beside, self.facets)
-        # Of the large pieces there is one of each name; a small one is known by its place beside the first.
+        # Large pieces have unique names; a small one is known by its place relative to the first.
         own, box = self._box(part), self._box(beside)
         place = tuple(round(y - x, 6) for x, y in zip(own, box, strict=True)) if id(beside) in self.alike else b
         key = self.alike[id(part)], place

@@ -1,8 +1,8 @@
 """C250: every printed piece fits the bed, and the pieces of a split tool fit together.
 
-Measured on the meshes. What a tool has and its pieces lack is the gap: it is as wide as the play asked for, no wider
-and no narrower, and no narrower than the printer's own play. The pieces share no volume and slide together along z.
-What of the gap a pour's silicone can reach, with tape or petroleum jelly under each tool, is what weeps into it.
+Measured on the meshes. The gap is the difference of a tool and its pieces: it is as wide as the spec's play, and no
+narrower than the printer's own. The pieces share no volume and slide together along z. The part of the gap that a
+pour's silicone can reach, with tape or petroleum jelly under each tool, fills with silicone.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from unitcad.shape.profile import GRID_PER_MM
 WEEP = 0.01
 """Silicone in the seams of a pour, at most, as a share of its layer (assumed): far less than what is mixed over."""
 GRID = 3 / GRID_PER_MM
-"""What snapping two borders to the grid may take from their gap, or add to it, mm."""
+"""Change of a gap by snapping its two borders to the grid, mm."""
 _Named = tuple[str, Manifold]
 THIN = 1e-3
-"""A slice between two heights nearer than this is left out, and what is nearer is touched, mm."""
+"""Two heights nearer than this have no slice between them, and nearer borders count as touching, mm."""
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
-    """Look at the size of the pieces, at every seam of a split tool, then at what weeps in each pour."""
+    """Look at the size of the pieces, at every seam of a split tool, then at the silicone in the seams of each pour."""
     yield _largest(moulds)
     gaps = {split.tool: _gap(moulds, split) for split in moulds.plan.splits}
     for split in moulds.plan.splits:
@@ -67,16 +67,16 @@ def _largest(moulds: MouldSet) -> MouldFinding:
 
 
 def _gap(moulds: MouldSet, split: Split) -> Manifold:
-    """Return what a tool has and its pieces lack."""
+    """Return the difference of a tool and its pieces."""
     return moulds.solids[split.tool] - united(moulds.mesh(piece) for piece in split.pieces)
 
 
 def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFinding]:
-    """Look at overlap, gap and way in of neighbouring pieces, at the widest gap, and for what the tool has not."""
+    """Look at overlap, gap and way in of neighbouring pieces, at the widest gap, and at material outside the tool."""
     whole, pieces = moulds.solids[split.tool], [(piece.name, moulds.mesh(piece)) for piece in split.pieces]
     lengths = moulds.spec.moulds
     play, least = lengths.plinth_clearance_mm, least_play(lengths)
-    # With the gap the pieces have the tool's volume, and what they have beyond it, or two of them have in common.
+    # Pieces and gap have the tool's volume, plus any material outside of it or shared by two of them.
     beyond = max(sum(float(piece.volume()) for _, piece in pieces) + float(gap.volume() - whole.volume()), 0.0)
     if beyond > OVERLAP / 2:
         beyond = sum(float((piece - whole).volume()) for _, piece in pieces)
@@ -94,7 +94,7 @@ def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFi
     spots = united(spot.translate((x, y, 0)) for x, y in split.crossings)
     yield at_most("C250", f"{split.tool}: widest gap", _widest(gap - spots), play + GRID, "mm", missing)
     if split.crossings:
-        # The four corners of a crossing stand on a square, whose diagonal is free.
+        # The four corners of a crossing are those of a square, whose diagonal is free.
         most = math.sqrt(2) * play + GRID
         yield at_most("C250", f"{split.tool}: widest gap where seams cross", _widest(gap ^ spots), most, "mm", missing)
 
@@ -127,7 +127,7 @@ def _inscribed(section: CrossSection) -> float:
 def _weep(moulds: MouldSet, step: Step, gaps: list[Manifold]) -> MouldFinding:
     """Compare the volume of the gaps that touch the layer, under the rim, with the layer's.
 
-    Each tool's seams are sealed from below: nothing gets from a cup's into the base's where the two cross.
+    Each tool's seams are sealed from below: nothing gets from a cup's into the base's at their crossing.
     """
     layers = moulds.meshes(step.layer)
     reached = 0.0

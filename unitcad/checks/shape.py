@@ -11,7 +11,7 @@ from unitcad.moulds.plan import Plan
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
-    """Look at every body of unit and tooling and the pieces of split tools; genus only where the drawing means one."""
+    """Look at every body of unit and tooling and the pieces of split tools; the genus if one is expected."""
     genus = expected_genus(moulds.plan)
     for name, solid in moulds.solids.items():
         yield exactly("C000", f"{name} components", len(solid.decompose()), moulds.pieces(name), "")
@@ -31,7 +31,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
 def expected_genus(plan: Plan) -> dict[str, int]:
     """Return the number of through holes of each tool.
 
-    A base has a filament hole a core; a cup a bore a cell and a closed window a tail; a lid a sprue and its vents. Of
+    A base has a filament hole a core; a cup a bore a cell and a closed window a tail; a lid a sprue and its vents. For
     moulds by complement only the blade's is known; a plan may state others.
     """
     if not plan.concentric:

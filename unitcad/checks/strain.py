@@ -1,7 +1,8 @@
-"""C310: where silicone must stretch, the hoop strain against its elongation at break, with a margin.
+"""C310: the hoop strain of stretched silicone against its elongation at break, with a margin.
 
-Strain is the perimeter that has to pass over the perimeter that is there, less one: of the convex hull, since stretched
-silicone spans a hollow. The least elongation among the layers is the limit's, though the innermost stretches most.
+Strain is the perimeter of the part that passes through over that of the hole, less one. Perimeters are those of the
+convex hull, since stretched silicone spans a hollow. The least elongation among the layers is the limit's, though the
+innermost stretches most.
 """
 
 from __future__ import annotations
@@ -32,9 +33,9 @@ from unitcad.spec import Spec
 FOOT = 1e-3
 """How far over its lowest point the foot of a part that is peeled off is looked at, mm."""
 TOUCHING = 1e-6
-"""Area of silicone over the core, mm2, up to which nothing has to stretch: rounding where walls mate."""
+"""Area of silicone over the core, mm2, up to which nothing has to stretch: rounding of mating walls."""
 CAPTIVE = 1e4
-"""The strain written where there is no hole at all for what has to pass."""
+"""The strain written if there is no hole at all for the part that has to pass."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
 
 
 class Peel(NamedTuple):
-    """What is pulled off along +z, the base that stays, and the outline within which the base is in its way.
+    """The part that is pulled off along +z, the base that stays, and the outline within which the base is in its way.
 
     None is the outline of the body itself.
     """
@@ -95,10 +96,10 @@ class Peel(NamedTuple):
 
 
 def peel(moulds: MouldSet, step: Step) -> list[Peel]:
-    """Return for each cell what is pulled off after a pour (all layers, bonded), turned so that it leaves along +z.
+    """Return the silicone of each cell pulled off after a pour (all layers, bonded), turned to leave along +z.
 
-    Where one layer joins all cells, a cell's part is what lies within half the pitch of it, or what leaves in a way of
-    its own: the parts of cells are the first ones that are taken out.
+    If one layer joins all cells, a cell's part is the silicone within half the pitch of it, or the part that leaves in
+    a direction of its own: the parts of cells are the first ones that are taken out.
     """
     lay, base = moulds.plan.layout, moulds.solids[moulds.plan.base_of(step)]
     shapes, cells = (*step.earlier, *step.layer), len(lay.cells)
@@ -126,7 +127,7 @@ def _ways(step: Step) -> list[tuple[Shape, Way]]:
 
 
 def _turned(part: Manifold, base: Manifold, direction: Way) -> Peel:
-    """Return a part that leaves along a direction. The base is in its way within its foot: beside it lies the sheet."""
+    """Return a part that leaves along a direction. The base is in its way within its foot: next to it is the sheet."""
     turn = np.column_stack([upright(direction), np.zeros(3)])
     body = part.transform(turn)
     foot = body.slice(body.bounding_box()[2] + FOOT)
@@ -137,7 +138,7 @@ def _advice(strain: Strain, limit: float) -> str:
     if not strain.room:
         return ""
     largest = strain.room * (1 + limit / 100)
-    return f"make what the core carries above z = {strain.z:.3g} mm no more than {largest:.3g} mm round (convex hull)"
+    return f"make the part of the core above z = {strain.z:.3g} mm no more than {largest:.3g} mm round (convex hull)"
 
 
 def peel_strain(body: Manifold, base: Manifold, outline: CrossSection | None = None) -> tuple[float, float, float]:
@@ -156,7 +157,7 @@ def peel_strain(body: Manifold, base: Manifold, outline: CrossSection | None = N
         if above - below < 1e-6 or z >= top:
             continue
         silicone = body.slice(z)
-        # Above a higher level the base carries no more: where nothing was in the way of this section, nothing is.
+        # Above a higher level the base carries no more: if nothing was in the way of this section, nothing is.
         if silicone.is_empty() or (passing ^ silicone).area() <= TOUCHING:
             continue
         passing = base.trim_by_plane((0, 0, 1), z).project() ^ outline
@@ -176,5 +177,5 @@ def _perimeter(section: CrossSection) -> float:
 
 
 CHECK = MouldCheck(
-    "C310", "strain: where silicone stretches it keeps the margin on its elongation", findings, reads_silicone=True
+    "C310", "strain: stretched silicone keeps the margin on its elongation", findings, reads_silicone=True
 )

@@ -1,6 +1,6 @@
-"""C240: between any two hollows of a cup stands a wall: bores, grooves, windows and holes for pins keep apart.
+"""C240: any two hollows of a cup have a wall between them: bores, grooves, windows and holes for pins.
 
-Measured on the meshes. Engraved letters don't count: nothing flows through them, and their strokes lie closer.
+Measured on the meshes. Engraved letters don't count: nothing flows through them, and their strokes are closer.
 """
 
 from __future__ import annotations
@@ -44,4 +44,4 @@ def near(pieces: Sequence[Manifold], gap: float) -> list[tuple[int, int]]:
     return list(zip(first.tolist(), second.tolist(), strict=True))
 
 
-CHECK = MouldCheck("C240", "walls: between any two hollows of a cup stands the least wall or more", findings)
+CHECK = MouldCheck("C240", "walls: the wall between any two hollows of a cup is the least wall or more", findings)

@@ -39,7 +39,7 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
     if level := manifest["estimate"]:
-        yield level["answer"]
+        yield from level["lines"]
     yield from to_open(built.folder)
 
 

@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from unitcad.attenuation.edge.fitted_models import MODELS
+from unitcad.attenuation.edge.models import MODELS
 from unitcad.catalogue import FREQUENCIES_HZ
 from unitcad.cli.estimate_tables import print_errors, print_estimate, print_frequencies, print_neighbours
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
 from unitcad.designs import design_of
 from unitcad.errors import Refusal
-from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec, neighbours_of_specs
+from unitcad.estimating import FEM, estimate_spec, frequency_table_of_spec, neighbours_of_specs
 from unitcad.moulds.plan import plan
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
@@ -28,7 +28,7 @@ def estimate(
         list[str], typer.Argument(metavar="SPEC", help="a template's name or a path to a TOML file; or arrays")
     ],
     model: Annotated[
-        str, typer.Option(help="bush, fitted, paper, consistent or all of them; or mechanics; else the spec's")
+        str, typer.Option(help="Model of the details: rule, published, corrected, divider, all, or fem.")
     ] = "",
     frequency: Annotated[
         str, typer.Option(metavar="HZ|FROM:TO:STEP", help="one frequency, or a table over frequencies")
@@ -43,21 +43,21 @@ def estimate(
     fit: Fit = None,
     sets: Sets = None,
     details: Annotated[
-        bool, typer.Option("--details", help="every model, the skin's curve, the inputs, errors, assumptions")
+        bool, typer.Option("--details", help="How sure it is: models, errors, slopes, the skin's curve, assumptions.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Estimate the level at a unit's edge, or an array's crosstalk.
 
-    The first line is the answer: how much of the motor's amplitude reaches the edge, in per cent, by the model with
-    the least error, and what was measured. Of an array: how much of a unit's motion reaches its neighbours. Of
-    several arrays each is compared with the first.
+    The first line has the level in per cent of the motor's amplitude, and the 80 % range of the model that leads. If
+    this unit was measured, it has the measurement. The second line has the paper's analytic model and its error. For an
+    array: the share of a unit's motion at its neighbours; several arrays are compared with the first.
     """
 
-    if model not in ("", "all", *MODELS, MECHANICS):
-        raise Refusal("--model", model, f"is none of {', '.join((*MODELS, MECHANICS, 'all'))}", MODELS[0])
-    if ":" in frequency and model == MECHANICS:
-        raise Refusal("--frequency", frequency, "must be one frequency for mechanics, whose draws cost seconds each")
+    if model not in ("", "all", *MODELS, FEM):
+        raise Refusal("--model", model, f"is none of {', '.join((*MODELS, FEM, 'all'))}", MODELS[0])
+    if ":" in frequency and model == FEM:
+        raise Refusal("--frequency", frequency, "must be one frequency for fem, whose draws cost seconds each")
     models = None if not model else MODELS if model == "all" else (model,)
     hertz = frequencies(frequency) if frequency else []
     for name in specs:
@@ -95,7 +95,7 @@ def estimate(
     if details:
         print_errors(estimates[0]["table_error"], estimates[0]["models"])
     else:
-        typer.echo("--details prints every model, the skin's curve, the inputs that count, errors and assumptions")
+        typer.echo("How sure? --details prints every model, its errors and slopes, the skin's curve and assumptions")
 
 
 def _warn_of_moulds(spec: Spec) -> None:

@@ -9,10 +9,11 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from unitcad.cli.output import console
+from unitcad.text import listed, number
 
 
 def print_estimate(data: dict[str, Any], details: bool = False) -> None:
-    """Print the answer in a few lines; with `details` every model, the layered curve, the inputs, what is assumed.
+    """Print the two lines of the answer; with `details` how sure it is: models, curve, slopes, what is assumed.
 
     The range by finite elements, which is only made when it is asked for, is always shown.
     """
@@ -20,13 +21,13 @@ def print_estimate(data: dict[str, Any], details: bool = False) -> None:
     variant = data["variant"]
     layers = " / ".join(layer["material"] for layer in variant["layers"])
     rest = f": {variant['design']}, {layers}, {level(variant['frequency_hz'], digits=4)} Hz"
-    screen.print(Text.assemble((variant["name"], "bold"), rest))
-    for line in [*data["answer"]["lines"], *_besides(data)]:
+    screen.print(Text.assemble((variant["name"], "bold"), rest), soft_wrap=True)
+    for line in [*data["answer"]["lines"], *(data["answer"]["details"] if details else [])]:
         screen.print(f"  {line}", soft_wrap=True)
-    if "mechanics" in data:
-        if data["mechanics"]["levels"]:
-            screen.print(_mechanics(data["mechanics"]))
-        for line in _mechanics_lines(data["mechanics"]):
+    if "fem" in data:
+        if data["fem"]["levels"]:
+            screen.print(_fem(data["fem"]))
+        for line in _fem_lines(data["fem"]):
             screen.print(f"  {line}", soft_wrap=True)
     if details:
         _print_details(screen, data)
@@ -43,18 +44,18 @@ def _print_details(screen: Console, data: dict[str, Any]) -> None:
     inputs = _inputs(data)
     if inputs:
         screen.print(inputs[0])
+        screen.print(f"  {_SLOPES}", soft_wrap=True)
         if inputs[1]:
             screen.print(f"  {inputs[1]}", soft_wrap=True)
-    paper = data["models"].get("paper", {})
-    if paper.get("constraints"):
-        screen.print(_constraints(paper["constraints"]))
-    if paper.get("readings") and paper["readings"][0]["hierarchical_over_control"]:
-        screen.print(_readings(paper["readings"]))
+    published = data["models"].get("published", {})
+    if published.get("constraints"):
+        screen.print(_coefficients(published["interfaces"], published["coefficients"]))
+        screen.print(_constraints(published["constraints"]))
+    if published.get("readings") and published["readings"][0]["hierarchical_over_control"]:
+        screen.print(_readings(published["readings"]))
     no_ratio = data["layered"]["hierarchical_over_control_reason"]
-    besides = _besides(data)
     for line in [f"no hierarchical / control from the layers: {no_ratio}", *data["assumptions"]]:
-        if line not in besides:
-            screen.print(f"  {line}", soft_wrap=True)
+        screen.print(f"  {line}", soft_wrap=True)
 
 
 def print_errors(errors: dict[str, Any], models: dict[str, Any]) -> None:
@@ -64,6 +65,7 @@ def print_errors(errors: dict[str, Any], models: dict[str, Any]) -> None:
     if fitted := {name: block["fit_error"] for name, block in models.items() if "fit_error" in block}:
         screen.print(_fit_errors(fitted))
     screen.print(_choice(errors["chosen_without"]), soft_wrap=True)
+    screen.print(_classes(errors["classes_out"]["by_class"], errors["order"]))
 
 
 def print_frequencies(data: dict[str, Any]) -> None:
@@ -90,15 +92,13 @@ def print_frequencies(data: dict[str, Any]) -> None:
         fit = data["fit"]
         screen.print(f"  fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]})", soft_wrap=True)
     screen.print(decay)
-    if data["assumptions"][0].startswith("bush"):
-        screen.print(f"  {data['assumptions'][0]}", soft_wrap=True)
 
 
-def _mechanics(block: dict[str, Any]) -> Table:
+def _fem(block: dict[str, Any]) -> Table:
     """Tabulate each drive and reading over what is not known: all draws, then bonded and resting skin apart."""
     low, _, high = block["percent"]
     heads = ("drive", "read on", "skin", f"{low} %", "median", f"{high} %", "as drawn")
-    table = Table(*heads, title="mechanics: edge level, %, over the draws")
+    table = Table(*heads, title="fem: edge level, %, over the draws")
     for one in block["levels"]:
         place = "skin, r = D/2" if one["reading"] == "skin" else "own edge"
         for name, group in {"both": one, **one["by_contact"]}.items():
@@ -110,8 +110,8 @@ def _mechanics(block: dict[str, Any]) -> Table:
     return table
 
 
-def _mechanics_lines(block: dict[str, Any]) -> list[str]:
-    """Say how to read the table of `mechanics`, or why it is empty."""
+def _fem_lines(block: dict[str, Any]) -> list[str]:
+    """Say how to read the table of `fem`, or why it is empty."""
     if "reason" in block:
         return [block["reason"]]
     return [
@@ -119,6 +119,9 @@ def _mechanics_lines(block: dict[str, Any]) -> list[str]:
         "x/: standard error of the median, a factor: times or divided by.",
         "as drawn: the unit of the spec, bonded, nominal values.",
         f"Not known, and drawn: {block['not_known']}.",
+        "The level on the skin over that of the unit's own edge, as drawn: "
+        + listed(f"{number(100 * ratio, 2)} % ({drive})" for drive, ratio in block["skin_over_edge"].items())
+        + ". The paper does not state which of the two it measured.",
     ]
 
 
@@ -169,12 +172,6 @@ def _models(data: dict[str, Any]) -> Table:
     return table
 
 
-def _besides(data: dict[str, Any]) -> list[str]:
-    """Say what belongs to the levels: models of another drive, and why one gives no number."""
-    drives = [block["not_of_this_drive"] for block in data["models"].values() if "not_of_this_drive" in block]
-    return [*drives, *(reason for reason in _reasons(data) if data["answer"]["model"])]
-
-
 def _errors(errors: dict[str, Any]) -> Table:
     """Tabulate each model's error against the measured values, the best one with a unit left out first."""
     best = errors["order"][0]
@@ -195,7 +192,7 @@ def _errors(errors: dict[str, Any]) -> Table:
 
 
 def _fit_errors(fitted: dict[str, Any]) -> Table:
-    """Tabulate each model's error by the lab's fit, the best one first, and the null's."""
+    """Tabulate each model's error by the lab's fit, the best one first, and the baseline's."""
     names = ("model", "unit left out", "own units", "own, stored constants", "in 80 %")
     table = Table(*names, title="error by the lab's fit; the table above is by the stored constants")
     for name, error in sorted(fitted.items(), key=lambda pair: pair[1]["left_out"]["geometric_mean"]):
@@ -203,7 +200,7 @@ def _fit_errors(fitted: dict[str, Any]) -> Table:
         middle = f"x {one['geometric_mean']:.2f} ({one['low']:.2f} to {one['high']:.2f})"
         own = ["-" if error[key] is None else f"x {error[key]:.2f}" for key in ("own_left_out", "own_by_stored")]
         table.add_row(name, middle, *own, error["held_80"] or "-")
-    table.add_row("null", f"x {next(iter(fitted.values()))['null']:.2f}", "-", "-", "-")
+    table.add_row("baseline", f"x {next(iter(fitted.values()))['baseline']:.2f}", "-", "-", "-")
     return table
 
 
@@ -216,35 +213,48 @@ def _fit_line(fit: dict[str, Any]) -> str:
     scores = ", ".join(f"{name} x {one['geometric_mean']:.2f}" for name, one in fit["left_out"].items())
     beside = " beside the paper's nine" if fit["with_paper"] else ""
     units = f"{fit['own_units']} units of the lab's own{beside}"
-    return f"  fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]}): {units}; unit left out: {scores}"
+    head = f"  fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]}), {fit['leads']} leads"
+    return f"{head}: {units}; unit left out: {scores}"
 
 
 _ERRORS = "error against the table"
+_SLOPES = (
+    "In brackets: measured pairs of units whose slope has the same sign, and the range with them. ?: no pair was "
+    "measured, so that 0 is in the range."
+)
 
 
 def _choice(chosen: dict[str, Any]) -> str:
-    """Say what the score is when the form is chosen without the unit too."""
+    """Say the rule's score when its form is chosen without the unit too."""
     low, high = chosen["range"]["low"], chosen["range"]["high"]
     return (
-        f"  chosen among {len(chosen['forms'])} forms without the unit too: x {chosen['geometric_mean']:.2f} "
+        f"  rule, its form chosen among {len(chosen['forms'])} without the unit too: x {chosen['geometric_mean']:.2f} "
         f"({low:.2f} to {high:.2f}); p above 0.05: not told apart by nine units"
     )
+
+
+def _classes(by_class: dict[str, dict[str, float]], order: list[str]) -> Table:
+    """Tabulate what leaving out a whole class costs."""
+    table = Table("model", *by_class, title="error on a class that the fit did not have")
+    for model in order:
+        table.add_row(model, *[f"x {errors[model]:.2f}" for errors in by_class.values()])
+    return table
 
 
 def _inputs(data: dict[str, Any]) -> tuple[Table, str] | None:
     """Tabulate the percent by which a level grows with 1 % more of an input, and name inputs that no model reads."""
     found = {name: block["inputs_seen"] for name, block in data["models"].items()}
-    for one in data.get("mechanics", {}).get("inputs_seen", ()):
-        found[f"mechanics, {one['reading']}"] = one
+    for one in data.get("fem", {}).get("inputs_seen", ()):
+        found[f"fem, {one['reading']}"] = one
     seen = {name: one["by"] for name, one in found.items() if one["by"] is not None}
     if not seen:
         return None
-    table = Table("1 % more of", *seen, title="changes the edge level by, %")
+    table = Table(Column("1 % more of", no_wrap=True), *seen, title="changes the edge level by, %")
     some = found[next(iter(seen))]
     names = [*some["by"], *some["not_seen"]]
     for name in sorted(names, key=lambda name: -max(abs(by.get(name, 0.0)) for by in seen.values())):
         if any(name in by for by in seen.values()):
-            table.add_row(name, *[f"{by[name]:+.2f}" if name in by else "not seen" for by in seen.values()])
+            table.add_row(name, *[_slope(found[model], name) for model in seen])
     unread = [name for name in names if not any(name in by for by in seen.values())]
     if not unread:
         return table, ""
@@ -253,19 +263,38 @@ def _inputs(data: dict[str, Any]) -> tuple[Table, str] | None:
     return table, f"read by no model of the level: {', '.join(unread)}{curve}"
 
 
-def _reasons(data: dict[str, Any]) -> list[str]:
-    reasons = [block["edge_level"].get("reason") for block in data["models"].values()]
-    return [reason for reason in dict.fromkeys(reasons) if reason]
+def _slope(seen: dict[str, Any], name: str) -> str:
+    """Format a slope, how many measured pairs agree, and its range; "?" if there is no pair."""
+    if name not in seen["by"]:
+        return "not seen"
+    slope, one = f"{seen['by'][name]:+.2f}", seen.get("tested", {}).get(name)
+    if one is None:
+        return slope
+    return (
+        f"{slope} ({one['agree']} of {one['of']}: {one['low']:+.2f} to {one['high']:+.2f})"
+        if one["of"]
+        else f"{slope} ?"
+    )
+
+
+def _coefficients(interfaces: list[str], found: dict[str, dict[str, Any]]) -> Table:
+    """Tabulate equation 4's coefficients of both waves."""
+    heads = [f"{key}, {wave.upper()}" for wave in found for key in ("k_t", "k_r")]
+    table = Table("from a layer to the next", *heads, title="transmission and reflection, equation 4")
+    for i, name in enumerate(interfaces):
+        ends = [{end: values[i] for end, values in block.items()} for block in found.values()]
+        table.add_row(name, *(_ranged(one, key) for one in ends for key in ("k_t", "k_r")))
+    return table
 
 
 def _constraints(rows: list[dict[str, Any]]) -> Table:
-    table = Table("6", "what", "left", "", "right", "margin", "unit", title="the paper's constraints, equation 6")
+    table = Table("", "says", "left", "", "right", "margin", "unit", title="the paper's inequalities 5 and 6")
     table.add_column("holds")
     for row in rows:
         numbers = [_ranged(row, key) for key in ("left", "right", "margin")]
         holds = {True: "yes", False: "no", None: row.get("reason", "not known")}[row["holds"]]
         what = row["text"].replace("control", row["control"] or "")
-        table.add_row(row["equation"][-1], what, numbers[0], row["relation"], *numbers[1:], row["unit"], holds)
+        table.add_row(row["equation"], what, numbers[0], row["relation"], *numbers[1:], row["unit"], holds)
     return table
 
 

@@ -11,7 +11,7 @@ import typer
 
 from unitcad.errors import unknown_name
 from unitcad.spec import custom_code
-from unitcad.spec.asked import FORMATS, OUTPUTS
+from unitcad.spec.raw import FORMATS, OUTPUTS
 
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
 Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]

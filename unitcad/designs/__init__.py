@@ -18,8 +18,8 @@ from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.shape import cylinder
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import is_custom
+from unitcad.spec.raw import RawSpec
 
 __all__ = [
     "CIRCUIT_COLOUR",
@@ -58,7 +58,7 @@ def shipped() -> dict[str, Design]:
     return {module.DESIGN.name: module.DESIGN for module in modules if hasattr(module, "DESIGN")}
 
 
-def design_of(spec: Spec | AskedSpec) -> Design:
+def design_of(spec: Spec | RawSpec) -> Design:
     """Return the design of a spec. Raises Refusal for an unknown one, UnitcadError for a custom one that fails."""
     if is_custom(spec.design):
         return custom(spec.design, spec.design_source or "")
@@ -81,7 +81,7 @@ def no_estimate() -> str:
 
 
 def default_design() -> Design:
-    """Return the design to start from where none is named."""
+    """Return the default design."""
     return next(design for design in shipped().values() if design.default)
 
 
@@ -94,7 +94,7 @@ def unit_bodies(spec: Spec) -> tuple[Body, ...]:
     """Return the bodies of the unit as assembled on the skin z = 0: layers inside out, motor, circuit or wires.
 
     "layer1" ... and "skin" are cast. Motor ("motor"), circuit ("fpcb") and wires ("wire1" ...) are bought, and added
-    if the design draws none. Whatever else it names is printed.
+    if the design draws none. Bodies of other names are printed.
 
     Raises Refusal for a layer, circuit or wire that the spec lacks.
     """
@@ -137,9 +137,9 @@ def widths(spec: Spec, boxes: Sequence[Sequence[float]]) -> tuple[float, ...]:
 
 
 def inserts(spec: Spec) -> tuple[Body, ...]:
-    """Return the bodies that are laid into the mould before the pour `Design.laid_in`, to stay; () where it is 0.
+    """Return the bodies that are laid into the mould before the pour `Design.laid_in`, to stay; () if it is 0.
 
-    Raises UnitcadError where the spec has fewer pours.
+    Raises UnitcadError if the spec has fewer pours.
     """
     laid_in, pours = design_of(spec).laid_in, len(spec.layers)
     if laid_in > pours:
@@ -148,7 +148,7 @@ def inserts(spec: Spec) -> tuple[Body, ...]:
 
 
 def _inside(spec: Spec, dims: Dimensions) -> tuple[Body, ...]:
-    """Return what is bought and goes into the silicone."""
+    """Return the bought bodies that go into the silicone."""
     bodies = [Body("motor", "unit", "motor", parts.motor(dims), _MOTOR_COLOUR, made="bought")]
     if spec.fpcb and dims.pad:
         drawn = parts.circuit(spec.fpcb, dims.pad, dims)

@@ -42,7 +42,7 @@ def custom(name: str, source: str) -> Design:
 
 @lru_cache(maxsize=16)
 def _design(name: str, source: str) -> Design:
-    """Return what the text holds under the name, each of its functions with errors that name the line."""
+    """Return the text's value of this name, each of its functions with errors that name the line."""
     held = _held(name, source)
     if isinstance(held, Design):
         design = replace(held, name=name)
@@ -61,7 +61,7 @@ def _design(name: str, source: str) -> Design:
 
 
 def _held(name: str, source: str) -> Any:
-    """Run the text and return what it has under the name."""
+    """Run the text and return its value of this name."""
     module = types.ModuleType("unitcad_custom_design")
     try:
         exec(compile(source, name.rpartition(":")[0], "exec"), module.__dict__)
@@ -77,7 +77,7 @@ def _held(name: str, source: str) -> Any:
 
 @lru_cache(maxsize=16)
 def _of_file(name: str, source: str) -> Mapping[str, Shape]:
-    """Return the bodies of a file; where layers share space, the earlier one has it."""
+    """Return the bodies of a file; space that layers share belongs to the earlier one."""
 
     held = bodies_in(name, source)
     cast = [key for key in (f"layer{i + 1}" for i in range(len(held))) if key in held]
@@ -90,7 +90,7 @@ def _dimensions(spec: Spec) -> Dimensions:
 
 
 def _check_values(design: Design) -> None:
-    """Raise UnitcadError for a field of a Design that holds what it can't."""
+    """Raise UnitcadError for a field of a Design with a wrong value."""
     ways = ("concentric", "complement")
     if not callable(design.tooling) and design.tooling not in ways:
         raise UnitcadError(f"design {design.name}: tooling is {design.tooling!r}, not a function or one of {ways}")
@@ -148,7 +148,7 @@ def _texts(made: Any) -> Any:
 
 
 def _wrong_texts(field: str, many: int = 0) -> Callable[[Any], str]:
-    """Return what finds fault with a list of sentences, or of `many` texts together."""
+    """Return a check of a list of sentences, or of tuples of `many` texts."""
 
     def fault(made: Any) -> str:
         items = made if isinstance(made, list | tuple) else [None]
@@ -185,7 +185,7 @@ def _failed(design: str, error: BaseException) -> UnitcadError:
         trace = trace.tb_next
     where = f" (line {line})" if line else ""
     if isinstance(error, SystemExit):
-        text = "ends the program (SystemExit); it must return a shape tree, or raise an error that says what is wrong"
+        text = "ends the program (SystemExit); it must return a shape tree, or raise an error that names the problem"
     elif isinstance(error, ProfileError):
         text = str(error)
     else:

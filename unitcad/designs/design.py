@@ -1,4 +1,4 @@
-"""What a design is: the one protocol that the shipped designs and a custom design's file implement alike."""
+"""The protocol of a design, for the shipped designs and for a custom design's file."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from unitcad.designs.dimensions import Dimensions
 from unitcad.designs.tooling import Tooling
 from unitcad.shape import Shape
 from unitcad.spec import Spec
-from unitcad.spec.asked import AskedSpec
+from unitcad.spec.raw import RawSpec
 
 Reason = tuple[str, str]
-"""Something that is left out, and why."""
+"""A skipped output and the reason."""
 
 
 def _no_limits(spec: Spec, dims: Dimensions) -> None:
@@ -28,17 +28,17 @@ def _nothing_left_out(spec: Spec) -> list[Reason]:
     return []
 
 
-def _inside_cavity(asked: AskedSpec, inner_radius: float) -> float:
+def _inside_cavity(asked: RawSpec, inner_radius: float) -> float:
     return inner_radius - 0.3
 
 
 @dataclass(frozen=True)
 class Fitting:
-    """A sentence of the assembly, and what its step takes.
+    """A sentence of the assembly, and the needs of its step.
 
     needs       tools and consumables, as casting.steps.NEEDS names them
-    silicone    the layer whose silicone it asks for: from 1, -1 the last; 0 for none
-    mixed       its use, if it is mixed after the pours
+    silicone    the layer whose silicone it uses: from 1, -1 the last; 0 for none
+    mixed       the product of that silicone, if it is mixed after the pours
     volume_mm3  the volume of it in one unit
     mix         whether it uses the mix of the pour that it is laid into
     """
@@ -55,24 +55,24 @@ class Fitting:
 class Design:
     """A kind of unit, all of it in one file.
 
-    name         what `design` in a spec says; a custom design is named by its file
+    name         value of `design` in a spec; a custom design is named by its file
     about        one line for `unitcad list designs`
     layers       the cast layers from the inside out, by name ("layer1" ...); other names are printed bodies
     dimensions   radii, heights, pad and exit that follow from a spec
     limits       raises Refusal for a spec that this design can't be made of
-    advice       what is unwise and not refused, a sentence each
-    pad_radius   default radius of the circuit's pad (mm), from the asked spec and the radius inside the walls
+    advice       warnings about unwise values, a sentence each
+    pad_radius   default radius of the circuit's pad (mm), from the raw spec and the radius inside the walls
     wire_sides   sides of a wire that need clearance in its exit: 2 in a slot, 1 in a notch
-    tooling      "concentric": base, cups, tongues and blade drawn from the dimensions; "complement": what is left round
+    tooling      "concentric": base, cups, tongues and blade drawn from the dimensions; "complement": the space round
                  the cast layers; or a function from a spec and the cast layers' shapes to a Tooling
-    suction      whether a unit closed at the top holds to its core, so that a filament must let air in
-    opens        where motor and circuit go in: "above" or "below" (the skin)
-    laid_in      the pour (from 1) before which all that is not cast is laid in, to stay; 0: it goes in after casting
+    suction      whether a unit closed at the top sticks to its core by suction, so that a filament must let air in
+    opens        side on which motor and circuit go in: "above" or "below" (the skin)
+    laid_in      the pour (from 1) before which motor, circuit and printed parts are laid in, to stay; 0: after casting
     caps         whether a layer has a cap over the one inside it, or is an open ring
     passes       how often the wave from motor to skin passes the border between the layers; None: no estimate
     assembly     how motor and circuit go into the body, or into the mould, a sentence each; [] for a default
-    left_out     pieces that this variant does without, and why
-    default      whether to start from it where none is named; one design's is True
+    left_out     skipped pieces of this variant, and why
+    default      whether it is the design of new specs; True for one design
     """
 
     name: str
@@ -81,7 +81,7 @@ class Design:
     dimensions: Callable[[Spec], Dimensions]
     limits: Callable[[Spec, Dimensions], None] = _no_limits
     advice: Callable[[Spec, Dimensions], list[str]] = _nothing
-    pad_radius: Callable[[AskedSpec, float], float] = _inside_cavity
+    pad_radius: Callable[[RawSpec, float], float] = _inside_cavity
     wire_sides: int = 1
     tooling: Literal["concentric", "complement"] | Callable[[Spec, Sequence[Shape]], Tooling] = "complement"
     suction: bool = False

@@ -1,4 +1,4 @@
-"""The lengths that follow from an effective spec (mm): one place for designs, moulds and drawings to read them from."""
+"""The lengths that follow from a resolved spec (mm): one place for designs, moulds and drawings to read them from."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from unitcad.spec import Spec
 MOTOR_CLEARANCE = 0.1
 """Least ring of air between the motor and Layer 1, mm, unless `motor.fill` closes it."""
 WIRE_GAP = 0.1
-"""Between wires side by side, and between them and what is next to them, mm."""
+"""Between wires side by side, and between them and their neighbours, mm."""
 LIP_EDGE, LIP_LEAN_DEG = 0.4, 40.0
 """Least height of a lip's upright edge, mm, and the lean of the cone over it: the core prints without support."""
 Outline = tuple[tuple[float, float], ...]
@@ -24,8 +24,7 @@ EPS = 1e-9
 class Exit:
     """The passage of tails or wires through the silicone, from `low` to `high` (z, mm) and `width` wide.
 
-    A slot has silicone over it; a notch ends at the layers' top and is open there. `wires_y` is where the wires' axes
-    lie across it.
+    A slot has silicone over it; a notch ends at the layers' top and is open there. `wires_y`: y of the wires' axes.
     """
 
     low: float
@@ -53,7 +52,7 @@ class Dimensions:
     """A unit's radii and heights; z = 0 is the skin.
 
     cavity_radius   r of the cavity and so of the core at the skin, without a lip; Layer 1 begins there
-    radii[i]        outer radius of layer i at the skin, in the section at y = 0 where it is not round
+    radii[i]        outer radius of layer i at the skin, in the section at y = 0 if it is not round
     core_height     top of the core
     heights[i]      top of layer i
     pad             the circuit's pad; None without a circuit
@@ -64,7 +63,7 @@ class Dimensions:
     mouth_radius    radius of the lip's mouth; 0 without a lip
     lip_edge        height of the lip's upright edge
     skin            thickness of the film over the skin side, from z = -skin to 0
-    tapers          by how much core, and outsides of layers, get narrower for each mm upwards
+    tapers          narrowing of core, and of the layers' outsides, for each mm upwards
     """
 
     cavity_radius: float
@@ -176,8 +175,8 @@ def whole_layers(spec: Spec, z: float) -> float:
 def slot_exit(spec: Spec, low: float, inside: tuple[float, float], width: float) -> Exit:
     """Return a slot with silicone over it, its floor moved from z = `low` to a whole layer of the base.
 
-    It stays where it is where `inside` (what it takes, from z to z, mm) would no longer fit, or the cups' wall under
-    the window would get thinner than the least wall.
+    It is not moved if `inside` (its content, from z to z, mm) would no longer fit, or the cups' wall under the window
+    would get thinner than the least wall.
     """
     snapped, height = whole_layers(spec, low), spec.moulds.slot_height_mm
     if snapped <= inside[0] + EPS and snapped + height >= inside[1] - EPS and snapped >= _least_floor(spec):
@@ -194,7 +193,7 @@ def wire_exit(spec: Spec, top: float, core: float | None = None) -> Exit | None:
     """Return the exit of a spec's wires, side by side, whose passage ends at z = `top`; None without wires.
 
     Under a cap, `core` is the core's top (mm), and all of the slot moves to a whole layer. A notch keeps its open top:
-    its floor moves down to one, where the wall under it stays.
+    its floor moves down to one, if the wall under it remains.
     """
     wires = spec.wires
     if not wires:

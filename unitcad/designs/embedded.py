@@ -1,4 +1,4 @@
-"""The embedded design: concentric open rings round the motor; the circuit's pad lies on top and touches every layer.
+"""The embedded design: concentric open rings round the motor; the circuit's pad is on top and touches every layer.
 
 ------------------- FPCB pad over all layers
 | L2 | L1 |  motor  | L1 | L2 |
@@ -17,7 +17,7 @@ from unitcad.designs.parts import ADHESIVE, bond, motor_hold, slots
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec
-from unitcad.spec.asked import AskedSpec
+from unitcad.spec.raw import RawSpec
 from unitcad.text import number
 
 
@@ -71,13 +71,13 @@ def _check_circuit(spec: Spec, dims: Dimensions) -> None:
     limits.at_most("fpcb.pad_diameter_mm", pad, spec.diameter_mm, "the pad stays on the body, whose diameter is")
     outermost = 2 * (dims.radii[-2] if len(dims.radii) > 1 else dims.cavity_radius)
     limits.at_least(
-        "fpcb.pad_diameter_mm", pad, outermost + 0.2, "the embedded pad lies on every layer, so it reaches at least"
+        "fpcb.pad_diameter_mm", pad, outermost + 0.2, "the embedded pad covers every layer, so it reaches at least"
     )
     limits.at_most("fpcb.tail_width_mm", fpcb.tail_width_mm, pad, "the tail is no wider than the pad, which has")
 
 
 def advice(spec: Spec, dims: Dimensions) -> list[str]:
-    """Say where nothing holds the motor."""
+    """Warn if nothing holds the motor."""
     if spec.fpcb or spec.motor.fill:
         return []
     return [
@@ -86,7 +86,7 @@ def advice(spec: Spec, dims: Dimensions) -> list[str]:
     ]
 
 
-def pad_radius(asked: AskedSpec, cavity_radius: float) -> float:
+def pad_radius(asked: RawSpec, cavity_radius: float) -> float:
     """Return the default radius of the pad: over every layer, half a millimetre or half a wall short of the edge."""
     return asked.diameter_mm / 2 - min(0.5, asked.layers[-1].wall_mm / 2)
 
@@ -117,9 +117,9 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
 
 def left_out(spec: Spec) -> list[Reason]:
     """Name the tooling that an open ring does without."""
-    reasons = [("filament stub and hole", "embedded: open rings hold no suction")]
+    reasons = [("filament stub and hole", "embedded: open rings have no suction")]
     if spec.fpcb:
-        reasons.insert(0, ("tongue and slot", "embedded: the circuit lies on the rings"))
+        reasons.insert(0, ("tongue and slot", "embedded: the circuit is on the rings"))
     return reasons
 
 

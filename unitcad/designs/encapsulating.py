@@ -3,7 +3,7 @@
 .-----------------.  heights[1]
 | .-------------. |  heights[0]
 | |  FPCB pad   | |  core_height
-|L|L|  motor  |L|L=  the slot, where a tail leaves
+|L|L|  motor  |L|L=  the slot of a tail
 |2|1|         |1|2|
 ======= skin ======
 """
@@ -28,11 +28,11 @@ from unitcad.designs.stretch import allowed_strain, pad_strain, tail_strain, wid
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec
-from unitcad.spec.asked import LEAST_TAIL
-from unitcad.spec.effective import Circuit
+from unitcad.spec.raw import LEAST_TAIL
+from unitcad.spec.resolved import Circuit
 
 TIP_PROUD = 0.2
-"""How far a tongue for wires stands proud of the core, mm, so that Layer 1 clears them, before it moves to a layer."""
+"""Height of a tongue for wires above the core, mm, so that Layer 1 clears them, before it moves to a layer."""
 
 
 def layers(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
@@ -88,12 +88,12 @@ def _check_circuit(spec: Spec, dims: Dimensions, fpcb: Circuit, exit: Exit) -> N
     widest = limits.widest_exit(spec, dims)
     clearance = spec.moulds.window_clearance_mm
     if widest < LEAST_TAIL:
-        # No tail fits: the refusal names the clearance where that is the cause, else the core, not the tail.
+        # No tail fits: the refusal names the clearance if that is the cause, otherwise the core, not the tail.
         most = limits.down(clearance - (tail - widest) / 2)
         if clearance > LEAST_TAIL and most > 0:
             limit = f"the ledge leaves room for a tail of {tail:g} mm up to a clearance of {most:g} mm"
             raise Refusal("moulds.window_clearance_mm", clearance, limit, most)
-        limit = f"the core must hold the ledge beside a tail, whose least width is {LEAST_TAIL:g} mm"
+        limit = f"the core must have room for the ledge next to a tail, whose least width is {LEAST_TAIL:g} mm"
         raise limits.wider_core(spec, limits.core_for(spec, LEAST_TAIL) - dims.cavity_radius, limit)
     limits.at_most(
         "fpcb.tail_width_mm",
@@ -122,7 +122,7 @@ def _check_circuit(spec: Spec, dims: Dimensions, fpcb: Circuit, exit: Exit) -> N
 
 
 def advice(spec: Spec, dims: Dimensions) -> list[str]:
-    """Say where the pad has no clearance in the cavity."""
+    """Warn if the pad has no clearance in the cavity."""
     if not dims.pad or dims.pad.radius <= dims.cavity_radius - MOTOR_CLEARANCE + limits.EPS:
         return []
     return [

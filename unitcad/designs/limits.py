@@ -13,8 +13,8 @@ from unitcad.designs.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, Ex
 from unitcad.designs.rib_leaves import farthest_push, leaf_mm, least_skirt
 from unitcad.errors import Refusal
 from unitcad.spec import Spec, printer_of
-from unitcad.spec.asked import LEAST_LEDGE, FpcbTable, WiresTable
-from unitcad.spec.effective import Circuit
+from unitcad.spec.raw import LEAST_LEDGE, FpcbTable, WiresTable
+from unitcad.spec.resolved import Circuit
 
 TAIL_SHARE = 0.7
 """Half the tail's width over the core's radius, at most: beyond it the ledge has no shoulders."""
@@ -28,8 +28,7 @@ EPS = 1e-9
 
 
 def check_motor(spec: Spec, dims: Dimensions) -> None:
-    """Raise Refusal where motor, clearance and walls do not fit the diameter, and for lips and skins that can't be "
-    "cast."""
+    """Raise Refusal if motor, clearance and walls do not fit, and for a lip or a skin that can't be cast."""
     clearance = 0.0 if spec.motor.fill else MOTOR_CLEARANCE + dims.tapers[0] * dims.motor_height
     walls = sum(layer.wall_mm for layer in spec.layers)
     at_least(
@@ -61,7 +60,7 @@ def widest_exit(spec: Spec, dims: Dimensions) -> float:
 
 
 def core_for(spec: Spec, width: float) -> float:
-    """Return the least radius of a core whose ledge keeps its shoulders beside a tail of this width, mm."""
+    """Return the least radius of a core whose ledge has shoulders on both sides of a tail of this width, mm."""
     return max(width / (2 * TAIL_SHARE), (width + _beside(spec)) / (2 * LEDGE_SHARE) + spec.moulds.ledge_mm)
 
 
@@ -71,7 +70,7 @@ def _beside(spec: Spec) -> float:
 
 
 def check_wires(spec: Spec, dims: Dimensions) -> None:
-    """Raise Refusal for wires beside a circuit, and for a bundle that the motor or the ledge leaves no room for."""
+    """Raise Refusal for wires together with a circuit, and for a bundle too wide for the motor or the ledge."""
     wires = spec.wires
     if not wires:
         return
@@ -90,14 +89,14 @@ def check_wires(spec: Spec, dims: Dimensions) -> None:
 
 
 def least_slot(fpcb: FpcbTable | Circuit | None, wires: WiresTable | None, wire_sides: int) -> float:
-    """Return the least height of the exit, mm; 0 where nothing leaves. `wire_sides`: see `Design`."""
+    """Return the least height of the exit, mm; 0 if nothing leaves. `wire_sides`: see `Design`."""
     if wires:
         return wires.diameter_mm + SLOT_CLEARANCE * wire_sides
     return fpcb.thickness_mm + SLOT_CLEARANCE if fpcb else 0.0
 
 
 def check_slot_height(spec: Spec, wire_sides: int) -> None:
-    """Raise Refusal for a slot too low for what it takes."""
+    """Raise Refusal for a slot too low for its tail or wires."""
     at_least(
         "moulds.slot_height_mm",
         spec.moulds.slot_height_mm,
@@ -107,7 +106,7 @@ def check_slot_height(spec: Spec, wire_sides: int) -> None:
 
 
 def check_under_window(spec: Spec, dims: Dimensions, exit: Exit) -> None:
-    """Raise Refusal where the cup has no wall under the window that its tongue goes through."""
+    """Raise Refusal if the cup has no wall under the window of its tongue."""
     at_least(
         "motor.thickness_mm",
         dims.motor_height,
@@ -117,7 +116,7 @@ def check_under_window(spec: Spec, dims: Dimensions, exit: Exit) -> None:
 
 
 def leaving(spec: Spec) -> str:
-    """Return what leaves the body: "tail" or "wire"."""
+    """Return the part that leaves the body: "tail" or "wire"."""
     return "tail" if spec.fpcb else "wire"
 
 
@@ -136,7 +135,7 @@ def check_printer(spec: Spec) -> None:
 
 
 def check_engraving(spec: Spec, dims: Dimensions) -> None:
-    """Raise Refusal where no floor stays under the lettering on the first cup or on the plate."""
+    """Raise Refusal if the lettering on the first cup or on the plate has no floor under it."""
     floor = float(catalogue.printers(spec.printers)[spec.moulds.printer].least_flat_wall_mm)
     at_most(
         "moulds.engraving_depth_mm",
@@ -157,7 +156,7 @@ def check_seat(spec: Spec) -> None:
 
 
 def check_ribs(spec: Spec) -> None:
-    """Raise Refusal for ribs that would hold the cup off its seat, and for leaves under them too short to bend."""
+    """Raise Refusal for ribs that would lift the cup off its seat, and for leaves under them too short to bend."""
     moulds, printer = spec.moulds, printer_of(spec)
     line, leaf = float(printer.least_feature_mm), leaf_mm(printer)
     at_most(
@@ -177,7 +176,7 @@ def check_ribs(spec: Spec) -> None:
 
 
 def check_filament(spec: Spec, dims: Dimensions) -> None:
-    """Raise Refusal where plate and core can't take the filament that lets air under a closed unit."""
+    """Raise Refusal if plate and core have no room for the filament that lets air under a closed unit."""
     moulds = spec.moulds
     hole, wall = moulds.filament_hole_mm, moulds.least_wall_mm
     at_least("moulds.filament_hole_mm", hole, moulds.filament_mm, "the hole takes the filament of")
@@ -185,11 +184,11 @@ def check_filament(spec: Spec, dims: Dimensions) -> None:
         "moulds.plate_mm",
         moulds.plate_mm,
         filament_groove(spec) + wall,
-        "the plate holds the filament's groove and a wall over it, so at least",
+        "the plate contains the filament's groove and a wall over it, so at least",
     )
     inside = dims.ledge_radius if dims.sides else dims.cavity_radius
     if inside < hole / 2 + wall - EPS:
-        limit = "the core must hold the filament's hole with a wall round it, and the ledge"
+        limit = "the core must have room for the filament's hole with a wall round it, and the ledge"
         ledge = down(dims.cavity_radius - hole / 2 - wall)
         if dims.sides and ledge >= LEAST_LEDGE:
             limit += f"; moulds.ledge_mm = {ledge:g} would do too"
@@ -210,12 +209,12 @@ def filament_groove(spec: Spec) -> float:
 
 
 def at_least(field: str, value: float, limit: float, why: str) -> None:
-    """Raise Refusal where `value` is below `limit`."""
+    """Raise Refusal if `value` is below `limit`."""
     _bound(field, value, limit, why, value < limit - EPS, up)
 
 
 def at_most(field: str, value: float, limit: float, why: str) -> None:
-    """Raise Refusal where `value` is above `limit`."""
+    """Raise Refusal if `value` is above `limit`."""
     _bound(field, value, limit, why, value > limit + EPS, down)
 
 

@@ -1,4 +1,4 @@
-"""What designs share: motor, circuit or wires, and the slot that lets the tail out.
+"""Parts that designs share: motor, circuit or wires, and the slot that lets the tail out.
 
 z
 |   .--------- pad, radius pad.radius ---------.========== tail ===  pad.low to pad.high
@@ -11,11 +11,11 @@ from __future__ import annotations
 from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Outline, Pad
 from unitcad.shape import Revolve, Shape, box, cut, cylinder, moved, polygon, turned, union
 from unitcad.spec import Spec
-from unitcad.spec.effective import Circuit, Wires
+from unitcad.spec.resolved import Circuit, Wires
 from unitcad.text import number
 
 BEYOND = 1.0
-"""How far a cutting tool reaches past what it cuts, mm: never in one plane with it."""
+"""How far a cutting tool reaches past the part that it cuts, mm: never in one plane with it."""
 
 
 def motor(dims: Dimensions) -> Shape:
@@ -35,15 +35,15 @@ ADHESIVE = "silicone adhesive"
 
 
 def motor_hold(spec: Spec, dims: Dimensions) -> str:
-    """Write what is round the motor once it is in."""
+    """Describe the surroundings of the motor once it is in."""
     lip = " The lip keeps it in." if dims.mouth_radius else ""
     if spec.motor.fill:
-        return f"Layer 1 holds the motor all round.{lip}"
+        return f"Layer 1 encloses the motor.{lip}"
     return f"A ring of air of {number(dims.air_ring, 3)} mm stays round the motor (motor.fill = true closes it).{lip}"
 
 
 def bond(what: str, where: str) -> str:
-    """Write what fixes the motor: the same words in every design."""
+    """Write how the motor is fixed: the same words in every design."""
     return (
         f"Coat {what} thinly with {ADHESIVE} where it touches {where}: cast silicone bonds poorly to metal and "
         "polyimide."
@@ -60,7 +60,7 @@ def circuit(fpcb: Circuit, pad: Pad, dims: Dimensions) -> Shape:
 def wires(drawn: Wires, across: tuple[float, ...], dims: Dimensions) -> list[Shape]:
     """Draw the wires, from just off the motor's side out along +x, side by side, a gap below the core's top.
 
-    `across` is where their axes lie along y, mm.
+    `across`: y of their axes, mm.
     """
     radius = drawn.diameter_mm / 2
     lying = turned(cylinder(radius, dims.motor_radius + WIRE_GAP, dims.outer_radius + drawn.length_mm), "y", 1)

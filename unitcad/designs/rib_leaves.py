@@ -1,8 +1,8 @@
 """The leaves that carry the ribs of a cup printed in resin: how long they must be to bend and not to break.
 
-A rib of resin would chip where one of filament is crushed. So each stands on a leaf of the skirt, cut free on three
-sides, which gives way: a cantilever of thickness t, pushed aside by d at the arm a below its root. The strain at the
-root is 1.5 t d / a^2, the most in it, if nothing but the leaf bends. No leaf has been printed yet.
+Crushing would chip a rib of resin. So each is on a leaf of the skirt, cut free on three sides, which gives way: a
+cantilever of thickness t, pushed aside by d at the arm a below its root. The strain at the root is 1.5 t d / a^2, the
+most in it, if nothing but the leaf bends. No leaf has been printed yet.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import math
 from unitcad.catalogue import Printer
 
 MOST_STRAIN = 0.012
-"""At a leaf's root, at most (assumed: about half of what strength over modulus gives for standard resins)."""
+"""Largest strain at a leaf's root (assumed: about half of strength over modulus of standard resins)."""
 LEAF_WIDTH = 2.5
 CREST = 0.8
-"""From the skirt's lower end up to where a rib on a leaf begins to reach into the plinth, mm."""
+"""Distance from the skirt's lower end up to the contact of a rib on a leaf with the plinth, mm."""
 
 
 def leaf_mm(printer: Printer) -> float:
@@ -29,7 +29,7 @@ def leaf_strain(thickness: float, pushed: float, arm: float) -> float:
 
 
 def farthest_push(interference: float, play: float, clearance: float) -> float:
-    """Return how far a rib is pushed back where the gap is printed narrower by the printer's play, mm."""
+    """Return how far a rib is pushed back if the gap is printed narrower by the printer's play, mm."""
     return interference + min(play, clearance)
 
 

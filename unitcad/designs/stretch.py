@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from unitcad.catalogue import Material
 from unitcad.designs.dimensions import Dimensions, Exit
 from unitcad.spec import Spec
-from unitcad.spec.effective import Circuit
+from unitcad.spec.resolved import Circuit
 
 
 def allowed_strain(spec: Spec, known: Mapping[str, Material]) -> float:
@@ -28,7 +28,7 @@ def tail_strain(fpcb: Circuit, slot: Exit) -> float:
 
 
 def pad_strain(fpcb: Circuit, slot: Exit) -> float:
-    """Return the strain of the slot's edge if the circuit's own pad had to pass: what a chain's next pad would need."""
+    """Return the strain of the slot's edge if the circuit's own pad had to pass, as a chain's next pad would."""
     return max(0.0, 2 * (fpcb.pad_diameter_mm + fpcb.thickness_mm) / _round(slot) - 1)
 
 

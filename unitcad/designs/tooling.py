@@ -1,4 +1,4 @@
-"""What a design's moulds are made of: blank tools and the cells they stand in (mm, as assembled, seat at z = 0)."""
+"""Tooling of a design: blank tools and their cells (mm, as assembled, seat at z = 0)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from unitcad.shape.body import Body
 
 @dataclass(frozen=True)
 class Cell:
-    """One cavity: its centre, the sides (+1, -1 along x) where its tails leave, and its number among several ("")."""
+    """One cavity: its centre, the sides (+1, -1 along x) of its tails, and its number among several ("")."""
 
     x: float
     y: float
@@ -34,16 +34,16 @@ class Layout:
 
 @dataclass(frozen=True)
 class Tooling:
-    """The tools of all pours, without labels, and what keeps silicone in beside them.
+    """The tools of all pours, without labels, and the other seals.
 
     dimensions   the lengths that the tools are drawn to; `heights` are the rims of the pours
     layout       cells and plates; the labels go into the plates' corners
-    tools        in the order in which a person needs them: "base", and "cup1", "cup2" ... with their pour as `step`;
-                 what has no `step` stands in every pour, but for a blade
-    seals        for each pour, what silicone is kept from though no tool fills it
-    channels     for each pour under a lid, the silicone in sprue and vents, as many a cell; () where all pours are open
-    grooves      for each pour, whether its cup has an overflow groove; () where all have one
-    concentric   whether the tools are those of rings: then the dimensions tell every hole and gap in them
+    tools        in the order in which a person needs them: "base", and "cup1", "cup2" ... with their pour as `step`; a
+                 tool without `step`, except a blade, is part of every pour
+    seals        for each pour, space without tool that silicone is kept from
+    channels     for each pour under a lid, the silicone in sprue and vents, as many a cell; () if all pours are open
+    grooves      for each pour, whether its cup has an overflow groove; () if all have one
+    concentric   whether the tools are those of rings: then the dimensions define every hole and gap in them
     """
 
     dimensions: Dimensions

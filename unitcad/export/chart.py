@@ -22,7 +22,7 @@ MOST_POINTS = 2000
 """Points of a series that are drawn: more can't be told apart."""
 _GRID, _DARK, _SHADE = "#e2e2e2", "#444444", "#f3ead8"
 _NIL = 0.005
-"""An axis starts at zero where values lie below it by at most this part of their span, less than a point's size."""
+"""An axis starts at zero if values are below it by at most this part of their span, less than a point's size."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +60,10 @@ def chart(
     shaded_name: str = "",
     x_range: tuple[float, float] | None = None,
 ) -> str:
-    """Return the chart as an SVG document. What an axis can't show is left out.
+    """Return the chart as an SVG document. Points that an axis can't show are skipped.
 
-    `shaded` marks a range of x, which the legend names where `shaded_name` does; `x_range` is what a linear axis of x
-    shows, where the series don't say it.
+    `shaded` marks a range of x, which the legend calls `shaded_name`; `x_range` is the range of a linear axis of x, by
+    default that of the series.
     """
     right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
     kept = [(one, *_kept(one, log_x, log_y)) for one in series]

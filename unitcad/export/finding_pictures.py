@@ -1,6 +1,6 @@
 """Pictures of a check's findings, for `unitcad check --show`.
 
-For each file with findings a folder that holds
+For each file with findings a folder with
 
 - a picture a finding (SVG with two shaded views): the whole part with the place marked, and the place from near;
 - findings.3mf: its meshes, faces that a finding concerns in the colour of the worst severity.
@@ -70,7 +70,7 @@ class Marks:
 
     `faces`: those of the first place, the first and the second one of a pair apart; `others`: those of other places.
     `segments` (n, 2, 3) and `points` (n, 3) are drawn over everything; `boxes`: low and high corner of each place, the
-    first one first; `point` its middle. `at_point`: that point is what must be seen, as opposed to the faces.
+    first one first; `point` its middle. `at_point`: that point, not the faces, must be visible.
     `across`: the unit vector through a thin wall.
     """
 
@@ -111,7 +111,7 @@ def write(folder: Path, report: FileReport) -> FileReport:
 
 
 def folder_name(path: str) -> str:
-    """Return a name for a file's pictures on any system: its path where that is a plain name, else that and a hash."""
+    """Return a name for a file's pictures that every system accepts: its path, with a hash if it is no plain name."""
     shown = os.path.relpath(path) if os.path.isabs(path) else os.path.normpath(path)
     name = re.sub(r"[^A-Za-z0-9._-]+", "_", shown).strip("._-") or "file"
     if name == shown and len(name) <= 80 and not re.match(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\.|$)", name):
@@ -140,7 +140,7 @@ def coloured(report: FileReport) -> bytes:
 
 
 def draw(report: FileReport, finding: Finding, scenes: Sequence[Scene | None]) -> str | None:
-    """Draw a finding as SVG; None where nothing of it can be drawn."""
+    """Draw a finding as SVG; None if nothing of it can be drawn."""
     places = [place for place in finding.locations if place.mesh is not None and scenes[place.mesh]]
     number = places[0].mesh if places else next(i for i, scene in enumerate(scenes) if scene)
     assert number is not None
@@ -183,7 +183,7 @@ def _near(scene: Scene, marks: Marks) -> tuple[np.ndarray, float]:
 
 
 def _direction(scene: Scene, marks: Marks, middle: np.ndarray, reach: float) -> tuple[Colour, float]:
-    """Return from where the place is seen best, and how near to the eye the part is cut so that it is seen at all."""
+    """Return the best direction of view, and how near to the eye the part is cut to show the place."""
     best, most = _DIRECTIONS[0], 0.0
     samples = marks.samples()
     for i, towards in enumerate(_DIRECTIONS[:4] if len(scene.faces) > _MANY else _DIRECTIONS):
@@ -228,7 +228,7 @@ class _View:
         self.marks, self.frame, self.near, self.cut = marks, frame, near, cut
         points, reach = (near[0][None], near[1]) if near else (scene.vertices, 0.0)
         self.view = raster.aim(towards, points, SIZE, reach)
-        # What is marked comes last: it is seen before other faces in its place.
+        # Marked faces come last: they hide other faces in their place.
         kind = np.zeros(len(scene.faces), int)
         for which, faces in enumerate((marks.others, marks.faces[1], marks.faces[0]), 1):
             kind[faces] = which
@@ -238,7 +238,7 @@ class _View:
         behind[0] = CUT if np.isfinite(cut) else INSIDE
         surface = Surface(scene.vertices, scene.faces[order], palette[kind[order]], inside=behind[kind[order]])
         pixels, depth, _ = raster.compose([raster.render(surface, self.view, cut)], self.view, wires=near is not None)
-        if near is None:  # what is marked shows through what lies before it
+        if near is None:  # marks show through the faces before them
             hidden = Surface(scene.vertices, scene.faces[kind > 0], colour, inside=colour)
             one = raster.render(hidden, self.view)
             under = (one.face >= 0) & (one.depth < depth[one.window] - 0.5 / self.view.scale)
@@ -281,7 +281,7 @@ class _View:
         return [f'<circle class="point" r="5" fill={self.colour} cx="{number(x)}" cy="{number(y)}"/>' for x, y in at]
 
     def _where(self) -> list[str]:
-        """Draw, in the whole view, a circle round what the near view shows."""
+        """Draw, in the whole view, a circle round the part in the near view."""
         if self.frame is None:
             return []
         middle, reach = self.frame
@@ -318,7 +318,7 @@ _STYLE = (
 
 
 def _page(title: str, finding: Finding, views: Sequence[_View], place: Location | None) -> str:
-    """Draw title and message, the views side by side, and below them what each shows."""
+    """Draw title and message, the views side by side, and below them their captions."""
     lines = [*_wrapped(finding.message), *_wrapped(f"Fix: {rules()[finding.code].fix}")]
     top = 2 * _MARGIN + 20 + 17 * len(lines)
     width = _MARGIN + len(views) * (SIZE[0] + _MARGIN)

@@ -26,7 +26,7 @@ _HALF = math.sqrt(0.5)
 
 @dataclass(frozen=True)
 class Standing:
-    """A place of a mesh that stands in several: a name, the turn about z (degrees), then the move (mm)."""
+    """One of several places of a mesh: a name, the turn about z (degrees), then the move (mm)."""
 
     name: str
     x: float
@@ -38,8 +38,8 @@ class Standing:
 class GlbPart:
     """A named closed mesh: colour as three sRGB numbers 0 to 1, vertices (n, 3) in mm, faces (m, 3).
 
-    `extras`: plain values that programs may read. `places`: where it stands; none for as it is, under its own name. Its
-    mesh is in the file once, however often it stands there.
+    `extras`: plain values that programs may read. `places`: its copies; none for as it is, under its own name. The file
+    has its mesh once, for any number of copies.
     """
 
     name: str
@@ -51,7 +51,10 @@ class GlbPart:
 
 
 def content(parts: Sequence[GlbPart]) -> bytes:
-    """Return the bytes of the file. Raises TooThin, with a part's name, if single precision can't hold its mesh."""
+    """Return the bytes of the file.
+
+    Raises TooThin, with a part's name, if single precision can't represent its mesh.
+    """
     buffer = bytearray()
     views: list[dict[str, Any]] = []
     accessors: list[dict[str, Any]] = []

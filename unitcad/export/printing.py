@@ -1,4 +1,4 @@
-"""A body for a printer's file: as it lies on the bed, in the single precision that STL and slicers have."""
+"""A body for a printer's file: as printed on the bed, in the single precision that STL and slicers have."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ROUNDS = 6
 
 
 class TooThin(UnitcadError):
-    """A mesh that single precision can't hold."""
+    """A mesh that single precision can't represent."""
 
 
 def print_ready(vertices: np.ndarray, faces: np.ndarray, upside_down: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -39,9 +39,10 @@ def resolution(vertices: np.ndarray) -> float:
 def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Round a closed mesh to float32 without a crack: see `print_ready`.
 
-    Rounding alone turns slivers of a boolean into faces without area. So what is thinner than a few roundings is
-    simplified away first, by manifold3d (which keeps the mesh closed), with more of it until the rounded mesh is sound.
-    The surface moves by less than 4 ** ROUNDS times the resolution in the worst case, 4 times it in the usual one.
+    Rounding alone turns slivers of a boolean into faces without area. So details thinner than a few roundings are
+    simplified away first, by manifold3d (which keeps the mesh closed), with a growing limit until the rounded mesh is
+    sound. The surface moves by less than 4 ** ROUNDS times the resolution in the worst case, 4 times it in the usual
+    one.
     """
     solid = manifold3d.Manifold(
         manifold3d.Mesh64(
@@ -59,7 +60,7 @@ def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
 
 
 def _rounded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mesh in float32: equal vertices merged, collapsed faces left out, in canonical order."""
+    """Return the mesh in float32: equal vertices merged, collapsed faces dropped, in canonical order."""
     # Adding zero turns -0.0 into 0.0, which would otherwise be another vertex in the bytes.
     merged, index = unique_rows(vertices.astype(np.float32) + np.float32(0))
     faces = index[faces]

@@ -31,7 +31,7 @@ LETTER_PX = 24
 MOST_CHARACTERS = 28
 """The longest name that is written whole."""
 MARGIN_PX, EDGE_PX, GAP_PX, APART_PX = 6, 8, 6, 12
-"""White above and below the drawing; from a name to the picture's edge, to what is drawn, to another name."""
+"""White margin above and below the drawing; gap from a name to the picture's edge, to the drawing, to another name."""
 _FRAGMENTS = 200_000  # a block's, which stay in the processor's cache
 _FACES = 100_000
 
@@ -62,9 +62,9 @@ class Camera:
 def aim(
     towards_eye: Colour, points: np.ndarray, size: tuple[int, int], reach: float = 0.0, turned: bool = False
 ) -> Camera:
-    """Return a view that holds all `points` (n, 3) mm with a margin, and a ball of radius `reach` mm in their middle.
+    """Return a view of all `points` (n, 3) mm with a margin, and of a ball of radius `reach` mm in their middle.
 
-    `turned`: upside down, as things look that lie on their back.
+    `turned`: upside down, like parts on their back.
     """
     eye = np.array(towards_eye, float) / np.linalg.norm(towards_eye)
     upwards = np.array([0.0, 0.0, 1.0]) if abs(eye[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
@@ -84,8 +84,8 @@ def aim(
 class Layer:
     """A mesh in a view: the rectangle of the depth buffer that it reaches, from its `top` row and `left` column.
 
-    Of each pixel (height, width) there: depth in mm, minus infinity beside the mesh, and face, -1 beside it. Of each
-    face (m,): colour, four bytes, and the number of the smooth patch that it lies in, from 1; -1 for a cut.
+    For each pixel (height, width) there: depth in mm and face; minus infinity and -1 off the mesh. For each face (m,):
+    colour, four bytes, and the number of its smooth patch, from 1; -1 for a cut.
     """
 
     top: int
@@ -104,7 +104,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class Surface:
-    """A mesh in a picture: vertices (n, 3) mm, faces (m, 3), its colour or one a face; `label` is written beside it.
+    """A mesh in a picture: vertices (n, 3) mm, faces (m, 3), its colour or one a face; `label` is written next to it.
 
     It is closed unless it has an `inside`: the colour of faces seen from behind.
     """
@@ -118,7 +118,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Label:
-    """A name in its place: its box in pixels of the picture, and the line from `start`, what it names, to `end`."""
+    """A name in its place: its box in pixels of the picture, and the line from `start`, on the named part, to `end`."""
 
     text: str
     left: int
@@ -132,7 +132,7 @@ class Label:
 
 @dataclass(frozen=True)
 class Name:
-    """A name and the point (x, y, z) mm of what it names: under a dot, or in a `ring` if a dot would cover it.
+    """A name and a point (x, y, z) mm of the named part: under a dot, or in a `ring` if a dot would cover it.
 
     `on`: the name itself is written there, without a line to it.
     """
@@ -151,7 +151,7 @@ def draw(surfaces: Sequence[Surface], towards_eye: Colour, size: tuple[int, int]
 
 
 def render(surface: Surface, view: Camera, cut: float = np.inf) -> Layer:
-    """Draw a surface, without what is nearer the eye than `cut` (mm from the view's middle).
+    """Draw a surface, without faces nearer the eye than `cut` (mm from the view's middle).
 
     If it is cut, faces seen from behind are the cut: hatched, in their colour as it is. Others are lit.
     """
@@ -178,7 +178,7 @@ def _fine(view: Camera) -> Camera:
 
 
 def _patches(faces: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Return the number of the smooth patch, from 1, that each face lies in."""
+    """Return the number of each face's smooth patch, from 1."""
     sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1).astype(np.int64)
     key = sides[:, 0] * (int(faces.max(initial=0)) + 1) + sides[:, 1]
     order = np.argsort(key, kind="stable")
@@ -199,10 +199,10 @@ def look(vertices: np.ndarray, faces: np.ndarray, view: Camera) -> tuple[np.ndar
 def rasterise(
     vertices: np.ndarray, faces: np.ndarray, view: Camera, cut: float = np.inf
 ) -> tuple[int, int, np.ndarray, np.ndarray]:
-    """Return what is seen of a mesh, without what is nearer the eye than `cut`, in the rectangle that it reaches.
+    """Return the visible part of a mesh, cut off nearer to the eye than `cut`, in the rectangle that it reaches.
 
-    That is the rectangle's first row and column, and of each pixel the face, -1 for none, and the depth in mm. Of two
-    faces in one place, to a part of a pixel, the later one is seen.
+    That is the rectangle's first row and column, and for each pixel the face, -1 for none, and the depth in mm. The
+    later of two faces in one place, to a part of a pixel, is visible.
     """
     points = view.project(vertices)
     reached = points[faces].reshape(-1, 3)[:, :2]
@@ -225,7 +225,7 @@ def rasterise(
 def _fragments(
     points: np.ndarray, faces: np.ndarray, shape: tuple[int, int]
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield face, pixel and depth of every pixel's middle that lies in a face, in blocks: row by row of each face.
+    """Yield face, pixel and depth of every pixel's middle inside a face, in blocks: row by row of each face.
 
     A pixel's number is that in a picture of `shape` (height, width), row by row.
     """
@@ -269,7 +269,7 @@ def _counted(start: np.ndarray, count: np.ndarray) -> np.ndarray:
 
 
 def _span(corners: np.ndarray, face: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return from where to where (px) the line y = `level` lies in faces of `corners` (n, 3, 3): (m,) each."""
+    """Return start and end (px) of the line y = `level` in faces of `corners` (n, 3, 3): (m,) each."""
     x0, y0 = corners[face, :, 0], corners[face, :, 1]
     x1, y1 = np.roll(x0, 1, axis=1), np.roll(y0, 1, axis=1)
     crosses = (np.minimum(y0, y1) <= level[:, None]) & (level[:, None] <= np.maximum(y0, y1)) & (y0 != y1)
@@ -282,7 +282,7 @@ def compose(layers: Sequence[Layer], view: Camera, wires: bool = False) -> tuple
     """Draw layers over one another, with lines round smooth patches and, with `wires`, along the sides of all faces.
 
     Return pixels of the depth buffer (height, width): colour in bytes (.., 4), depth in mm, and the number of the face
-    from 1 on, counted through all layers. Of two layers in one place, to a tenth of a pixel, the later one is seen.
+    from 1 on, counted through all layers. The later of two layers in one place, to a tenth of a pixel, is visible.
     """
     width, height = _fine(view).size
     depth, shown = np.full((height, width), -np.inf, np.float32), np.zeros((height, width), np.int32)
@@ -318,8 +318,8 @@ def compose(layers: Sequence[Layer], view: Camera, wires: bool = False) -> tuple
 def finish(layers: Sequence[Layer], view: Camera, names: Sequence[Name] = (), labels: Sequence[str] = ()) -> bytes:
     """Return the picture of layers drawn for one view as a PNG, without the empty rows above and below.
 
-    Names, and the `labels` of layers, stand clear of what is drawn and of each other if there is room, each with a line
-    to what it names.
+    Names, and the `labels` of layers, are clear of the drawing and of each other if there is room, each with a line to
+    the named part.
     """
     colour, _, shown = compose(layers, view)
     shown = shown[::SHARPER, ::SHARPER]
@@ -345,7 +345,7 @@ def finish(layers: Sequence[Layer], view: Camera, names: Sequence[Name] = (), la
 
 
 def name_layers(layers: Sequence[Layer], labels: Sequence[str], shown: np.ndarray, view: Camera) -> list[Name]:
-    """Name what is seen of each layer that has a label, well inside it near its left end; from left to right.
+    """Name the visible part of each layer that has a label, well inside it near its left end; from left to right.
 
     `shown` (height, width): the number of the face of each pixel, as `compose` counts them.
     """
@@ -363,7 +363,7 @@ def name_layers(layers: Sequence[Layer], labels: Sequence[str], shown: np.ndarra
 
 
 def place_names(names: Sequence[Name], drawn: np.ndarray, view: Camera) -> list[Label]:
-    """Give names a place in a picture, beside what is `drawn` (height, width) and beside each other."""
+    """Give names a place in a picture, clear of the `drawn` pixels (height, width) and of each other."""
     covered = Image.fromarray(drawn.astype(np.uint8))
     cover, font, labels = ImageDraw.Draw(covered), _font(), []
     for name in names:

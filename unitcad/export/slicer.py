@@ -1,4 +1,4 @@
-"""PrusaSlicer, headless, where it is installed: whether it reads a file without repair, print time and filament."""
+"""PrusaSlicer, headless, if it is installed: whether it reads a file without repair, print time and filament."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from unitcad.errors import UnitcadError
 from unitcad.workers import TimedOut, cores, run
 
 PROGRAMS = ("prusa-slicer", "prusa-slicer-console", "PrusaSlicer")
-"""Its names on Linux, Windows and macOS, where it is on the path."""
+"""Its names on the path of Linux, Windows and macOS."""
 PLACES = {
     "darwin": (
         "/Applications/PrusaSlicer.app/Contents/MacOS/PrusaSlicer",
@@ -27,7 +27,7 @@ PLACES = {
     ),
     "win32": (r"C:\Program Files\Prusa3D\PrusaSlicer\prusa-slicer-console.exe",),
 }
-"""Where its installers put it without adding it to the path, by `sys.platform`."""
+"""Its folders by `sys.platform`, if its installer does not add it to the path."""
 NOZZLES_MM = {"fdm-0.25": 0.25}
 TIMEOUT_S = 300
 FILAMENT_MM = 1.75
@@ -46,14 +46,14 @@ class Sliced:
 
 
 def program() -> str | None:
-    """Return PrusaSlicer's command: on the path, or where its installer puts it; None where there is none."""
+    """Return PrusaSlicer's command: on the path, or in the folder of its installer; None if there is none."""
     return next((path for name in (*PROGRAMS, *PLACES.get(sys.platform, ())) if (path := shutil.which(name))), None)
 
 
 def needs_repair(path: Path) -> bool:
     """Tell whether PrusaSlicer finds anything to repair in a mesh file; fast, nothing is sliced.
 
-    Raises UnitcadError where the slicer is missing or does not read the file.
+    Raises UnitcadError if the slicer is missing or does not read the file.
     """
     output = _run("--info", str(path))
     if "manifold" not in output:
@@ -62,7 +62,7 @@ def needs_repair(path: Path) -> bool:
 
 
 def slice_file(path: Path, printer: Printer) -> Sliced:
-    """Slice one STL with the slicer's own defaults and this printer's layers. Raises UnitcadError where that fails."""
+    """Slice one STL with the slicer's own defaults and this printer's layers. Raises UnitcadError if that fails."""
     with tempfile.TemporaryDirectory(prefix="unitcad-slice-") as scratch:
         code = Path(scratch) / "out.gcode"
         layer, nozzle = float(printer.layer_mm), NOZZLES_MM.get(printer.name, 0.4)
@@ -113,7 +113,7 @@ def print_report(
         "pieces": pieces,
         "print_s": sum(piece["print_s"] for piece in pieces),
         "filament_cm3": round(sum(piece["filament_cm3"] for piece in pieces), 3),
-        "note": "the slicer's own defaults but for nozzle and layer height; each piece printed alone",
+        "note": "the slicer's own defaults but for nozzle and layer height; each piece printed by itself",
     }
 
 
@@ -128,7 +128,7 @@ def _run(*arguments: str) -> str:
     if command is None:
         raise UnitcadError("PrusaSlicer is not installed")
     try:
-        # It ends at once where the user's locale is not installed; this one always is.
+        # It ends at once if the user's locale is not installed; this one always is.
         done = run([command, *arguments], seconds=TIMEOUT_S, env={**os.environ, "LC_ALL": "C"})
     except TimedOut:
         raise UnitcadError(f"PrusaSlicer took more than {TIMEOUT_S} s") from None

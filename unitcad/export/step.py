@@ -1,6 +1,6 @@
 """STEP AP242: an assembly of named, coloured bodies, exact surfaces, the same bytes for the same bodies.
 
-Written through OCCT's document (XCAF) directly, so that either B-rep extra will do. What OCCT writes differently each
+Written through OCCT's document (XCAF) directly, so that either B-rep extra will do. Output of OCCT that differs each
 time is replaced in the text: the time stamp, a counter of the process and the last bits of coordinates. The styles are
 written here, since OCCT orders them by address and rounds colours to single precision.
 """
@@ -59,7 +59,7 @@ def write(path: Path, bodies: Sequence[Body], name: str) -> None:
 def content(bodies: Sequence[Body], name: str) -> bytes:
     """Return the bytes of the file. Its time stamp is SOURCE_DATE_EPOCH, or 1980-01-01 without one.
 
-    Raises UnitcadError where OCCT fails, or makes a body that differs from its mesh.
+    Raises UnitcadError if OCCT fails, or makes a body that differs from its mesh.
     """
     solids = occt.solids(body.shape for body in bodies)
     parts = _parts(bodies, solids)
@@ -125,7 +125,7 @@ def _name(label: TDF_Label, name: str) -> None:
 
 
 def _with_header(text: str, name: str) -> str:
-    """Return the file with a header of ours: OCCT's holds the time of writing."""
+    """Return the file with a header of ours: OCCT's has the time of writing."""
     when = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", "315532800")), UTC)
     file = f"'{_escaped(name)}.step','{when:%Y-%m-%dT%H:%M:%S}'"
     header = f"FILE_NAME({file},('unitcad'),(''),'Open CASCADE','unitcad','');"
@@ -159,9 +159,9 @@ def _settled(text: str, names: Sequence[str]) -> str:
 def _with_styles(text: str, colours: Sequence[tuple[float, float, float]], counts: Sequence[int]) -> str:
     """Return the file with a surface colour for every solid: `colours` by body, in the order of its representations.
 
-    `counts` says how many solids each body has; several are written as a plain representation, as the assembly is.
+    `counts`: the number of solids of each body; several are written as a plain representation, as the assembly is.
     Laid out after the recommended practices for model styling of the MBx Interoperability Forum (CAx-IF).
-    Raises UnitcadError where a body or a solid of one is missing.
+    Raises UnitcadError if a body or a solid of one is missing.
     """
     solids = set(re.findall(r"(#\d+) = (?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\(", text))
     representations = re.findall(

@@ -25,7 +25,7 @@ CHARACTER_PX = 0.62 * TEXT_PX
 """The room for a character: no common sans-serif is wider on average."""
 ARROW_PX = 7.0
 HAIR_MM = 1 / 3000
-"""The cut lies this far off its plane, and so in no plane of the length grid: a face in the plane itself, shared by two
+"""The cut is this far off its plane, and so in no plane of the length grid: a face in the plane itself, shared by two
 bodies, could be drawn for both or for neither."""
 TAIL_MM = 2.5
 """The length of a tail that is drawn."""
@@ -57,7 +57,7 @@ class Region:
 class Measure:
     """A dimension: `start` to `end` along x (drawn below) or z (drawn left or right), in a `row` counted outwards.
 
-    `reach`: where its extension lines begin, in the other coordinate. All in mm.
+    `reach`: start of its extension lines, in the other coordinate. All in mm.
     """
 
     text: str
@@ -79,7 +79,7 @@ class Note:
 def cut(
     bodies: Sequence[Body], segments: int, y: float = 0.0, reach: float = math.inf, swell: float | None = None
 ) -> list[Region]:
-    """Return what the plane at `y` (mm) cuts of `bodies`, up to |x| = `reach`; what it misses is left out.
+    """Return the sections of `bodies` by the plane at `y` (mm), up to |x| = `reach`, without bodies that it misses.
 
     `swell` as in `unitcad.kernels.mesh.realise`.
     """
@@ -104,7 +104,7 @@ def section(
 ) -> str:
     """Draw `regions`, every one named, with its measures.
 
-    `ground` is what the line z = 0 is called, "" for no name. The same arguments give the same text.
+    `ground`: the name of the line z = 0, "" for none. The same arguments give the same text.
     """
     anchors = _anchors(regions, [text_width(region.name) for region in regions])
     named = [*notes, *(Note(region.name, at) for region, at in zip(regions, anchors, strict=True))]
@@ -151,7 +151,7 @@ def unit_section(
 
 
 def _measured(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[Measure]:
-    """Return width and height of the cast layers together, and the motor's diameter where the plane holds its axis."""
+    """Return width and height of the cast layers together, and the motor's diameter if the plane contains its axis."""
     names = {body.name for body in bodies if body.made == "cast"}
     # A polygon's corners on the circle: a round body is then as wide as it is drawn.
     regions = cut(bodies, segments, swell=1.0)
@@ -256,7 +256,7 @@ class _Page:
                 marks += [_line(foot, tip, "extension") for foot, tip in zip(feet, tips, strict=True)]
                 marks += _dimension(*tips)
                 middles.append(((tips[0][0] + tips[1][0]) / 2, (tips[0][1] + tips[1][1]) / 2))
-            # Texts stand under a horizontal dimension line, beside a vertical one.
+            # Texts are under a horizontal dimension line, next to a vertical one.
             if in_row[0].side == "below":
                 places = spread([x for x, _ in middles], [text_width(m.text) for m in in_row])
                 spots, anchor = [(x, middles[0][1] + TEXT_PX * 0.8) for x in places], "middle"
@@ -317,7 +317,7 @@ def spread(wanted: Sequence[float], sizes: Sequence[float], gap: float = 4.0) ->
 def within(
     middles: Sequence[float], sizes: Sequence[float], ends: tuple[float, float], gap: float = 4.0
 ) -> list[float]:
-    """Return middles moved between `ends`, each no farther than it must be; where they don't fit, past the far end."""
+    """Return middles moved between `ends`, each no farther than it must be; if they don't fit, past the far end."""
     found = list(middles)
     order = sorted(range(len(found)), key=lambda i: found[i])
     start, end = ends
@@ -342,7 +342,7 @@ def _text(content: str, at: Point, anchor: str = "middle") -> str:
 
 
 def _dimension(start: Point, end: Point) -> list[str]:
-    """Draw a horizontal or vertical dimension line; arrows that don't fit inside stand outside."""
+    """Draw a horizontal or vertical dimension line; arrows that don't fit inside are outside."""
     along = (end[0] - start[0], end[1] - start[1])
     length = (along[0] ** 2 + along[1] ** 2) ** 0.5
     unit = (along[0] / length, along[1] / length)
@@ -360,7 +360,7 @@ def _dimension(start: Point, end: Point) -> list[str]:
 
 
 def _anchors(regions: Sequence[Region], widths: Sequence[float]) -> list[Point]:
-    """Return a point in each region for its leader: well inside, and below where a label of its width has room."""
+    """Return a point in each region for its leader: well inside, and below if a label of its width has room."""
     ends = [point[0] for region in regions for loop in region.loops for point in loop]
     low, span = min(ends, default=0.0), max(ends, default=0.0) - min(ends, default=0.0)
     room, total, anchors = 0.0, sum(widths) or 1.0, []
@@ -376,7 +376,7 @@ def _anchors(regions: Sequence[Region], widths: Sequence[float]) -> list[Point]:
             if abs(x - wanted) - 20 * room_needed > least[0]:
                 break  # no place farther away can be better
             for z in _middles(starts, stops, x):
-                # Room counts up to what a dot needs; beyond that, nearness to the wanted place does.
+                # Room counts up to a dot's size; beyond that, nearness to the wanted place does.
                 clear = min(_distance(starts, stops, np.array([x, z])), room_needed)
                 if (abs(x - wanted) - 20 * clear, x) < least:
                     best, least = (float(x), float(z)), (abs(x - wanted) - 20 * clear, x)

@@ -67,9 +67,9 @@ def content(parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220
 
 
 def layout(footprints: Sequence[tuple[float, float]], bed_mm: tuple[float, float]) -> list[tuple[float, float]]:
-    """Return where each footprint's (x, y) lower left corner goes (mm), about the bed's middle.
+    """Return the place of each footprint's (x, y) lower left corner (mm), about the bed's middle.
 
-    In rows along x, a new one where the bed's width ends. What does not fit on it runs over its far edges; nothing
+    In rows along x, a new one at the end of the bed's width. Pieces that do not fit run over its far edges; nothing
     overlaps.
     """
     corners: list[tuple[float, float]] = []

@@ -19,8 +19,8 @@ from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.readers import expect_ending
 from unitcad.lab.unit_files import Cavity, file_of, source_file
 from unitcad.lab.units import Quantity, to_si
-from unitcad.spec.asked import Table
 from unitcad.spec.convert import convert
+from unitcad.spec.raw import Table
 from unitcad.spec.toml import read_toml
 
 Name = Annotated[str, Meta(min_length=1, max_length=100)]

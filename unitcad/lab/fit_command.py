@@ -26,8 +26,8 @@ def fit(
 ) -> None:
     """Judge the edge-level models with a lab's units, and fit them.
 
-    Each unit is predicted from all others, by every model and by the baseline of two levels. The fewer units, the more
-    the constants shrink towards the stored ones. `estimate --fit` and `build --fit` take lab-fit.toml.
+    Each unit is predicted from all others, by every model and by a baseline of four class means. The fewer units, the
+    more the constants shrink towards the stored ones. `estimate --fit` and `build --fit` take lab-fit.toml.
     """
 
     loaded = load_fit_lab(lab)
@@ -50,18 +50,19 @@ def _print(result: Fitted) -> None:
     screen.print(f"{settings.name}: {result.fit.units} units of its own, {settings.moduli} moduli", soft_wrap=True)
     if settings.note:
         screen.print(f"  {settings.note}", soft_wrap=True)
-    table = Table("model", "leave-one-out", "own: stored -> fitted", "against the null", "80 %")
+    table = Table("model", "leave-one-out", "own: stored -> fitted", "against the baseline", "80 %")
     for name in chosen.order:
-        one = fit_files.entry(result, name)
+        one = result.fit.model[name]
         own = "-" if one.own_left_out is None else f"x {one.own_left_out:.2f}"
         if one.own_by_stored is not None:
             own = f"{one.own_by_stored:.2f} -> {one.own_left_out:.2f}"
         score = f"x {one.left_out:.2f} ({one.left_out_low:.2f} to {one.left_out_high:.2f})"
         table.add_row(name, score, own, fit_files.against_text(one), one.held)
     screen.print(table)
+    screen.print(f"  {fit_files.leads_text(result)}", soft_wrap=True)
     screen.print("constants, stored -> fitted (90 %):")
     for name in chosen.order:
-        screen.print(f"  {name}: {fit_files.constants_text(fit_files.entry(result, name))}", soft_wrap=True)
+        screen.print(f"  {name}: {fit_files.constants_text(result.fit.model[name])}", soft_wrap=True)
     for one in fit_files.warnings(result):
         screen.print(f"  warning: {one}", soft_wrap=True)
     by_source = Table("moduli", *chosen.judged, title="leave-one-out error, by source of the moduli")
@@ -81,6 +82,7 @@ def _print(result: Fitted) -> None:
     screen.print(f"  {fit_files.DIFFERING}.", soft_wrap=True)
     screen.print(f"  {fit_files.prior_text(result)}", soft_wrap=True)
     screen.print(
-        "  against the null: difference of |ln(predicted/measured)|, below 0 is better; 80 %: units in their range",
+        "  against the baseline (four class means): difference of |ln(predicted/measured)|, below 0 is better; 80 %: "
+        "units in their range",
         soft_wrap=True,
     )

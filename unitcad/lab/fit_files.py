@@ -10,8 +10,9 @@ import numpy as np
 
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.lab_fit import PERCENT, ModelFit, quantiles
+from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE
 from unitcad.export.chart import Series, chart
-from unitcad.lab.fitting import Compared, Fitted
+from unitcad.lab.fitting import Fitted
 from unitcad.spec.toml import text_of, without_none
 
 FIT = "lab-fit.toml"
@@ -63,10 +64,10 @@ def as_data(result: Fitted) -> dict[str, Any]:
 
 
 def unit_rows(result: Fitted) -> list[dict[str, Any]]:
-    """Return each unit's measured level and the best model's prediction without it."""
+    """Return each unit's measured level and the leading model's prediction without it."""
     chosen = result.chosen
     assert chosen.campaigns is not None
-    name = best(chosen)
+    name = chosen.leads
     judged, table = chosen.judged[name], chosen.campaigns.table
     rows = []
     for i, unit in enumerate(table.names):
@@ -82,7 +83,7 @@ def differing_units(result: Fitted) -> list[dict[str, Any]]:
 
     The unit on which the models differ most comes first.
     """
-    judged = {name: one for name, one in result.chosen.judged.items() if name != "null"}
+    judged = {name: one for name, one in result.chosen.judged.items() if name != BASELINE}
     own = next(iter(judged.values())).own
     rows = []
     for i, unit in zip(np.flatnonzero(own), result.lab.units, strict=True):
@@ -99,16 +100,6 @@ def differing_table(result: Fitted) -> list[list[str]]:
         [row["unit"], *(f"{level:.2g}" for level in row["levels"].values()), f"x {row['factor']:.2f}"] for row in rows
     ]
     return [["unit", *rows[0]["levels"], "factor"], *cells]
-
-
-def best(compared: Compared) -> str:
-    """Return the model with the best score that is not the null."""
-    return next(name for name in compared.order if name != "null")
-
-
-def entry(result: Fitted, name: str) -> ModelFit:
-    """Return a model's part of the fit, the null's too."""
-    return result.fit.null if name == "null" else result.fit.model[name]
 
 
 def prior_text(result: Fitted) -> str:
@@ -131,25 +122,33 @@ def constants_text(one: ModelFit) -> str:
     for name, value in one.constants.items():
         stored = f"{one.stored[name]:.3g} -> " if one.stored else ""
         parts.append(f"{name} {stored}{value:.3g} ({one.low[name]:.3g} to {one.high[name]:.3g})")
-        parts[-1] += ", on its bound" if name == one.at_bound else ""
+        parts[-1] += ", not determined" if name == one.at_bound else ""
     return "; ".join(parts)
 
 
 def warnings(result: Fitted) -> list[str]:
-    """Say which models have a constant on the bound of its search."""
+    """Say which models have a constant that the units do not determine."""
     return [
-        f"{name}: {one.at_bound} ran into the bound of its search, {one.constants[one.at_bound]:.3g}: the units do not "
-        "determine it, its range says nothing, and the model comes last"
+        f"{name}: the units do not determine {one.at_bound} ({one.constants[one.at_bound]:.3g}); its range says "
+        "nothing, and the model comes last"
         for name, one in result.fit.model.items()
         if one.at_bound
     ]
 
 
 def against_text(one: ModelFit) -> str:
-    """Return the paired difference to the null in ln, with its standard error and p."""
-    if one.against_null is None:
+    """Return the paired difference to the baseline in ln, with its standard error and p."""
+    if one.against_baseline is None:
         return "-"
-    return f"{one.against_null:+.2f} +- {one.against_null_error:.2f}, p {one.against_null_p:.2g}"
+    return f"{one.against_baseline:+.2f} +- {one.against_baseline_error:.2f}, p {one.against_baseline_p:.2g}"
+
+
+def leads_text(result: Fitted) -> str:
+    """Say which model leads, and by which rule."""
+    return (
+        f"{result.fit.leads} leads. Another model than {RULE} leads only if, on the lab's own units each left out, its "
+        f"mean error is less than {RULE}'s and the {BASELINE}'s and p is at most {OVERTURNED:g} against both."
+    )
 
 
 def page(result: Fitted) -> str:
@@ -165,13 +164,13 @@ def page(result: Fitted) -> str:
     lines += [
         f"{own} units of the lab's own"
         + (" in addition to the paper's nine" if settings.with_paper else "")
-        + f", {settings.moduli} moduli. {prior_text(result)}",
+        + f", {settings.moduli} moduli. {prior_text(result)} {leads_text(result)}",
         "",
-        "| model | leave-one-out | own units | own, stored constants | against the null | in 80 % | constants |",
+        "| model | leave-one-out | own units | own, stored constants | against the baseline | in 80 % | constants |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name in chosen.order:
-        one = entry(result, name)
+        one = result.fit.model[name]
         lines.append(
             f"| {name} | {one.left_out:.2f} ({one.left_out_low:.2f} to {one.left_out_high:.2f}) | "
             f"{factor(one.own_left_out)} | {factor(one.own_by_stored)} | {against_text(one)} | {one.held} | "
@@ -181,8 +180,8 @@ def page(result: Fitted) -> str:
     lines += [
         "",
         "Factors are geometric means of predicted over measured, 1 is exact; in brackets 5 to 95 % over units drawn "
-        "again. Against the null: mean difference of |ln(predicted/measured)| with its standard error, and the "
-        "sign-flip test; below 0 is better than the two levels. In 80 %: units within the range that was predicted "
+        "again. Against the baseline: mean difference of |ln(predicted/measured)| with its standard error, and the "
+        "sign-flip test; below 0 is better than four class means. In 80 %: units within the range that was predicted "
         "without them.",
         "",
         "## By source of the moduli",
@@ -198,7 +197,7 @@ def page(result: Fitted) -> str:
         "",
         "## Units",
         "",
-        f"Predicted without the unit by {best(chosen)}; 80 % intervals.",
+        f"Predicted without the unit by {chosen.leads}; 80 % intervals.",
         "",
         "![predicted against measured](fit.svg)",
         "",
@@ -233,5 +232,5 @@ def _chart(result: Fitted) -> str:
             series.append(Series(f"{label}, with {PERCENT[0]} to {PERCENT[1]} %", measured, predicted, True, bars=bars))
     ends = [min(row["measured"] for row in rows), max(row["measured"] for row in rows)]
     series.append(Series("predicted = measured", ends, ends, dashed=True))
-    title = f"{result.fit.name}: {best(result.chosen)}, leave-one-out"
+    title = f"{result.fit.name}: {result.fit.leads}, leave-one-out"
     return chart(series, title, "measured level", "predicted level", log_x=True, log_y=True)

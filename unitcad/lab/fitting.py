@@ -14,22 +14,22 @@ from scipy.special import stdtrit
 
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.fitted_models import KAPPA, MODELS
 from unitcad.attenuation.edge.lab_fit import InputFile, LabFit, ModelFit, OwnLevel, unit_key
 from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable, Moduli, measured_table
+from unitcad.attenuation.edge.models import BASELINE, COMPARED, KAPPA, RULE, Model, leader
+from unitcad.attenuation.edge.nearest import coordinates_of
 from unitcad.attenuation.edge.scores import SEED
 from unitcad.attenuation.edge.shrunk_fit import (
     BETWEEN_LABS,
     Campaigns,
     Judged,
-    Model,
     Shrunk,
+    gradients,
     judge,
-    models,
     paired,
     shrunk,
 )
-from unitcad.attenuation.edge.variant_units import MANY_LAYERS, MOST_LAYERS, nominal
+from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import materials
 from unitcad.catalogue.entries import Frequency, MaterialEntry
@@ -37,7 +37,7 @@ from unitcad.errors import Refusal, unknown_name
 from unitcad.estimating import estimate_input
 from unitcad.lab.unit_files import Cavity, file_of, measured_walls, source_file, specs_of
 from unitcad.spec import Spec, convert, read_toml, to_data
-from unitcad.spec.asked import Table
+from unitcad.spec.raw import Table
 from unitcad.validation import from_data
 from unitcad.validation.shipped_files import named_file, shipped_files
 
@@ -78,9 +78,9 @@ class FitLabFile(Table, frozen=True, kw_only=True):
     name: Annotated[Name, Meta(description="a name of the lab")]
     note: Annotated[str, Meta(max_length=1000, description="a remark for the results")] = ""
     moduli: Annotated[
-        Literal["dynamic", "quasi-static"],
-        Meta(description="moduli of the silicones: at the motor's frequency, or of a slow pull"),
-    ] = "dynamic"
+        Literal["small-strain", "quasi-static"],
+        Meta(description="moduli of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa"),
+    ] = "small-strain"
     with_paper: Annotated[
         bool, Meta(description="whether the paper's nine units count in addition to the lab's own")
     ] = True
@@ -201,8 +201,8 @@ def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | 
 
 
 SOURCES: tuple[Moduli, ...] = get_args(Moduli)
-LEAST_ALONE = 4
-"""Units of a lab without the paper's: with one left out and two constants fitted, one degree of freedom remains."""
+LEAST_ALONE = 6
+"""Units of a lab without the paper's: with one left out and four class means fitted, one degree of freedom remains."""
 _WIDEST = 10.0
 """Largest half-width of a range of ln constant that is written: beyond it the units say nothing of the constant."""
 _SIDES = 0.95
@@ -220,17 +220,33 @@ class Compared:
     reason: str = ""
 
     @property
-    def order(self) -> list[str]:
-        """The models by their score, the best first; those with a constant on its bound last."""
-        return sorted(
-            self.judged, key=lambda name: (self.at_bound(name) is not None, round(self.judged[name].score, 4))
+    def leads(self) -> str:
+        """The model that leads: `models.leader` over the lab's own units."""
+        return leader(
+            {
+                name: np.abs(one.errors[one.own])
+                for name, one in self.judged.items()
+                if name == RULE or not self.at_bound(name)
+            }
         )
 
+    @property
+    def order(self) -> list[str]:
+        """The model that leads, then the others by their score; those with a constant not determined last."""
+
+        def place(name: str) -> tuple[bool, bool, float]:
+            return name != self.leads, self.at_bound(name) is not None, round(self.judged[name].score, 4)
+
+        return sorted(self.judged, key=place)
+
     def at_bound(self, name: str) -> str | None:
-        """Return the constant of a model that the fit left on the bound of its search, if there is one."""
-        if name != "fitted":
-            return None
-        return "kappa" if np.any(np.isclose(self.fitted[name].constants[0], KAPPA, rtol=1e-6)) else None
+        """Return a constant that the units do not determine: none of them reads it, or the search met its bound."""
+        constants = self.fitted[name].constants
+        if name == "divider" and np.any(np.isclose(constants[0], KAPPA, rtol=1e-6)):
+            return "kappa"
+        assert self.campaigns is not None
+        unread = ~gradients(COMPARED[name], self.campaigns.table, constants).any(axis=0)
+        return COMPARED[name].names[int(np.argmax(unread))] if unread.any() and name != BASELINE else None
 
 
 @dataclass(frozen=True)
@@ -253,9 +269,6 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
     if not settings.with_paper and len(lab.units) < LEAST_ALONE:
         limit = f"{len(lab.units)} units; without the paper's {LEAST_ALONE} are needed"
         raise Refusal("unit", None, limit)
-    for i, unit in enumerate(lab.units):
-        if len(estimate_input(unit.spec, unit.frequency_hz).layers) > MOST_LAYERS:
-            raise Refusal(f"unit.{i}", unit.name, f"can't be fitted: {MANY_LAYERS}")
     by_source: dict[str, Compared] = {}
     for moduli in SOURCES:
         say(f"{moduli} moduli")
@@ -263,21 +276,25 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
     chosen = by_source[settings.moduli]
     if chosen.campaigns is None:
         raise Refusal("moduli", settings.moduli, chosen.reason)
-    measured = []
+    leads, measured = chosen.leads, []
+    model, constants = COMPARED[leads], chosen.fitted[leads].constants
     for unit in lab.units:
         variant, level = estimate_input(unit.spec, unit.frequency_hz), unit.level
-        hertz = variant.frequency.middle
+        built = _input(unit, settings.moduli)
+        predicted = float(model.logs(nominal(built), constants)[0])
         measured.append(
             OwnLevel(
                 unit=unit.name, key=unit_key(variant), value=level.value, low=level.low, high=level.high,
-                frequency_hz=hertz, source=unit.source,
+                frequency_hz=variant.frequency.middle, source=unit.source,
+                place=rounded(coordinates_of(built).tolist(), 6),
+                residual=float(f"{np.log(level.value) - predicted:.6g}"),
             )
         )  # fmt: skip
-    entries = {name: _entry(model, name, chosen) for name, model in models().items()}
     fit = LabFit(
         format=1, name=settings.name, units=len(lab.units), moduli=settings.moduli, with_paper=settings.with_paper,
-        between_labs=settings.between_labs, seed=SEED, model={name: entries[name] for name in (*MODELS, "crossings")},
-        null=entries["null"], measured=measured, input=list(lab.inputs),
+        between_labs=settings.between_labs, seed=SEED, leads=leads,  # pyright: ignore[reportArgumentType]
+        model={name: _entry(one, name, chosen) for name, one in COMPARED.items()},
+        measured=measured, input=list(lab.inputs),
     )  # fmt: skip
     return Fitted(lab, by_source, fit)
 
@@ -288,9 +305,9 @@ def _compared(lab: FitLab, moduli: Moduli) -> Compared:
         for at, layer in enumerate(variant.layers):
             if not layer.youngs_modulus.known:
                 return Compared(moduli, None, {}, {}, f"unit.{i}.layers.{at}: {layer.material}: no modulus is known")
-    campaigns, made = campaigns_of(lab, inputs, moduli), models()
-    judged = {name: judge(model, campaigns) for name, model in made.items()}
-    return Compared(moduli, campaigns, judged, {name: shrunk(model, campaigns) for name, model in made.items()})
+    campaigns = campaigns_of(lab, inputs, moduli)
+    judged = {name: judge(model, campaigns) for name, model in COMPARED.items()}
+    return Compared(moduli, campaigns, judged, {name: shrunk(model, campaigns) for name, model in COMPARED.items()})
 
 
 def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Campaigns:
@@ -313,7 +330,7 @@ def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Ca
 def _input(unit: OwnUnit, moduli: Moduli) -> EstimateInput:
     """Return a unit's input by one source of moduli."""
     data = to_data(unit.built)
-    data["estimate"]["moduli"] = "dynamic" if moduli == "data sheet" else moduli
+    data["estimate"]["moduli"] = "small-strain" if moduli == "data sheet" else moduli
     variant = estimate_input(from_data(data), unit.frequency_hz)
     if moduli != "data sheet":
         return variant
@@ -335,14 +352,15 @@ def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
     wide = np.exp(np.minimum(spread, _WIDEST))
     paper = ~campaigns.own
     constants = {"constants": found.constants, "low": found.constants / wide, "high": found.constants * wide}
-    constants["stored"] = model.fit(campaigns.table, paper.astype(float)) if paper.any() else ()
+    constants["stored"] = model.fit(campaigns.table, paper[None].astype(float))[0] if paper.any() else ()
     low, high = judged.range
-    against, error, p = paired(judged, compared.judged["null"]) if name != "null" else (None, None, None)
+    against, error, p = paired(judged, compared.judged[BASELINE]) if name != BASELINE else (None, None, None)
     numbers = {
         **{key: dict(zip(model.names, map(float, values), strict=False)) for key, values in constants.items()},
         "discrepancy": found.sigma, "covariance": found.covariance.tolist(), "left_out": judged.score,
         "left_out_low": low, "left_out_high": high, "own_left_out": judged.own_score,
-        "own_by_stored": judged.stored_score, "against_null": against, "against_null_error": error, "against_null_p": p,
+        "own_by_stored": judged.stored_score, "against_baseline": against, "against_baseline_error": error,
+        "against_baseline_p": p,
     }  # fmt: skip
     return ModelFit(
         degrees_of_freedom=found.df,

@@ -78,7 +78,7 @@ def specs_of(
     record, built = _cast(unit, folder, field)
     where = f"{field}.cast"
     if record.spec is None:
-        raise Refusal(where, unit.cast, "spec: is required here: the effective spec as a table")
+        raise Refusal(where, unit.cast, "spec: is required here: the resolved spec as a table")
     data = copy.deepcopy(record.spec)
     try:
         for path, entry in entries.items():

@@ -52,7 +52,7 @@ _AGAIN = "remove it, and make it again with --write-baseline"
 
 
 def read(path: Path) -> Baseline:
-    """Read a baseline. Raises UnitcadError where there is none."""
+    """Read a baseline. Raises UnitcadError if there is none."""
     content = files.read(path, largest=_LARGEST)
     try:
         baseline = msgspec.json.decode(content, type=Baseline)
@@ -81,7 +81,7 @@ def write(path: Path, old: Baseline, reports: Sequence[FileReport]) -> Baseline:
 
 
 def apply(baseline: Baseline, path: Path, report: FileReport) -> FileReport:
-    """Return the report with what the baseline at `path` lists marked as known."""
+    """Return the report with the findings of the baseline at `path` marked as known."""
     return _marked(report, baseline.files.get(_key(path, report.path), []))
 
 

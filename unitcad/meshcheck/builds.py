@@ -1,7 +1,7 @@
 """The rules on files of several solids: the objects and instances of a 3MF, the solids of a STEP file.
 
-Solids may share volume though each is sound by itself (G002). 3MF's core specification (4.1, 4.1.1) lets overlapping
-components and objects be, and says what is filled, so this is a warning.
+Solids may share volume though each is sound by itself (G002). 3MF's core specification (4.1, 4.1.1) permits overlapping
+components and objects, and defines what is filled, so this is a warning.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from unitcad.meshcheck.rules.inspection import Inspection, Printer
 from unitcad.meshcheck.rules.s_scale import likely_unit
 from unitcad.meshcheck.rules.v_values import V001
 
-# The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
+# The core specification, 4.1 and 4.1.1, tells consumers to accept these and defines them (positive fill rule).
 _FILLED = {"G001", "G002", "G008"}
 # It asks for two faces at each edge, by the indices of vertices.
 _MANIFOLD = {"T003", "T006"}
 
 
 def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
-    """Return all findings about a 3MF file and the facts of what it builds."""
+    """Return all findings about a 3MF file and the facts of its build."""
     package = open_package(data, options.limits, deadline, strict=options.strict_3mf)
     try:
         with keeping(package.findings):
@@ -84,7 +84,7 @@ def _turned(instance: Instance) -> _Turned:
 def _geometry(
     build: Build | None, options: Options, deadline: Deadline, findings: list[Finding]
 ) -> tuple[Sequence[Finding], Facts]:
-    """Add what the geometry rules find in the objects that are built, and in their instances beside each other."""
+    """Add the findings of the geometry rules in the built objects, and between their instances."""
     if build is None or any(item.code in ("P011", "V001", "F004") for item in findings):
         return ending(findings), Facts()
     instances = [instance for instance in build.instances if len(instance.triangles.rows)]
@@ -147,7 +147,7 @@ def _check_object(instance: Instance, options: Options, deadline: Deadline) -> C
 
 
 def _filled(findings: Iterable[Finding], strict: bool = False) -> Iterator[Finding]:
-    """Return the findings, as warnings those that 3MF settles by its fill rule; `strict`: what it forbids as errors."""
+    """Return the findings, as warnings those that 3MF settles by its fill rule; `strict`: forbidden ones as errors."""
     for item in findings:
         if strict and item.code in _MANIFOLD:
             yield replace(item, severity="error", message=f"{item.message} (3MF's core specification, 4.1, forbids it)")

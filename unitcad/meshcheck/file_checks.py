@@ -1,6 +1,6 @@
 """A file or a mesh in, a report out; many files one after the other or by several processes, within hard limits.
 
-`check_file` never raises for what a file holds: whatever is wrong with it is a finding.
+`check_file` never raises for a file's content: every fault is a finding.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def check_file(path: str | Path, options: Options | None = None) -> FileReport:
 
 
 def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileReport:
-    """Check a file's content without the file; `name` says by its suffix what it is. Not for STEP."""
+    """Check a file's content without the file; `name` gives the format by its suffix. Not for STEP."""
     options = options or Options()
     return _guarded(name, options, partial(_check, data, Path(name), options))
 
@@ -154,7 +154,7 @@ def expand(
 ) -> tuple[list[str], list[FileReport]]:
     """Return files for names that may be folders or globs, without repeats; a report for each name that gives none.
 
-    Of what folders and globs hold, `left_out` says which files to leave out. A folder's STEP files that cannot be
+    `left_out`: the files of folders and globs to skip. A folder's STEP files that cannot be
     read here give a warning each, since they were not named.
     """
     files: list[str] = []
@@ -182,14 +182,14 @@ def expand(
 
 
 def _step_needs() -> str:
-    """Return what STEP files need and is not there, or nothing."""
+    """Return the missing requirement of STEP files, or nothing."""
     from unitcad.meshcheck.readers import read_step
 
     return read_step.missing()
 
 
 def _walked(folder: Path) -> Iterator[str]:
-    """Return what is named as a mesh file below a folder, without hidden folders and those behind links.
+    """Return the files below a folder that are named as mesh files, without hidden folders and those behind links.
 
     Links to nothing and FIFOs are among them, and are findings.
     """
@@ -221,7 +221,7 @@ def check_files(
 ) -> Iterator[FileReport]:
     """Return a report for each (path, options), in order. `memory_mb` bounds each process's address space (POSIX only).
 
-    `then` takes each report where it was made, with its meshes, and gives the one that is passed on.
+    `then` takes each report in the process that made it, with its meshes, and returns the one that is passed on.
     """
     if jobs <= 1 or len(work) <= 1:
         with _bounded(memory_mb):

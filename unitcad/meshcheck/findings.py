@@ -16,12 +16,12 @@ from unitcad.text import number
 SHOWN = 5
 """Locations of a finding unless more are asked for; its count says how many there are."""
 MOST = 10_000
-"""Locations of a finding that are kept where all are asked for."""
+"""Locations of a finding that are kept if all are requested."""
 
 
 @dataclass(frozen=True)
 class Detail:
-    """`locations` a finding; `meshes`: where meshes with a finding are collected, None where they are not drawn."""
+    """`locations` a finding; `meshes`: the list that collects meshes with a finding, None if they are not drawn."""
 
     locations: int = SHOWN
     meshes: list[Mesh] | None = None
@@ -32,7 +32,7 @@ _DETAIL: ContextVar[Detail] = ContextVar("detail", default=_DEFAULT)
 
 
 def detail() -> Detail:
-    """Return what is kept now."""
+    """Return the current limits of locations and meshes."""
     return _DETAIL.get()
 
 
@@ -71,8 +71,9 @@ class Location:
 
     A polygon is one face, however it is cut into triangles. `object` is an id of a 3MF, or a name of an OBJ or GLB.
     `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
-    `line` is that of the first face where the format has lines, else that of the fault. `centre`: of the box round the
-    faces, the same in whatever order they are, mm. `region`, for pictures: its triangles in the mesh of number `mesh`.
+    `line` is that of the first face if the format has lines, otherwise that of the fault. `centre`: of the box round
+    the faces, the same in whatever order they are, mm. `region`, for pictures: its triangles in the mesh of number
+    `mesh`.
     """
 
     face: int | None = None
@@ -92,7 +93,7 @@ class Location:
             object.__setattr__(self, "faces", (self.face,))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it JSON-ready, without what is not known."""
+        """Return it JSON-ready, without unknown values."""
         known: dict[str, Any] = {}
         if self.part is not None:
             known["part"] = self.part
@@ -123,7 +124,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Finding:
-    """One rule that a file breaks: how often, and where first.
+    """One rule that a file breaks: how often, and its first places.
 
     `ends`: it ended the check of the file, so that other rules were not run; no filter drops it. `known`: a baseline
     lists it, and it does not fail.
@@ -150,7 +151,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Facts:
-    """Content of the file, in mm; None where it could not be read or has no meaning."""
+    """Content of the file, in mm; None if it could not be read or has no meaning."""
 
     triangles: int | None = None
     vertices: int | None = None
@@ -169,7 +170,7 @@ class Facts:
 class FileReport:
     """A file's findings, sorted by severity and code, its facts, and the wall time that the check took, if known.
 
-    `meshes`: those that the locations number, where `Options.draw` asked for them.
+    `meshes`: those that the locations number, if `Options.draw` is set.
     """
 
     path: str
@@ -211,7 +212,7 @@ class FileReport:
 class Unreadable(Interrupted):
     """An end of the check before its last rule; no filter drops the errors among its findings.
 
-    What was found before, and the facts known by then, are added on the way up (`f_limits.keeping`).
+    Earlier findings, and the facts known by then, are added on the way up (`f_limits.keeping`).
     """
 
     def __init__(self, *findings: Finding) -> None:
@@ -221,7 +222,7 @@ class Unreadable(Interrupted):
 
 
 def ending(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings, the errors among them marked as what ended the check."""
+    """Return the findings, the errors among them marked as the end of the check."""
     return tuple(replace(item, ends=True) if item.severity == "error" else item for item in findings)
 
 
@@ -237,7 +238,7 @@ def with_places(finding: Finding, places: int) -> str:
 
 
 def counted(n: int, one: str, many: str = "") -> str:
-    """Write `1 shell`, `2 shells`; `many` where the plural takes more than an s."""
+    """Write `1 shell`, `2 shells`; `many` if the plural takes more than an s."""
     return f"{n} {one if n == 1 else many or one + 's'}"
 
 

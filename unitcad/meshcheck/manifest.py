@@ -1,4 +1,4 @@
-"""A build's manifest.json against the files beside it: M001 to M005, and which parts are tools (D and S rules)."""
+"""A build's manifest.json against the files of its folder: M001 to M005, and which parts are tools (D and S rules)."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def read(where: str) -> Listing:
 def leads_outside(folder: Path, listed: str) -> bool:
     """Return whether a path of a manifest is absolute, has `..` in it, or leaves the manifest's folder through a link.
 
-    What is absolute or climbs on any system is refused on all of them.
+    Paths that are absolute or climb on any system are refused on all of them.
     """
     windows = PureWindowsPath(listed)
     if windows.drive or windows.root or ".." in windows.parts:
@@ -100,7 +100,7 @@ def _together(old: ListedFile, new: ListedFile) -> ListedFile:
 def work(
     listing: Listing, paths: Sequence[str], options: Choice, printers: Mapping[str, Printer] | None
 ) -> list[tuple[str, Options]]:
-    """Choose what to check: the named files, or all meshes of the manifest; tools with a printer, other parts without.
+    """Choose the files to check: the named ones, or all meshes of the manifest; only tools with a printer.
 
     `options` gives those of a path; `printers`: the known ones by name, None if the caller chose the printer.
     """
@@ -119,7 +119,7 @@ def work(
 
 
 def compare(listing: Listing, report: FileReport, options: Options) -> FileReport:
-    """Return the report with what the manifest adds to it."""
+    """Return the report with the findings of the manifest."""
     part = listing.files.get(os.path.abspath(report.path))
     unlisted = [M004.finding("the manifest does not list this file")]
     findings = unlisted if part is None else check_listed(part, report)
@@ -130,7 +130,7 @@ def compare(listing: Listing, report: FileReport, options: Options) -> FileRepor
 def unchecked(listing: Listing, checked: Sequence[str], options: Choice) -> list[FileReport]:
     """Report the listed files that were not checked (STEP, drawings and others) and are gone or changed: M003, M004.
 
-    One of the manifest itself comes last where it lists paths outside its folder (M005): nothing there is read.
+    One of the manifest itself comes last if it lists paths outside its folder (M005): nothing there is read.
     """
     seen = {os.path.abspath(path) for path in checked}
     left = [files.seen_from(path) for path in listing.files if path not in seen]

@@ -1,4 +1,4 @@
-"""What a file is checked for and against what: the choices of the person who asks."""
+"""Options of a mesh check: the choices of the user."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ class Options:
     """Options of a check: the rules, the output and the printer.
 
     `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all. An error
-    that ended the check of a file (not readable, a limit reached, no mesh) is kept whatever they say.
+    that ended the check of a file (not readable, a limit reached, no mesh) is always kept.
     `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
-    `shells`: the number of shells expected (G005). `cross`: look for self-crossing. `strict`: what is too
-    shallow for a printer is an error all the same. `strict_3mf`: what the 3MF
-    specification forbids and common programs write all the same is an error, not a warning. `unwanted`: prefixes of
-    codes that no select brings back. `locations`: how many are kept of a finding; `draw`: keep meshes with the report.
+    `shells`: the number of shells expected (G005). `cross`: look for self-crossing. `strict`: crossings too shallow for
+    a printer are errors too. `strict_3mf`: content that the 3MF specification forbids and common programs write is an
+    error, not a warning. `unwanted`: prefixes of codes that no select brings back. `locations`: how many are kept of a
+    finding; `draw`: keep meshes with the report.
     """
 
     select: tuple[str, ...] = ()

@@ -23,7 +23,7 @@ from unitcad.text import markdown, printable, xml_attribute, xml_text
 
 
 def write_text(reports: Sequence[FileReport], fail_on: str) -> str:
-    """Return a line a finding, one with the size of each file that passed, how to fix what was found, then a count."""
+    """Return a line a finding, one with the size of each file that passed, how to fix the findings, then a count."""
     lines = []
     codes: set[str] = set()
     for report in reports:
@@ -128,7 +128,7 @@ _MARKS = str.maketrans({mark: f"\\{mark}" for mark in "\\`*_[]|~#$@!"} | {"<": "
 
 
 def write_markdown(reports: Sequence[FileReport], fail_on: str) -> str:
-    """Write how many files failed, a table of all findings, the worst first, and how to fix what was found."""
+    """Write how many files failed, a table of all findings, the worst first, and how to fix them."""
     found = [(report, finding) for report in reports for finding in report.findings]
     found.sort(key=lambda pair: (pair[1].known, -SEVERITIES.index(pair[1].severity)))
     lines = ["## unitcad check", "", f"{summary(reports, fail_on)}."]
@@ -230,7 +230,7 @@ _LEVELS = {"error": "error", "warning": "warning", "info": "note"}
 def sarif_log(reports: Sequence[FileReport]) -> dict[str, Any]:
     """Return one run with every rule and a result a finding. Fingerprints depend on path and rule only.
 
-    What the baseline lists is `unchanged`, and suppressed.
+    Findings of the baseline are `unchanged`, and suppressed.
     """
     index = {code: i for i, code in enumerate(rules())}
     return {
@@ -289,7 +289,7 @@ def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict
 
 
 def _inside(path: str) -> str:
-    """Return the path from the working directory for what lies in it, however it is named; else the path itself."""
+    """Return the path from the working directory for files in it, however they are named; otherwise the path itself."""
     whole, here = os.path.abspath(path), os.getcwd()
     return os.path.relpath(whole, here) if whole.startswith(os.path.join(here, "")) else path
 
@@ -330,7 +330,7 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def _escaped(quoted: bool, match: re.Match[str]) -> str:
-    """Return what UTF-8 cannot hold, such as a byte of a file's name, as \\xe4; `quoted` for JSON's strings."""
+    """Write characters that UTF-8 cannot encode, such as a byte of a file name, as \\xe4; `quoted`: in JSON."""
     code = ord(match.group())
     text = f"\\x{code - 0xDC00:02x}" if 0xDC80 <= code <= 0xDCFF else f"\\u{code:04x}"
     return text.replace("\\", "\\\\") if quoted else text

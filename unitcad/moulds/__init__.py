@@ -1,1 +1,1 @@
-"""Casting moulds: the plan of pours, the tooling, the set that holds them."""
+"""Casting moulds: the plan of pours, the tooling, the set of both."""

@@ -51,7 +51,7 @@ def base(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
 
 
 def stand(spec: Spec, lay: Layout, standing: Sequence[Shape], tools: Sequence[Shape] = ()) -> Shape:
-    """Draw plate and plinth with what stands on them (its foot sunk in) in one piece, with pry slots, less `tools`."""
+    """Draw plate and plinth with the parts on them (feet sunk in) in one piece, with pry slots, less `tools`."""
     top, bottom = plate_top(spec), plate_bottom(spec)
     plate = Extrude(outline(lay.plate, MARK), bottom, top)
     return cut(union((plate, plinth(spec, lay), *standing)), [*(pry_slot(spec, lay, side) for side in (1, -1)), *tools])
@@ -75,7 +75,7 @@ def core(dims: Dimensions) -> Shape:
 
 
 def notch(spec: Spec, dims: Dimensions, exit: Exit, side: int) -> Shape:
-    """Draw what the ledge removes from a core: the tongue's seat and a window's clearance beside it, open upwards."""
+    """Draw what the ledge removes from a core: the tongue's seat and a window's clearance next to it, open upwards."""
     half = exit.width / 2 + spec.moulds.window_clearance_mm
     return strip(dims, side, dims.cavity_radius + BEYOND, half, exit.low, exit.high + BEYOND)
 

@@ -1,4 +1,4 @@
-"""The cavities of a mould: what silicone can reach in each pour, beside what was drawn as the layer."""
+"""The cavities of a mould: the space that silicone can reach in each pour, and the layer as drawn."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ _SAME_MM = 1e-6
 
 
 class Cavity(NamedTuple):
-    """One cell of a pour: the layer as drawn with what stands in sprue and vents, and what silicone can reach there.
+    """One cell of a pour: layer and silicone in sprue and vents, as drawn, and the space that silicone can reach.
 
-    `first` is the place, among all cavities, of the first one in surroundings like this one's; what a check finds there
-    holds here.
+    `first` is the index, among all cavities, of the first one in like surroundings; its findings apply here.
     """
 
     step: Step
@@ -59,8 +58,7 @@ def _alone(step: Step, solids: Mapping[str, Manifold], segments: int, first: int
 def _gang(step: Step, solids: Mapping[str, Manifold], segments: int, cells: Sequence[int], first: int) -> list[Cavity]:
     """Return the cavities of a pour's cells, worked out once for all cells in like surroundings.
 
-    A cell is looked at in a column that is a little larger than what is cast in it; where silicone leaves it, on
-    the whole plate.
+    A cell is examined in a column that is a little larger than its silicone; if silicone leaves it, on the whole plate.
     """
     tools, others = [solids[name] for name in step.tools], _not_tools(step)
     beside = Standing(others)
@@ -96,7 +94,7 @@ def _gang(step: Step, solids: Mapping[str, Manifold], segments: int, cells: Sequ
 
 
 def _not_tools(step: Step) -> list[Shape]:
-    """Return what keeps silicone out beside the tools: cured layers, what is laid in, seals."""
+    """Return the solids that keep silicone out besides the tools: cured layers, inserts, seals."""
     return [*step.earlier, *(body.shape for body in step.inserts), *step.seals]
 
 
@@ -114,8 +112,8 @@ def united(solids: Iterable[Manifold]) -> Manifold:
 def _block_round(solids: Sequence[Manifold], top: float) -> Manifold:
     """Return a block that is larger than the tools and reaches below them, so that a leak joins outside and cavity.
 
-    It ends at the rim plane, where the pour is open and the blade runs, or at the lid's upper face, where sprue and
-    vents open.
+    It ends at the rim plane, at which the pour is open and the blade runs, or at the lid's upper face with sprue and
+    vents.
     """
     boxes = np.array([solid.bounding_box() for solid in solids])
     (x0, y0, z0), (x1, y1) = boxes[:, :3].min(axis=0).tolist(), boxes[:, 3:5].max(axis=0).tolist()
@@ -126,7 +124,7 @@ def _block_round(solids: Sequence[Manifold], top: float) -> Manifold:
 def _one(
     layer: Manifold, channels: Sequence[Manifold], filled: Sequence[Manifold], block: Manifold
 ) -> tuple[Manifold, Manifold]:
-    """Return what is drawn to be cast in a cell, and the part of a block less what is `filled` that holds the layer."""
+    """Return a cell's silicone as drawn, and the part of a block less `filled` that contains the layer."""
     drawn = united([layer, *channels])
     reached = _holding(layer, drawn, Manifold.batch_boolean([block, *filled], OpType.Subtract).decompose())
     if _leaks(drawn, reached):
@@ -143,7 +141,7 @@ def _leaks(drawn: Manifold, reached: Manifold) -> bool:
 
 
 def _holding(layer: Manifold, drawn: Manifold, components: Iterable[Manifold]) -> Manifold:
-    """Return the component that is the layer as drawn with its channels, or holds most of the layer; else nothing."""
+    """Return the component that is the layer and its channels as drawn, or has most of the layer; otherwise nothing."""
     near = [component for component in components if boxes_meet(component, layer)]
     found = next((component for component in near if _alike(component, drawn)), None)
     return found or max(
@@ -152,7 +150,7 @@ def _holding(layer: Manifold, drawn: Manifold, components: Iterable[Manifold]) -
 
 
 def _alike(a: Manifold, b: Manifold) -> bool:
-    """Tell whether volume and bounding box are the same: of the components of a pour one alone can be so."""
+    """Tell whether volume and bounding box are the same: only one component of a pour can be so."""
     if abs(a.volume() - b.volume()) > BALANCE * b.volume():
         return False
     return all(abs(p - q) < _SAME_MM for p, q in zip(a.bounding_box(), b.bounding_box(), strict=True))

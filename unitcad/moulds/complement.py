@@ -1,14 +1,14 @@
-"""Moulds for any cast shape, by complement: what is left of a block round the layers that are cast so far.
+"""Moulds for any cast shape, by complement: the rest of a block round the layers cast so far.
 
-        lug    .---------------------.   rim: the top of what is cast so far
+        lug    .---------------------.   rim: the top of the silicone so far
      ----------'                     |
      | support |   .-------------.   |   cup      not under silicone, and joined to the block's outside
      |         |   |    core     |   |   base     under silicone (core, support), or alone in a hole (post)
     =======================================  seat, z = 0
 
-What is under silicone can't be lifted past it, so it stands on the base; the rest is lifted off upwards. Where cup and
-base slide along each other the cup is cut back by the printer's clearance, and that slit is the pour's seal.
-Balance (C100) holds by construction here and proves nothing: draw, strain, air, opening and printability decide.
+Mould under silicone can't be lifted past it, so it is part of the base; the rest is lifted off upwards. The cup is cut
+back by the printer's clearance from the parts of the base that it slides along, and that slit is the pour's seal.
+Balance (C100) is true by construction here and proves nothing: draw, strain, air, opening and printability decide.
 """
 
 from __future__ import annotations
@@ -50,9 +50,8 @@ MITRE = 3.0
 def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     """Return the moulds of the layers `cast`, in the order of their pours, drawn about the unit's axis.
 
-    Where what the design lays into the mould leads out of the silicone, the base carries it, and the cup has a slot
-    for it, open downwards. Raises Refusal, with the pour and the place, for layers that leave a piece of mould that
-    nothing holds.
+    If inserts of the design lead out of the silicone, the base carries them, and the cup has a slot for them, open
+    downwards. Raises Refusal, with the pour and the place, for layers that leave a loose piece of mould.
     """
     if spec.moulds.pour == "injected":
         raise Refusal("moulds.pour", "injected", "moulds by complement have no lids; they are poured open", "open")
@@ -106,7 +105,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
             for lost in _pieces(Manifold.compose(parted) - realise(cup, segments) - realise(base, segments)):
                 raise _refused(spec, i, f"the base goes all round a piece of the cup, {_place(lost)}")
         cups.append(cup)
-        # Down into the plinth too: where only faces touch, a way of no width could be left.
+        # Down into the plinth too: faces that only touch could leave a passage of no width.
         rest = Cut(blank, tuple(bores))
         sealed.append((Cut(Common((union(holes), rest)), tuple(in_cells([*standing, *there(i)]))),) if holes else ())
     tools = (
@@ -118,7 +117,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
 
 
 def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the rim plane and the bounding radius of what is cast up to each pour, mm."""
+    """Return the rim plane and the bounding radius of the silicone up to each pour, mm."""
     rims: list[float] = []
     radii: list[float] = []
     for i, solid in enumerate(solids):
@@ -126,17 +125,17 @@ def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tupl
             raise _refused(spec, i, "the layer has no volume")
         low, high = bounds(solid)[2], bounds(solid)[5]
         if low < -LEVEL:
-            raise _refused(spec, i, f"the layer reaches {-low:.3g} mm below the skin z = 0, where the seat is")
-        # A circle's polygon has its area, so its corners stand out by that factor.
+            raise _refused(spec, i, f"the layer reaches {-low:.3g} mm below the skin z = 0, the seat of the mould")
+        # A circle's polygon has its area, so its corners are outside by that factor.
         radius = float(np.hypot(*arrays(solid)[0][:, :2].T).max()) / area_true(segments)
-        # Rounded down, so that no film of mould lies over the layer's top.
+        # Rounded down, so that no film of mould is over the layer's top.
         rims.append(max([math.floor(high * GRID_PER_MM + 1e-6) / GRID_PER_MM, *rims]))
         radii.append(max([math.ceil(radius * GRID_PER_MM - 0.01) / GRID_PER_MM, *radii]))
     return tuple(rims), tuple(radii)
 
 
 def _check_opening(spec: Spec, layer: int, solid: Manifold, rim: float) -> None:
-    """Raise Refusal where a layer meets its rim in less than what silicone can be poured through."""
+    """Raise Refusal if a layer's opening at its rim is too small to pour silicone through."""
     width, area = max(regions(solid, rim), default=(0.0, 0.0))
     if area >= LEAST_AREA and width >= LEAST_WIDTH:
         return
@@ -157,9 +156,9 @@ def _standing(
     radius: float,
     segments: int,
 ) -> tuple[list[Shape], float]:
-    """Return the pieces that stand on the base in every pour, sunk into it, and the height of the tallest.
+    """Return the pieces on the base in every pour, sunk into it, and the height of the tallest.
 
-    Raises Refusal for a piece that would hang in the air, and for one that a later layer takes the place of.
+    Raises Refusal for a piece that would hang in the air, and for one in the place of a later layer.
     """
     filled = (*cast, *there(len(cast) - 1))
     under = _without_films(Cut(Below(union(filled), 0.0), filled), segments)
@@ -171,7 +170,7 @@ def _standing(
     edge = radius + BEYOND
     for i, rim in reversed(list(enumerate(rims))):
         if any(bounds(realise(shape, segments))[5] > rim + LEVEL for shape in there(i)):
-            raise _refused(spec, i, f"what is laid in stands out of the rim at z = {rim:.4g} mm")
+            raise _refused(spec, i, f"an insert reaches above the rim at z = {rim:.4g} mm")
         beneath = Below(union((*cast[: i + 1], *there(i))), -BEYOND)
         beside = Cut(box(-edge, edge, -edge, edge, -BEYOND, rim), (beneath,))
         for piece in _pieces(realise(beside, segments)):
@@ -185,29 +184,29 @@ def _standing(
                 held.append(above)
                 standing.append(Component(beside, _inside(piece)))
             elif thick_pieces(above - Manifold.compose(held)):
-                why = f"a piece of {_place(above)} stands alone in layer {i + 1}, and a later layer takes its place"
+                why = f"a loose piece of {_place(above)} is in layer {i + 1}, and a later layer takes its place"
                 raise _refused(spec, i, why)
         needed = realise(Cut(Below(union(cast[: i + 1]), 0.0), tuple(cast[: i + 1])), segments)
         for j in range(i + 1, len(cast)):
             lost = needed ^ solids[j]
             if thick_pieces(lost):
-                why = f"layer {j + 1} lies under layer {i + 1} in a space of {_place(lost)}, where its core would stand"
+                why = f"layer {j + 1} is under layer {i + 1} in a space of {_place(lost)}, in the place of its core"
                 raise _refused(spec, i, why)
     return standing, max([bounds(piece)[5] for piece in held], default=LEVEL)
 
 
 def _pieces(solid: Manifold) -> list[Manifold]:
-    """Return the connected pieces, lowest first, without what facets and rounding leave."""
+    """Return the connected pieces, lowest first, without scraps of facets and rounding."""
     return sorted(thick_pieces(solid), key=bounds)
 
 
 def _stands(piece: Manifold) -> bool:
-    """Tell whether a piece has a foot on the seat that is wider than what facets and rounding leave."""
+    """Tell whether a piece has a foot on the seat that is wider than scraps of facets and rounding."""
     return bool(thick_parts(piece.slice(LEVEL / 2)))
 
 
 def _without_films(shape: Shape, segments: int) -> Shape:
-    """Return a shape whose pieces have no films, which rounding leaves upright between two faces that lie on a plane.
+    """Return a shape whose pieces have no films, which rounding leaves upright between two faces in one plane.
 
     A film has area and no volume, and faces nowhere upwards: none is under the upward faces.
     """
@@ -242,8 +241,9 @@ def _inside(piece: Manifold) -> tuple[float, float, float]:
 
 
 def _slid(spec: Spec, piece: Shape, solid: Manifold, wall: Manifold, rim: float, segments: int) -> Shape:
-    """Return the hole in a cup for a piece of the base: wider by the clearance, and open at the rim where it would
-    leave a skin there that is too thin to print, unless the cup would fall in two.
+    """Return the hole in a cup for a piece of the base, wider by the clearance.
+
+    It is open at the rim if a skin there would be too thin to print, unless the cup would fall in two.
     """
     clearance = spec.moulds.window_clearance_mm
     top, under = bounds(solid)[5], Below(piece, -2 * BEYOND)
@@ -262,8 +262,8 @@ def _grown(piece: Shape, clearance: float, corners: Sequence[tuple[float, float]
     """Return a piece and copies of it: eight moved by `clearance` along the axes and diagonally, one for each corner.
 
     Every upright face moves out by `clearance` or more. So does an upright edge whose faces both look into one
-    quadrant, by a diagonal copy. A vertex of a circle of n sides that lies on an axis moves out by the copy along that
-    axis: `clearance` times the cosine of pi / n, as C210 allows.
+    quadrant, by a diagonal copy. A vertex on an axis, of a circle of n sides, moves out by the copy along that axis:
+    `clearance` times the cosine of pi / n, as C210 allows.
     """
     steps = (-clearance, 0.0, clearance)
     moves = [(x, y) for x in steps for y in steps if x or y]

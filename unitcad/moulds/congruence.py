@@ -1,7 +1,7 @@
-"""Places of a mould that hold the same: what is worked out at one of them holds at all.
+"""Congruent places of a mould: a result at one of them is valid at all.
 
-A place is an upright column. Two places are alike where the drawn shapes reach into them in the same way
-(`shape/column.py`), and where the meshes have the same corners there: a kernel that loses a wedge at one of a hundred
+A place is an upright column. Two places are alike if the drawn shapes reach into them in the same way
+(`shape/column.py`), and if the meshes have the same corners there: a kernel that loses a wedge at one of a hundred
 cells makes that cell one of its own.
 """
 
@@ -22,13 +22,13 @@ _T = TypeVar("_T")
 SAME = 1e-6
 """Distance up to which two corners of meshes are one, mm."""
 MARGIN = 0.2
-"""How much wider than what is looked at a column is, mm: less than the thinnest wall."""
+"""Margin of a column round the examined part, mm: less than the thinnest wall."""
 SLACK = 0.1
 """How much wider than a column's circle its box is taken, mm: the polygon about it reaches beyond it."""
 _DIRECTIONS = np.array([[0.3217, 0.5931, 0.7381], [0.8017, -0.2713, 0.5326]])
 _SIDES = 48
 _FLAT = 1e-8
-"""Least eigenvalue of the sum of n n' over the normals n of a vertex up to which they lie in one plane."""
+"""Largest least eigenvalue of the sum of n n', over the normals n of a vertex, at which they count as in one plane."""
 
 
 def column_round(solids: Sequence[Manifold], margin: float) -> Column:
@@ -43,7 +43,7 @@ def column_round(solids: Sequence[Manifold], margin: float) -> Column:
 
 
 def cropped(solid: Manifold, column: Column) -> Manifold:
-    """Return what of a solid stands in a column, whose round wall is a polygon about it."""
+    """Return the part of a solid in a column, whose round wall is a polygon about it."""
     low, high = max(solid.bounding_box()[2] - 1, column.low), min(solid.bounding_box()[5] + 1, column.high)
     if low >= high:
         return Manifold()
@@ -112,7 +112,7 @@ def _corners(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def once_each(keys: Sequence[int], make: Callable[[int], _T]) -> list[tuple[int, _T]]:
-    """Return for every number the place of the first equal one and what `make` gave there."""
+    """Return for every number the place of the first equal one and the result of `make` there."""
     first: dict[int, tuple[int, _T]] = {}
     for i, key in enumerate(keys):
         if key not in first:

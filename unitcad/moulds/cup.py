@@ -42,19 +42,19 @@ def skirt_end(spec: Spec) -> float:
 
 def recess(spec: Spec, lay: Layout) -> Shape:
     """Draw the cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides, less
-    the ribs that centre the cup, and the slots round the leaves that ribs of resin stand on.
+    the ribs that centre the cup, and the slots round the leaves of ribs of resin.
     """
     room = cut(tapered(lay, spec.moulds.plinth_clearance_mm * SQUARE, skirt_end(spec)), rib_shapes(spec, lay))
     return union((room, *slots)) if (slots := slot_shapes(spec, lay)) else room
 
 
 def grooves(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
-    """Draw the overflow grooves of all cells, neighbours joined where the web between them would be too thin."""
+    """Draw the overflow grooves of all cells, neighbours joined if the web between them would be too thin."""
     return [groove(spec, dims, layer, cell) for cell in lay.cells] + _joints(spec, dims, lay, layer)
 
 
 def _joints(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
-    """Draw what is cut from between neighbours' grooves, as far as the web there is thinner than the least wall.
+    """Draw the webs between neighbours' grooves that are thinner than the least wall.
 
     The pitch is the outermost layer's, whose grooves overlap: those of the layers inside it may just miss each other.
     The circles are polygons within the tolerance, so that is added to the wall on both sides. The lands stay whole.
@@ -76,7 +76,7 @@ def _joints(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape
 
 
 def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
-    """Draw the overflow groove behind the land; it stops over a window where the wall would be too thin."""
+    """Draw the overflow groove behind the land; it stops over a window if the wall would be too thin."""
     moulds, rim, radius = spec.moulds, dims.heights[layer], dims.radii[layer]
     inner = radius + moulds.land_mm
     outer = inner + moulds.groove_width_mm
@@ -111,8 +111,8 @@ def window_section(spec: Spec, exit: Exit, rim: float) -> tuple[float, float, fl
     """Return half width, bottom and top of a window in a cup of that rim, mm.
 
     As the cup is printed, upside down from its rim, bottom and top end whole layers. They keep the clearance to the
-    tongue both as drawn and as the layers make cup, ledge and tongue. Where the wall over or under the window would be
-    thinner than the least wall, the clearance alone is kept.
+    tongue both as drawn and as the layers make cup, ledge and tongue. If the wall over or under the window would be
+    thinner than the least wall, they keep only the clearance.
     """
     moulds, layer = spec.moulds, spec.moulds.layer_mm
     low, high = exit.low - moulds.window_clearance_mm, exit.high + moulds.window_clearance_mm

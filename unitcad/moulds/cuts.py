@@ -1,7 +1,7 @@
-"""Where tools larger than the printer's bed are cut: between features, as few cuts as can be, with room for teeth.
+"""Cuts of tools larger than the printer's bed: between features, as few as possible, with room for teeth.
 
-In a wide gap a seam is straight and its teeth reach to one side. In a narrow one its line keeps the middle, and small
-teeth stand to either side where the features leave room: between four units of a grid, or three of a hexagon.
+In a wide gap a seam is straight and its teeth reach to one side. In a narrow one its line is in the middle, with small
+teeth to either side if the features leave room: between four units of a grid, or three of a hexagon.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ STEP = 0.5
 
 
 class Feature(NamedTuple):
-    """What a cut keeps clear of: a convex polygon by its corners, and all that is nearer to it than `radius` (mm)."""
+    """A region without cuts: a convex polygon by its corners, and its surroundings within `radius` (mm)."""
 
     corners: tuple[Point, ...]
     radius: float = 0.0
 
     @property
     def extent(self) -> Interval:
-        """What it takes along x, mm."""
+        """Its extent along x, mm."""
         return min(x for x, _ in self.corners) - self.radius, max(x for x, _ in self.corners) + self.radius
 
 
 class Place(NamedTuple):
-    """Where a cut may lie: the middle of a gap, and the line of its seam, in the frame of its seam."""
+    """Place of a cut: the middle of a gap, and the line of its seam, in the frame of its seam."""
 
     at: float
     line: tuple[Point, ...]
@@ -59,7 +59,7 @@ class Place(NamedTuple):
 
     @property
     def extent(self) -> Interval:
-        """From where to where its seam may reach, teeth included, mm."""
+        """Lower and upper limit of its seam, teeth included, mm."""
         if self.wide:
             return self.at - LARGE.depth / 2, self.at + LARGE.depth / 2
         return min(x for x, _ in self.line) - SMALL.depth, max(x for x, _ in self.line) + SMALL.depth
@@ -69,8 +69,8 @@ class Place(NamedTuple):
 class Sized:
     """A tool that exceeds the bed along an axis, in the frame of the seams across that axis, mm.
 
-    `ends` of the tool, the `bed`, `teeth`: where along the seams teeth may stand; `features` that teeth keep clear of.
-    `choices` are places for cuts: the later ones are looked at where the earlier ones do not do.
+    `ends` of the tool, the `bed`, `teeth`: places of teeth along the seams; `features` that teeth keep clear of.
+    `choices`: places for cuts; later ones are tried if earlier ones don't fit.
     """
 
     across: Axis
@@ -88,12 +88,12 @@ def seams(
     other: Sequence[Seam] = (),
     fault: Callable[[Sequence[Seam]], str] = lambda found: "",
 ) -> tuple[Seam, ...]:
-    """Return the seams of a tool of which every piece fits the bed, as few as can be, along the axes that it exceeds.
+    """Return the seams of a tool whose pieces all fit the bed, as few as possible, along the axes that it exceeds.
 
-    Among these the longest piece is as short as it can be. Where they can, they lie at none of the seams of the tool
-    under it (`other`): each then holds the other's pieces together, and no seam lies over a seam. Teeth join all
-    pieces, though not each two that share a border. `fault` says what is wrong with seams, "" where nothing is. Raises
-    Refusal for a bed that no such cut makes large enough, with the least that is.
+    Among these the longest piece is as short as it can be. If possible, none is over a seam of the tool under it
+    (`other`): each tool then joins the other's pieces. Teeth join all pieces, though not each two that share a border.
+    `fault` returns the fault of seams, "" if there is none. Raises Refusal for a bed that no such cut makes large
+    enough, with the least that is.
     """
     sized = tuple(tool)
     found = _found(sized, play, other)
@@ -138,7 +138,7 @@ def _found(sized: Sequence[Sized], play: float, other: Sequence[Seam]) -> tuple[
 
 
 def _heights(seam: Seam, others: Iterable[Seam]) -> list[float]:
-    """Return where along a seam those across the other axis cross it, from below, in its frame."""
+    """Return the crossings of a seam with those across the other axis, from below, in its frame."""
     crossing = [other for other in others if other.across != seam.across]
     if seam.across == "x":
         return sorted(other.line[0][0] for other in crossing)
@@ -198,7 +198,7 @@ def toothed(place: Place, sized: Sized, play: float, crossing: Sequence[Seam] = 
 
 
 def _fitting(place: Place, within: Interval, features: Sequence[Feature]) -> list[Tooth]:
-    """Return the teeth of a place's line, clear of the features, in the middle of where they fit."""
+    """Return the teeth of a place's line, clear of the features, in the middle of their room."""
     if place.wide:
         at_pitch = [Tooth((place.line[0][0], y), (0.0, 1.0), 1) for y in evenly(within, LARGE)]
         if all(_clear(tooth, features) for tooth in at_pitch):
@@ -220,11 +220,11 @@ def _fitting(place: Place, within: Interval, features: Sequence[Feature]) -> lis
 def _beside(
     start: Point, end: Point, within: Interval, side: int, size: Dovetail, features: Sequence[Feature]
 ) -> Iterator[Tooth]:
-    """Yield the teeth that fit beside one straight stretch of a line."""
+    """Yield the teeth that fit along one straight stretch of a line."""
     low, high = max(start[1], within[0]), min(end[1], within[1])
     length = math.dist(start, end)
     way = (end[0] - start[0]) / length, (end[1] - start[1]) / length
-    # Round corners of the line stay beside a tooth's foot.
+    # Round corners of the line are off a tooth's foot.
     room = (high - low) / way[1] - size.tip - 2 * BESIDE * (start[0] != end[0])
     if room < 0:
         return
@@ -266,7 +266,7 @@ def _clear(tooth: Tooth, features: Iterable[Feature]) -> bool:
 
 
 def _cuts(sized: Sized, other: Sequence[Seam], useless: set[tuple[Axis, Place]]) -> list[Place] | None:
-    """Return the places of the cuts across one axis; None where none give pieces that fit."""
+    """Return the places of the cuts across one axis; None if none give pieces that fit."""
     taken = {seam.at for seam in other if seam.across == sized.across}
     for choice in sized.choices:
         places = sorted(place for place in choice if (sized.across, place) not in useless)
@@ -290,7 +290,7 @@ def _fewest(sized: Sized, places: Sequence[Place]) -> list[Place] | None:
 
 
 def _reaching(sized: Sized, places: Sequence[Place], most: float) -> list[Place] | None:
-    """Return cuts from below on, each as far as a piece of length `most` reaches; None where one would be longer."""
+    """Return cuts from below on, each as far as a piece of length `most` reaches; None if one would be longer."""
     chosen: list[Place] = []
     start, reached = sized.ends[0], -math.inf
     while sized.ends[1] - start > most + 1e-9:

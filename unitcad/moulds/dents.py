@@ -25,7 +25,7 @@ def deepest(spec: Spec, layer: int) -> float:
 
 
 def under_tongue(dims: Dimensions, exit: Exit, layer: int) -> float:
-    """Return the depth of the air that stays under a tongue where it meets the bore, the mould tilted towards it, mm.
+    """Return the depth of the air trapped under a tongue at the bore, the mould tilted towards it, mm.
 
     The tongue's flat underside is a ceiling; its highest point is on the bore at r, and the way out leads round to the
     tongue's edge, half a width h aside: lower by (r - sqrt(r^2 - h^2)) sin(tilt).
@@ -42,7 +42,7 @@ def widest_tongue(spec: Spec, dims: Dimensions, layer: int) -> float:
 
 
 def check_tongue(spec: Spec, dims: Dimensions) -> None:
-    """Raise Refusal where a tongue is too wide for the air under it to get out."""
+    """Raise Refusal if a tongue is too wide for the air under it to get out."""
     widths = [widest_tongue(spec, dims, layer) for layer in range(len(spec.layers))]
     if not dims.exit or dims.exit.width <= min(widths) + EPS:
         return

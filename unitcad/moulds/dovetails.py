@@ -10,8 +10,8 @@ r"""Tools larger than the printer's bed: cut at dovetails, whose pieces slide to
     ------------'  '-------------
 
 Either side of the line is moved square to itself by half the play, so that the gap is the play everywhere, along the
-flanks too. A seam goes from edge to edge. Where seams across x and across y cross, both run straight: the corners of
-the four pieces are whole, and no tooth is cut.
+flanks too. A seam goes from edge to edge. Seams across x and across y cross on straight stretches: the corners of the
+four pieces are whole, and no tooth is cut.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ ROUND = 0.8
 """Radius of the line's corners, mm: a nozzle follows it, and the gap stays the play round them."""
 TOOTH_PITCH = 14.0
 FAR = 1000.0
-"""Where lines begin and end, beyond every tool, mm."""
+"""Begin and end of lines, beyond every tool, mm."""
 Interval = tuple[float, float]
 Axis = Literal["x", "y"]
 
@@ -51,7 +51,7 @@ class Dovetail:
 
 
 LARGE, SMALL = Dovetail(3.5, 5.0), Dovetail(2.5, 4.0)
-"""SMALL is for what units that stand close leave between them."""
+"""SMALL is for narrow gaps between units."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,8 @@ class Tooth:
 class Seam:
     """A cut across x or y: `at` there, and the gap between the pieces (mm).
 
-    `line` goes from far below to far above, `teeth` stand on it, in the frame of the tools; across y in that frame
-    turned by a quarter, (y, -x): there too the seam goes from below to above.
+    `line` goes from far below to far above, `teeth` are on it, in the frame of the tools; for a seam across y that
+    frame is turned by a quarter, (y, -x): there too the seam goes from below to above.
     """
 
     at: float
@@ -101,7 +101,7 @@ class Seam:
 
     @property
     def extent(self) -> Interval:
-        """From where to where it reaches along the axis that it is across, mm."""
+        """Its lower and upper end along the axis that it is across, mm."""
         reached = [x for x, _ in (*self.line, *self.corners)]
         return min(reached), max(reached)
 
@@ -134,7 +134,7 @@ class Split:
 
     @property
     def crossings(self) -> tuple[Point, ...]:
-        """Where four pieces meet."""
+        """The meeting point of four pieces."""
         over = [seam.line[0][0] for seam in self.seams if seam.across == "y"]
         return tuple((at(seam.line, y), y) for seam in self.seams if seam.across == "x" for y in over)
 
@@ -157,14 +157,14 @@ def split(tool: Body, seams: Sequence[Seam]) -> Split:
 def straight(
     where: float, stretches: Sequence[Interval], play: float, across: Axis = "x", size: Dovetail = LARGE
 ) -> Seam:
-    """Return a straight seam whose teeth, all to one side, have their middle at `where` and stand in `stretches`."""
+    """Return a straight seam whose teeth, all to one side, have their middle at `where` and are within `stretches`."""
     x = where - size.depth / 2
     teeth = tuple(Tooth((x, y), (0.0, 1.0), 1, size) for ends in stretches for y in evenly(ends, size))
     return Seam(where, ((x, -FAR), (x, FAR)), teeth, play, across)
 
 
 def evenly(within: Interval, size: Dovetail) -> list[float]:
-    """Return the middles of as many teeth as stand within an interval at their pitch; none where there is no room."""
+    """Return the middles of as many teeth as fit an interval at their pitch; none without room."""
     middle, width = sum(within) / 2, within[1] - within[0]
     if width < size.tip - 1e-9:
         return []
@@ -213,7 +213,7 @@ def _between(left: Seam | None, right: Seam | None) -> Shape:
     """Draw the region between two seams; without one it reaches far out."""
     up = right.side(-1) if right else ((FAR, -FAR, 0.0), (FAR, FAR, 0.0))
     down = left.side(1) if left else ((-FAR, -FAR, 0.0), (-FAR, FAR, 0.0))
-    # Walked the other way, an arc's bulge stands at its other end and turns to the other side.
+    # Walked the other way, an arc's bulge is at its other end and turns to the other side.
     bulges = [-bulge for _, _, bulge in down[:-1]]
     back = [(x, y, bulge) for (x, y, _), bulge in zip(reversed(down), [*reversed(bulges), 0.0], strict=True)]
     return Extrude(Profile((*up, *back)), -FAR, FAR)

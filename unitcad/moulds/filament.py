@@ -1,7 +1,7 @@
 """The stub of printer filament that lets air under a unit, and its way through core and plate.
 
-It stands in a hole through the core, flush with its top, and is bent below into a groove under the plate: it lies on
-the bench, so it can't sink while the pour stands on it.
+It fills a hole through the core, flush with its top, and is bent below into a groove under the plate: it rests on the
+bench, so it can't sink under the weight of the pour.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from unitcad.spec import Spec
 FLARE = 1.0
 """Of the filament hole's lower end: the filament bends round it."""
 STUB_TAIL = 8.0
-"""How far the bent end stands out of the plate, mm: what one pulls."""
+"""Length of the bent end outside the plate, mm: the end to pull."""
 BITE = 1 / 16
 """How far the seal reaches into filament and core, mm."""
 _QUARTER = math.tan(math.pi / 8)
@@ -28,7 +28,7 @@ def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) ->
     """Draw the hole through a core, flared below, and the groove under the plate (whose lower face is z = `bottom`)."""
     radius, depth = spec.moulds.filament_hole_mm / 2, filament_groove(spec)
     roof, layer = bottom + depth, spec.moulds.layer_mm
-    below = roof - math.ceil(BEYOND / 2 / layer - 1e-6) * layer  # the floor beside the groove ends a whole layer
+    below = roof - math.ceil(BEYOND / 2 / layer - 1e-6) * layer  # the floor next to the groove ends a whole layer
     hole = Revolve(
         polygon(
             (0, below),
@@ -44,7 +44,7 @@ def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) ->
 
 
 def groove(spec: Spec, lay: Layout, cell: Cell) -> tuple[float, float, float, float]:
-    """Return what the groove takes of the plate's lower face: x0, y0, x1, y1 (mm)."""
+    """Return the groove's rectangle in the plate's lower face: x0, y0, x1, y1 (mm)."""
     half, up = filament_groove(spec) / 2, spec.moulds.filament_hole_mm / 2 + FLARE
     return cell.x - half, cell.y - _length(spec, lay, cell), cell.x + half, cell.y + up
 
@@ -76,7 +76,7 @@ def _meets_edge(lay: Layout, cell: Cell) -> bool:
 
 
 def _length(spec: Spec, lay: Layout, cell: Cell) -> float:
-    """Return the groove's length: to beyond the plate's edge at -y, or, behind another cell, what the pitch allows."""
+    """Return the groove's length: to beyond the plate's edge at -y, or as the pitch allows behind another cell."""
     if _meets_edge(lay, cell):
         return cell.y + lay.plate[1] + BEYOND
     return lay.pitch - spec.moulds.filament_hole_mm / 2 - FLARE - 2 * spec.moulds.least_wall_mm

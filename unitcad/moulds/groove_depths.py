@@ -9,7 +9,7 @@ from unitcad.text import listed, number
 
 
 def shallow_grooves(moulds: MouldSet) -> list[str]:
-    """Return a sentence where an asked depth, larger than the printer's own, is cut down to half a rim; else []."""
+    """Return a sentence if the spec's depth, larger than the printer's own, is cut down to half a rim; otherwise []."""
     spec = moulds.spec
     asked = spec.moulds.groove_depth_mm
     if asked <= float(printers(spec.printers)[spec.moulds.printer].groove_depth_mm):

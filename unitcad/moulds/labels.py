@@ -14,7 +14,7 @@ from unitcad.spec import Spec
 
 
 def set_label(shapes: Iterable[Shape]) -> str:
-    """Return four characters that tell a set, from the hash of its shapes as they are before a label is on them.
+    """Return four characters that identify a set, from the hash of its shapes before a label is on them.
 
     Without B and C, which stand for base and cup: "C1" is a cup's mark on every piece. Without D, whose bars are those
     of a small letter: a text shows the label as it is engraved.

@@ -1,4 +1,4 @@
-"""Where the cells of a mould lie and how large its plates are (mm, as assembled, z = 0 at the seat)."""
+"""Places of a mould's cells and sizes of its plates (mm, as assembled, z = 0 at the seat)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOST_CELLS = 255
 def layout(spec: Spec, dims: Dimensions) -> Layout:
     """Return the layout of a spec's moulds; "fill" is as many cavities as the bed takes.
 
-    Raises Refusal where a plate or a piece's height exceeds the bed, or a tail reaches no edge.
+    Raises Refusal if a plate or a piece's height exceeds the bed, or a tail reaches no edge.
     """
     most = most_columns(dims)
     if spec.moulds.cavities == "fill":
@@ -100,7 +100,7 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
     foot = plinth[0] + splay, plinth[1] + splay
     skirt = moulds.plinth_clearance_mm + moulds.skirt_wall_mm
     corner = _corner_for_label(reach + _off_groove(spec, dims), text_width("00", stroke), label)
-    # The numbers of the last column and row lie outside its bores too, and behind the cut corner.
+    # The numbers of the last column and row are outside its bores too, and behind the cut corner.
     beside = [pitch / 2 + size + MARK / 2 + 0.1 if digits else 0.0 for size in number]
     cup = max(foot[0] + skirt, half[0] + max(corner, beside[0])), max(foot[1] + skirt, half[1] + max(corner, beside[1]))
     margin = label + 2 * _LABEL_GAP
@@ -119,12 +119,12 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
 
 
 def _sides(dims: Dimensions, column: int, columns: int) -> tuple[int, ...]:
-    """Return where a cell's tails leave: of two columns with one tail each, the left one's leaves to the left."""
+    """Return the exits of a cell's tails: in two columns with one tail each, the left one's leaves to the left."""
     return (-1,) if dims.sides == (1,) and columns == 2 and column == 0 else dims.sides
 
 
 def _off_groove(spec: Spec, dims: Dimensions) -> float:
-    """Return how far a corner's label stands off the groove, mm: letters as deep as a low rim's groove leave a wall."""
+    """Return a corner label's distance from the groove, mm: letters as deep as a low rim's groove leave a wall."""
     lengths = spec.moulds
     deep = any(groove_depth_of(spec, rim) <= lengths.engraving_depth_mm + EPS for rim in dims.heights)
     return max(_LABEL_GAP, lengths.least_wall_mm) if deep else _LABEL_GAP
@@ -137,7 +137,7 @@ def groove_depth_of(spec: Spec, rim: float) -> float:
 
 
 def _corner_for_label(radius: float, width: float, height: float) -> float:
-    """Return the least half side of a square about a cell whose corner holds a label outside `radius`."""
+    """Return the least half side of a square about a cell whose corner has room for a label outside `radius`."""
     half = radius / math.sqrt(2)
     while math.hypot(max(half - TEXT_MARGIN - width, 0), max(half - TEXT_MARGIN - height, 0)) < radius:
         half += 1 / 64

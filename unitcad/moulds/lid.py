@@ -5,7 +5,7 @@
     '-.  .----'-'-----'-'-----.  .-'   z = rim
       |  |       cavity       |  |   skirt round the cup, above the windows
 
-Over a ring, whose width no syringe's tip fits, the sprue narrows to a gate and stands in the place of the first vent.
+Over a ring, whose width no syringe's tip fits, the sprue narrows to a gate and replaces the first vent.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from unitcad.spec import Spec
 
 THICKNESS, SKIRT, SKIRT_WALL, SKIRT_OFF_WINDOW = 3.0, 1.5, 1.6, 0.2
 VENT, LEAST_VENT = 1.0, 0.8
-"""Diameter of a vent, mm, and what it may come down to over a narrow ring."""
+"""Diameter of a vent, mm, and its least value over a narrow ring."""
 VENT_COUNTS = tuple(range(4, 65, 4))
 """Multiples of four: the tilts of C400 then fall halfway between two vents, the worst case."""
 SPRUE_OFF_VENT = 0.1
 """Wall between sprue and vents at the lid's upper face, at least, mm."""
 GATE = 0.8
-"""Diameter of what opens into a ring, over the ring's width."""
+"""Diameter of an opening into a ring, over the ring's width."""
 
 
 def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
@@ -52,7 +52,7 @@ def skirt_end(spec: Spec, dims: Dimensions, layer: int) -> float:
 
 
 def lid_top(dims: Dimensions, layer: int) -> float:
-    """Return z of the lid's upper face, where sprue and vents are open."""
+    """Return z of the lid's upper face, at which sprue and vents are open."""
     return dims.heights[layer] + THICKNESS
 
 
@@ -91,7 +91,7 @@ def _check_sprue(spec: Spec, dims: Dimensions, layer: int, count: int) -> None:
 
 
 def vent_diameter(dims: Dimensions, layer: int) -> float:
-    """Return the diameter of each vent, mm: 1, or what a narrow ring leaves."""
+    """Return the diameter of each vent, mm: 1, or less over a narrow ring."""
     inner, outer = _ceiling(dims, layer)
     return min(VENT, GATE * (outer - inner)) if inner else VENT
 
@@ -104,7 +104,7 @@ def vents(spec: Spec, dims: Dimensions, layer: int) -> int:
     inner, outer = _ceiling(dims, layer)
     width = GATE * (outer - inner)
     if _at_the_rim(dims, layer):
-        # The tongue parts the ring: air would stay beside it, whatever the number of vents.
+        # The tongue parts the ring: air would be trapped next to it, whatever the number of vents.
         raise Refusal("moulds.pour", "injected", "wires that leave at the rim need an open pour", "open")
     if inner and width < LEAST_VENT - 1e-9:
         raise Refusal(

@@ -23,9 +23,9 @@ from unitcad.shape import Shape
 from unitcad.shape.body import Body
 from unitcad.shape.profile import FACETS
 from unitcad.spec import Spec, from_json, to_json, with_formats
-from unitcad.spec.asked import CastingTable
 from unitcad.spec.custom_code import is_body_file
-from unitcad.spec.effective import Estimate
+from unitcad.spec.raw import CastingTable
+from unitcad.spec.resolved import Estimate
 
 _T = TypeVar("_T")
 
@@ -53,12 +53,12 @@ def _drawn(geometry: str) -> Plan:
 
 @lru_cache(maxsize=32)
 def _kept(geometry: str) -> dict[str, Any]:
-    """Return what is kept of a geometry for the next set of it, by name."""
+    """Return the cache of a geometry for the next set of it, by name."""
     return {}
 
 
 def forget() -> None:
-    """Drop plans, meshes and all else that is kept for the next call: what a measurement of times needs."""
+    """Drop cached plans, meshes and other results, as a measurement of times needs."""
 
     _drawn.cache_clear()
     _kept.cache_clear()
@@ -69,7 +69,7 @@ def forget() -> None:
 class MouldSet:
     """A spec's unit and moulds. Lengths in mm, as assembled, z = 0 at the skin.
 
-    `altered` stands in for the plan that the spec's own would be: a set with a fault, for tests.
+    `altered` replaces the spec's own plan: a set with a fault, for tests.
     """
 
     spec: Spec
@@ -95,7 +95,7 @@ class MouldSet:
 
     @cached_property
     def geometry(self) -> str:
-        """What the geometry reads, as JSON: the spec without formats and without what is no shape."""
+        """Inputs of the geometry, as JSON: the spec without formats and other keys that change no shape."""
         return to_json(with_formats(self.spec)) if self.blank is self else self.blank.geometry
 
     @cached_property
@@ -105,27 +105,27 @@ class MouldSet:
 
     @cached_property
     def laid_later(self) -> tuple[Body, ...]:
-        """What goes into the silicone after casting, where `unit` is the silicone alone."""
+        """Bodies that go into the silicone after casting, if `unit` is only the silicone."""
         return ()
 
     @cached_property
     def pushed_in(self) -> tuple[Body, ...]:
-        """What is pushed into the cast sheet from its side towards the skin, each body's name after its place's."""
+        """Bodies pushed into the cast sheet from its side towards the skin, each body's name after its place's."""
         return ()
 
     @cached_property
     def together(self) -> tuple[tuple[str, tuple[Shape, ...]], ...]:
-        """What shares the space of the finished unit, by name: its bodies, and what goes in after casting."""
+        """All solids of the finished unit, by name: its bodies, and those that go in after casting."""
         return tuple((body.name, (body.shape,)) for body in (*self.unit, *self.laid_later))
 
     @property
     def cast_flat(self) -> MouldSet | None:
-        """The set of the inner layers alone, where these are cast flat and laid into the last pour; else None."""
+        """The set of only the inner layers, if these are cast flat and laid into the last pour; otherwise None."""
         return None
 
     @cached_property
     def plan(self) -> Plan:
-        """Tools and pours. Raises Refusal where the moulds can't be made."""
+        """Tools and pours. Raises Refusal if the moulds can't be made."""
         if self.altered:
             return self.altered
         drawn = _drawn(self.geometry)
@@ -140,7 +140,7 @@ class MouldSet:
 
     @property
     def facets(self) -> float:
-        """How far this set's facets may lie from what they stand for, mm: 0 if no body is from a file."""
+        """Largest distance of this set's facets from the true surface, mm: 0 if no body is from a file."""
         if not is_body_file(self.spec.design):
             return 0.0
         from unitcad.kernels.bounds import deviation
@@ -160,12 +160,12 @@ class MouldSet:
 
     @property
     def makes(self) -> str:
-        """What comes out of the mould."""
+        """The product of the mould."""
         return "unit"
 
     @property
     def across(self) -> str:
-        """What to measure across, where the tooling is not concentric."""
+        """The part to measure across, if the tooling is not concentric."""
         return f"Farthest corner from the motor's axis: {self.plan.dimensions.outer_radius:.2f} mm."
 
     @property
@@ -175,7 +175,7 @@ class MouldSet:
 
     @property
     def assembly(self) -> tuple[Fitting, ...]:
-        """How motor and circuit go into the body, or into the mould, in the design's words; () where it has none."""
+        """How motor and circuit go into the body, or into the mould, in the design's words; () if it has none."""
         said = self.design.assembly(self.spec, self.plan.dimensions)
         return tuple(each if isinstance(each, Fitting) else Fitting(each) for each in said)
 
@@ -188,18 +188,18 @@ class MouldSet:
 
     @property
     def poured_across(self) -> tuple[str, float]:
-        """The widest surface that lies open in a pour: what it is, and how wide, mm."""
+        """The widest open surface of a pour: its name, and its width, mm."""
         return "cavity", 2 * self.dimensions.outer_radius
 
     def greased(self, step: Step) -> str:
-        """Return what gets petroleum jelly before the cup of a pour is put on; "" where nothing does.
+        """Return the faces that get petroleum jelly before the cup of a pour is put on; "" for none.
 
-        A seal beside what a tongue passes through is greased with the tongue.
+        A seal next to a tongue's passage is greased with the tongue.
         """
         if self.plan.concentric or not step.seals:
             return ""
         return (
-            f"the upright faces of what stands on the base, only there where cup {step.index} has a slot for it, "
+            f"the upright faces of the parts on the base, only inside the slots of cup {step.index} for them, "
             "outside the cavity"
         )
 
@@ -218,7 +218,7 @@ class MouldSet:
 
     @cached_property
     def surroundings(self) -> tuple[Surroundings, ...]:
-        """What stands round each place, by the pours in their order; the same of pours that leave all where it is."""
+        """Surroundings of each place, by the pours in their order; the same object for pours that move nothing."""
 
         return surroundings(self.plan, self.solids, rib_spaces(self.spec, self.plan.layout), self.segments)
 
@@ -235,7 +235,7 @@ class MouldSet:
 
     @cached_property
     def pressed(self) -> dict[str, Manifold]:
-        """The tools by name as they stand in a pour: where a cup's rib reaches into the base, it is crushed."""
+        """The tools by name as assembled in a pour: a cup's rib that reaches into the base is crushed."""
         tools = {tool.name: self.solids[tool.name] for tool in self.plan.tools}
         if not self.crushing.is_empty():
             tools |= {step.cup: tools[step.cup] - self.crushing for step in self.plan.steps}
@@ -243,7 +243,7 @@ class MouldSet:
 
     @cached_property
     def crushing(self) -> Manifold:
-        """What of the base stands where ribs reach into it; empty without ribs."""
+        """The parts of the base that ribs reach into; empty without ribs."""
         return self.solids["base"] ^ self.rib_spaces
 
     @cached_property
@@ -253,13 +253,13 @@ class MouldSet:
         return cavities(self.plan, self.solids, self.segments, self.cells)
 
     def once(self, name: str, make: Callable[[], _T]) -> _T:
-        """Return what `make` gives, worked out once for this set under `name`."""
+        """Return the result of `make`, computed once for this set under `name`."""
         if name not in self._kept:
             self._kept[name] = make()
         return self._kept[name]
 
     def once_a_geometry(self, name: str, make: Callable[[MouldSet], _T]) -> _T:
-        """Return what `make` gives of the blank set, worked out once under `name` for all sets of one geometry."""
+        """Return the result of `make` of the blank set, computed once under `name` for all sets of one geometry."""
         if self.altered:
             return self.once(name, lambda: make(self.blank))
         kept = _kept(self.geometry)

@@ -54,7 +54,10 @@ def tray_piece(shape: Shape) -> Body:
 
 
 def blade_piece(shape: Shape, *, too_long: bool = False) -> Body:
-    """Return the blade, printed upside down; it stands in no pour. One that no bed takes is cut: it has no joint."""
+    """Return the blade, printed upside down; it is part of no pour.
+
+    One too long for the bed is cut, without a joint.
+    """
     return Body("blade", "tool", "blade", shape, _BLADE, made="cut" if too_long else "printed", upside_down=True)
 
 

@@ -1,4 +1,4 @@
-r"""Pins on a base and blind holes in its cups: what centres cups that are too large for a skirt.
+r"""Pins on a base and blind holes in its cups: they centre cups that are too large for a skirt.
 
           .----------------- cup -----.
           |    .--------.   blind hole, wider by the clearance and deeper by its relief

@@ -24,16 +24,16 @@ from unitcad.text import spaced
 
 @dataclass(frozen=True)
 class Step:
-    """One pour: the layer it casts, the tools that stand around it (by name), and what is there already.
+    """One pour: the layer it casts, the tools around it (by name), and the solids that are there already.
 
-    `layer` is the cast layer in the frame of the tools, one solid a cell; `earlier` the cured ones, where they were
-    cast or, taken out since, where they are laid in; `seals` what silicone is kept from though no tool fills it;
+    `layer` is the cast layer in the frame of the tools, one solid a cell; `earlier` the cured ones, in their places of
+    casting or, if taken out since, of laying in; `seals` space without tool that silicone is kept from;
     `channels` the silicone in sprue and vents, as many a cell.
-    `inserts` are motor and circuit where they are laid in before this pour, or lie there already: of all cells.
-    `rim` is z of the plane that the blade runs on, `top` where the silicone is open: the rim or the lid's upper face.
+    `inserts` are motor and circuit of all cells, if they are laid in before this pour or an earlier one. `rim` is z of
+    the plane that the blade runs on, `top` that of the silicone's open surface: the rim or the lid's upper face.
     `windows` counts the cup's passages for tongues that are closed all round; `groove`: it has an overflow groove.
-    `pins` centre the pour's lid on its base, where no cup does.
-    `removals` are what is taken away once the layer has cured, in that order; what is left stands in the next pour.
+    `pins` centre the pour's lid on its base, if no cup does.
+    `removals` are the pieces taken away once the layer has cured, in that order; the others are part of the next pour.
     """
 
     index: int
@@ -70,11 +70,11 @@ class Step:
 class Plan:
     """All tools as assembled, the pours in their order, and the four characters that their labels end in.
 
-    `dimensions` are those that the tools were drawn to; `concentric`: they tell every hole and gap in the tools.
+    `dimensions` are those that the tools were drawn to; `concentric`: they define every hole and gap in the tools.
     `pins` centre the cups on the base in place of plinth and skirt; `pry_slots` of that base: the number of the piece
     that has it (1 of a whole base), its side (left, right, front, back) and its middle along that side, mm. `genus`:
-    the through holes of a tool, by its name, where neither is told by dimensions of rings.
-    `stretches`: where the silicone stretches after casting, and by how many percent, beside what the tools ask for.
+    the through holes of a tool, by its name, if dimensions of rings don't define them.
+    `stretches`: parts of the silicone that stretch after casting, and by how many percent, besides those of the tools.
     `splits`: the tools that are printed in pieces; everything but the pieces' files and C250 sees them joined.
     """
 
@@ -104,7 +104,7 @@ class Plan:
         return tuple(piece for tool in self.tools for piece in self.pieces_of(tool.name))
 
     def pieces_of(self, name: str) -> tuple[Body, ...]:
-        """Return the pieces of a tool by its name: itself where it is not split. Raises KeyError."""
+        """Return the pieces of a tool by its name: itself if it is not split. Raises KeyError."""
         return next((split.pieces for split in self.splits if split.tool == name), None) or (self.tool(name),)
 
     def called(self, name: str) -> str:
@@ -120,7 +120,7 @@ class Plan:
         return (self.standing(step, "cup") or self.standing(step, "base"))[0].name
 
     def base_of(self, step: Step) -> str:
-        """Return the name of the base that a pour stands on."""
+        """Return the name of a pour's base."""
         return self.standing(step, "base")[0].name
 
     def of_kind(self, kind: Kind) -> tuple[Body, ...]:
@@ -128,20 +128,20 @@ class Plan:
         return tuple(tool for tool in self.tools if tool.kind == kind)
 
     def standing(self, step: Step, kind: Kind) -> tuple[Body, ...]:
-        """Return the tools of a kind that stand in a pour."""
+        """Return the tools of a kind in a pour."""
         return tuple(tool for tool in self.of_kind(kind) if tool.name in step.tools)
 
 
 def plan(spec: Spec) -> Plan:
-    """Return the plan of a spec: the tooling that its design asks for, labelled, and the pours.
+    """Return the plan of a spec: the tooling of its design, labelled, and the pours.
 
-    Raises Refusal where the moulds can't be made: beyond the bed, a tail that reaches no edge, a lid whose vents or a
-    tongue whose width can't clear the air, a piece that nothing holds.
+    Raises Refusal if the moulds can't be made: beyond the bed, a tail that reaches no edge, a lid whose vents or a
+    tongue whose width can't clear the air, a loose piece.
     """
     layers = cast_layers(spec)
     made = _tooling(spec, layers)
     dims, lay = made.dimensions, made.layout
-    # Material variants share pieces: the label is of geometry alone.
+    # Material variants share pieces: the label depends only on geometry.
     label = set_label((*(tool.shape for tool in made.tools), *layers))
     tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in made.tools)
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
@@ -177,7 +177,7 @@ def plan(spec: Spec) -> Plan:
 def _tooling(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     """Return the tooling of the cast layers, by the way that the design names or by a function of its own.
 
-    Raises UnitcadError where a function's tooling lacks a piece, and Refusal for a pour that the tooling can't take.
+    Raises UnitcadError if a function's tooling lacks a piece, and Refusal for a pour that the tooling can't take.
     """
     way = design_of(spec).tooling
     if way == "concentric":
@@ -201,7 +201,7 @@ def _tooling(spec: Spec, cast: Sequence[Shape]) -> Tooling:
 def cast_layers(spec: Spec) -> tuple[Shape, ...]:
     """Return the shapes of a unit's cast layers in the order of their pours.
 
-    Raises Refusal where the design draws others than the spec has layers for.
+    Raises Refusal if the design draws others than the spec has layers for.
     """
     bodies = sorted((body for body in unit_bodies(spec) if body.kind == "layer"), key=lambda body: body.step or 0)
     if len(bodies) != len(spec.layers):
@@ -212,7 +212,7 @@ def cast_layers(spec: Spec) -> tuple[Shape, ...]:
 
 
 def placed(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
-    """Return a unit's solid in its cell: turned by half where the cell's one tail leaves to -x."""
+    """Return a unit's solid in its cell: turned by half if the cell's one tail leaves to -x."""
     return moved(turned(shape, "z", 2 if cell.sides == (-1,) and dims.sides == (1,) else 0), cell.x, cell.y)
 
 

@@ -11,7 +11,7 @@ LEAST_AREA = 2.0
 LEAST_WIDTH = 0.4
 """Of that opening, and of a vent, mm (assumed): less than the thinnest wall that a spec may have."""
 _UNDER = 1 / 4096
-"""How far under the plane of the opening the section lies, mm."""
+"""Depth of the section under the plane of the opening, mm."""
 
 
 def regions(cavity: Manifold, top: float) -> list[tuple[float, float]]:

@@ -1,4 +1,4 @@
-"""What is taken away after a pour: a piece and its way. A step's removals stand in their order."""
+"""A removal after a pour: a piece and its direction. A step's removals are in their order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""Ribs: what centres a cup on its plinth. Two stand on each face of its recess, level with those opposite.
+r"""Ribs centre a cup on its plinth. Each face of its recess has two, level with those opposite.
 
       plan, from above                  section of a rib
     .--v-----------v--.                      seat
@@ -10,11 +10,11 @@ r"""Ribs: what centres a cup on its plinth. Two stand on each face of its recess
     '--^-----------^--'              |  /    <- lead-in, down to the skirt's end
 
 The plinth is tapered, so a rib meets it only when the cup is nearly down, along its whole crest at once. Opposite ribs
-are crushed alike, which leaves the cup in the middle; pairs hold it against turning too. They stand as far from the
-axes as the cut corner lets them: for leverage, and clear of tails, which leave along x.
+are crushed alike, which leaves the cup in the middle; pairs hold it against turning too. They are as far from the axes
+as the cut corner permits: for leverage, and clear of tails, which leave along x.
 
-Ribs of resin would chip. Each stands low on a leaf of the skirt, which a slot from below frees behind and on both
-sides; the leaf bends, and nothing is crushed:
+Ribs of resin would chip. Each is low on a leaf of the skirt, which a slot from below frees behind and on both sides;
+the leaf bends, and nothing is crushed:
 
       plan of a face, from above
     ----.  .---.  .----
@@ -39,11 +39,11 @@ from unitcad.shape.profile import mm
 from unitcad.spec import Spec, printer_of
 
 ROOF = 1.5
-"""Height of a crest's upper ramp over what it juts out: steep enough to be printed, upside down, without support."""
+"""Height of a crest's upper ramp over its overhang: steep enough to be printed, upside down, without support."""
 ROOT = 0.5
 """How deep a rib's drawing reaches into the wall behind it, mm; half a thinner wall."""
 AROUND = 0.05
-"""How far the box round a rib stands off it, mm."""
+"""Margin of the box round a rib, mm."""
 SLOPE = math.tan(math.radians(PLINTH_DRAFT_DEG))
 SQUARE = 1 / math.cos(math.radians(PLINTH_DRAFT_DEG))
 """A length square to the plinth's faces, measured level, over itself."""
@@ -51,7 +51,7 @@ SQUARE = 1 / math.cos(math.radians(PLINTH_DRAFT_DEG))
 
 @dataclass(frozen=True)
 class Rib:
-    """A rib: where it stands on the plinth's upper edge (x, y, mm), and the way it points, inwards.
+    """A rib: its place on the plinth's upper edge (x, y, mm), and its direction, inwards.
 
     `bottom` and `top` are those of the crest, `foot` and `head` of the whole rib (z, mm).
     """
@@ -66,7 +66,7 @@ class Rib:
 
 
 def ribs(spec: Spec, lay: Layout) -> tuple[Rib, ...]:
-    """Return the ribs of every cup of a set; () where the spec asks for none, or the plinth's faces are too short."""
+    """Return the ribs of every cup of a set; () if the spec sets none, or the plinth's faces are too short."""
     moulds = spec.moulds
     crest = float(printer_of(spec).least_feature_mm)
     end = -moulds.plinth_height_mm + moulds.seat_relief_mm
@@ -87,8 +87,8 @@ def placed(
 ) -> tuple[Rib, ...]:
     """Return the ribs round a plinth of half sizes `half` at z = 0 whose cup's skirt ends at z = `end`, mm.
 
-    `corner` is how much of a face a corner takes; () where the corners leave no room. `leaf`: the thickness of what
-    carries a rib, 0 for the wall itself.
+    `corner` is the length of a face that a corner takes; () if the corners leave no room. `leaf`: the thickness of the
+    leaf under a rib, 0 for the wall itself.
     """
     proud, skirt = (clearance + interference) * SQUARE, -end
     beside = LEAF_WIDTH / 2 + leaf if leaf else crest / 2 + proud + ROOT
@@ -112,7 +112,7 @@ def drawn(
     shapes: list[Shape] = []
     for rib in standing:
         heights = (rib.foot, rib.bottom, rib.top, rib.head)
-        # At foot and head the tip lies within the wall.
+        # At foot and head the tip is within the wall.
         tips = (back + mm(root / 2), tip, tip, back + mm(root / 2))
         sections = [_section(rib, at, back, reach, z) for at, z in zip(tips, heights, strict=True)]
         shapes += [Extrude(sections[i], heights[i], heights[i + 1], top=sections[i + 1]) for i in range(3)]
@@ -120,7 +120,7 @@ def drawn(
 
 
 def _section(rib: Rib, tip: float, back: float, reach: float, z: float) -> Profile:
-    """Draw a rib's section at z: its tip and its back lie so far inwards of the plinth's face there.
+    """Draw a rib's section at z: its tip and its back are so far inwards of the plinth's face there.
 
     Its flanks would meet at `reach`. All lengths are on the grid, so that flanks are planes at exactly 45 degrees.
     """
@@ -156,7 +156,7 @@ def _strip(rib: Rib, near: float, far: float, t0: float, t1: float, z: float) ->
 
 
 def slot_shapes(spec: Spec, lay: Layout) -> list[Shape]:
-    """Draw the slots round the leaves of every cup of a set; none where its ribs stand on the wall itself."""
+    """Draw the slots round the leaves of every cup of a set; none if its ribs are on the wall itself."""
     slots = leaf_slots(ribs(spec, lay), spec.moulds.plinth_clearance_mm, leaf_mm(printer_of(spec)))
     return [union(slots)] if slots else []
 
@@ -170,7 +170,7 @@ def rib_shapes(spec: Spec, lay: Layout) -> list[Shape]:
 
 
 def rib_spaces(spec: Spec, lay: Layout) -> list[Shape]:
-    """Draw a box round each rib, from behind its wall to before its tip: what a check of other faces leaves out."""
+    """Draw a box round each rib, from behind its wall to before its tip: a check of other faces ignores it."""
     moulds = spec.moulds
     before = moulds.rib_interference_mm * SQUARE + AROUND
     behind = moulds.plinth_clearance_mm * SQUARE + AROUND

@@ -1,4 +1,4 @@
-"""The seals of a pour: what silicone is kept from though no tool fills it."""
+"""The seals of a pour: space without tool that silicone is kept from."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from unitcad.spec import Spec
 
 
 def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
-    """Draw what silicone is kept from though no tool fills it: grease round a tongue, the annulus round a filament.
+    """Draw the space without tool that silicone is kept from: grease round a tongue, the annulus round a filament.
 
-    A window's seal is what the window removes from the cup, less the tongue; never a solid built a second time.
+    A window's seal is the part of the cup removed by the window, less the tongue; never a solid built a second time.
     """
     seals: list[Shape] = []
     if dims.exit:

@@ -1,4 +1,4 @@
-"""What stands round each place of a mould set, pour by pour: which cells and tools are in like surroundings."""
+"""Surroundings of each place of a mould set, pour by pour: which cells and tools are in like surroundings."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from unitcad.shape import Shape
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """All that stands in pours between which nothing is laid in elsewhere, and which places of it are alike.
+    """The solids of pours between which nothing is laid in elsewhere, and their places that are alike.
 
-    `solids` are the tools by name, `more` is drawn beside tools, silicone and seals: spaces of ribs.
+    `solids` are the tools by name, `more` is drawn besides tools, silicone and seals: spaces of ribs.
     """
 
     plan: Plan
@@ -29,7 +29,7 @@ class Surroundings:
 
     @cached_property
     def congruence(self) -> Congruence:
-        """All tools that stand in the pours, what is cast or laid in there, and seals."""
+        """All tools in the pours, cast and laid in solids, and seals."""
         last = self.steps[-1]
         tools = [tool for tool in self.plan.tools if any(tool.name in step.tools for step in self.steps)]
         shapes = [tool.shape for tool in tools] + [*last.earlier, *last.layer, *self.more]
@@ -41,7 +41,7 @@ class Surroundings:
     def cells(self) -> tuple[int, ...]:
         """For every cell a number that is the same for cells in like surroundings.
 
-        A cell's place reaches round all that is cast in it alone: of a sheet that joins all cells nothing.
+        A cell's place encloses the silicone cast only in it: nothing of a sheet that joins all cells.
         """
         last, count = self.steps[-1], len(self.plan.layout.cells)
         alone = (*last.earlier, *last.layer) if len(last.layer) == count else last.earlier
@@ -61,7 +61,7 @@ class Surroundings:
 def surroundings(
     plan: Plan, solids: Mapping[str, Manifold], more: Sequence[Shape], segments: int
 ) -> tuple[Surroundings, ...]:
-    """Return the surroundings of every pour: one object for pours that leave in place what was cast before."""
+    """Return the surroundings of every pour: one object for pours that leave earlier silicone in place."""
     groups: list[list[Step]] = []
     for step in plan.steps:
         before = groups[-1][-1] if groups else None

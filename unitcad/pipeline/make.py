@@ -56,7 +56,7 @@ from unitcad.pipeline.plan import (
 from unitcad.pipeline.plan import forget as forget_geometry
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, printer_of, spec_hash, to_json, to_toml, with_formats
-from unitcad.spec.asked import Format
+from unitcad.spec.raw import Format
 from unitcad.validation import from_data
 
 MESH_FORMATS = ("stl", "3mf")

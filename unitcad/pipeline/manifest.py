@@ -20,7 +20,7 @@ from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import kernel_versions
 from unitcad.spec import Spec, spec_hash
-from unitcad.spec.asked import OUTPUTS
+from unitcad.spec.raw import OUTPUTS
 from unitcad.validation import warnings
 
 CASTING = ("bom.csv", "casting.json", "casting.md", "troubleshooting.md")
@@ -88,12 +88,12 @@ class ModelLevel(TypedDict):
 class EstimateSummary(TypedDict):
     """The summary of the estimate; `measured` is the paper's level of this unit, None if there is none.
 
-    `answer` leads the estimate; `model` has the least error of those that give a level.
+    `lines` are the two that lead the estimate; `model` is the one behind the first.
     """
 
     models: dict[str, ModelLevel]
     model: str | None
-    answer: str
+    lines: list[str]
     measured: float | None
     frequency_hz: float | None
 

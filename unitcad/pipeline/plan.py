@@ -34,8 +34,8 @@ from unitcad.pipeline.scenes import pictures
 from unitcad.shape import Shape, content_hash
 from unitcad.shape.body import Body, copies, part_names
 from unitcad.spec import Spec
-from unitcad.spec.asked import OUTPUTS, Output
 from unitcad.spec.custom_code import is_body_file, is_custom
+from unitcad.spec.raw import OUTPUTS, Output
 
 GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""

@@ -21,9 +21,35 @@ from unitcad.validation import Source, load
 
 @dataclass(frozen=True, eq=False)
 class Variant(MouldSet):
-    """A spec's unit, moulds and meshes, each worked out when first asked for.
+    """A spec's unit, moulds and meshes. Each is computed when it is first used.
 
-    Lengths in mm, as assembled, z = 0 at the skin. Raises UnitcadError for a `spec` that is none.
+    Parameters
+    ----------
+    spec : Spec
+        The spec; ``Variant.of`` takes a template's name or a file.
+    altered : Plan, optional
+        A plan in place of the spec's own, for tests with a fault.
+
+    Attributes
+    ----------
+    bodies : dict of str to Body
+        Bodies of unit and tooling by name: "layer1", "motor", "base", "cup1" and so on. Lengths in mm, as assembled,
+        z = 0 at the skin.
+
+    Raises
+    ------
+    UnitcadError
+        For a ``spec`` that is none.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> variant = unitcad.Variant.of("encapsulating", "diameter_mm=15")
+    >>> list(variant.bodies)[:4]
+    ['layer1', 'layer2', 'motor', 'fpcb']
+    >>> mesh = variant.mesh("layer1", "trimesh")
+    >>> mesh.is_watertight, mesh.vertices.shape[1]
+    (True, 3)
     """
 
     def __post_init__(self) -> None:

@@ -23,7 +23,7 @@ from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
 from unitcad.pipeline.plan import checked_outputs, code_version
 from unitcad.pipeline.subjects import subject
 from unitcad.spec import read_toml
-from unitcad.spec.asked import FORMATS, OUTPUTS, Format
+from unitcad.spec.raw import FORMATS, OUTPUTS, Format
 
 LOCK = re.compile(r"\.[a-z0-9-]+-[0-9a-f]{12}\.lock")
 PAGE = "report.html"

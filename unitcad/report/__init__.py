@@ -1,4 +1,4 @@
-"""One offline HTML page for what a folder holds: a variant, or a batch of them. It contacts nothing."""
+"""One offline HTML page for a folder's variant or batch. It contacts nothing."""
 
 from unitcad.report.page import write_report
 

@@ -1,4 +1,4 @@
-"""Reading a batch's table: batch.json, else variants.parquet, which holds the same."""
+"""Reading a batch's table: batch.json, otherwise variants.parquet, with the same content."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from unitcad.report.records import BatchFile, expect
 
 JSON, PARQUET, CSV = TABLES = ("batch.json", "variants.parquet", "variants.csv")
 HEAD = b"unitcad"
-"""Key of a Parquet file's metadata that holds what batch.json has beside the rows, as JSON."""
+"""Key of a Parquet file's metadata with the content of batch.json except its rows, as JSON."""
 
 
 def read_batch(folder: Path) -> dict[str, Any] | None:
-    """Read the table of a batch's folder; None without one. Raises UnitcadError where it can't be read."""
+    """Read the table of a batch's folder; None without one. Raises UnitcadError if it can't be read."""
     try:
         batch, path = files.read_json(folder / JSON, largest=files.LARGEST_TABLE, links=False), folder / JSON
     except files.NotThere:
@@ -39,7 +39,7 @@ def name_in(folder: Path) -> str:
 def read_parquet(path: Path) -> dict[str, Any]:
     """Return the head of a Parquet table with its rows, as batch.json has them.
 
-    Raises NotThere, Missing without the extra, UnitcadError for what is no such table.
+    Raises NotThere, Missing without the extra, UnitcadError for another file.
     """
     content = files.read(path, largest=files.LARGEST_TABLE, links=False)
     try:

@@ -105,7 +105,7 @@ class ListedTrouble(msgspec.Struct):
 
 
 class CastingFile(msgspec.Struct):
-    """casting.json: what the page shows of it."""
+    """The part of casting.json that the page shows."""
 
     name: str
     label: str
@@ -127,9 +127,9 @@ class CastingFile(msgspec.Struct):
 
 
 def write_bench(folder: Path) -> Path | None:
-    """Write `folder`/bench.html for the variant in `folder`; None where it has no procedure. Returns its path.
+    """Write `folder`/bench.html for the variant in `folder` and return its path; None if it has no procedure.
 
-    Raises UnitcadError where casting.json is damaged.
+    Raises UnitcadError if casting.json is damaged.
     """
     try:
         data = files.read_json(folder / "casting.json", links=False)
@@ -139,7 +139,7 @@ def write_bench(folder: Path) -> Path | None:
     casting = msgspec.convert(data, CastingFile)
     try:
         spec = spec_in(folder)
-    except UnitcadError:  # such as one that runs code: the record then names it by its hash alone
+    except UnitcadError:  # such as one that runs code: the record then names it only by its hash
         spec = None
     content: dict[str, Any] = {
         "version": __version__,
@@ -161,7 +161,7 @@ def write_bench(folder: Path) -> Path | None:
 
 
 def _asked(casting: CastingFile, spec: Spec | None) -> dict[str, Any]:
-    """Return what a unit should measure, mm and g: the page refuses what lies far from it. {} where it is not known."""
+    """Return the expected measures of a unit, mm and g: the page refuses values far from them. {} if unknown."""
     if spec is None:
         return {}
     figures = [{figure.name: figure.value for figure in pour.figures} for pour in casting.pours]
@@ -186,7 +186,7 @@ def _paths(casting: CastingFile) -> list[str]:
 
 
 def _slicer(folder: Path) -> dict[str, Any] | None:
-    """Return print time and filament by the slicer, where they are known."""
+    """Return print time and filament by the slicer, if they are known."""
     try:
         sliced = files.read_json(folder / "slicer.json", links=False)
         return {"slicer": str(sliced["slicer"]), **{key: float(sliced[key]) for key in ("print_s", "filament_cm3")}}

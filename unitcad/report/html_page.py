@@ -56,8 +56,8 @@ def packed(data: dict[str, Any]) -> str:
 def compressed(content: bytes) -> str:
     """Return content as a gzip file in base 64.
 
-    What is in base 64 in it, as pictures are, holds nothing that comes again: it is coded without a search for that,
-    which would take most of the time and make the file no smaller.
+    Base 64 in it, such as pictures, has no repetitions. So it is coded without a search for them, which would take most
+    of the time and make the file no smaller.
     """
     coded = [_GZIP]
     pieces = _BASE_64.split(content)
@@ -72,7 +72,7 @@ def compressed(content: bytes) -> str:
 def document(
     title: str, sheets: Sequence[str], body: Sequence[str], scripts: Sequence[str] = (), connects: bool = False
 ) -> str:
-    """Return the HTML of a page that runs `scripts` alone; `body` is markup, escaped already.
+    """Return the HTML of a page that runs only `scripts`; `body` is markup, escaped already.
 
     It contacts nothing, or with `connects` the server that it came from.
     """
@@ -109,7 +109,7 @@ def document(
 
 @cache
 def asset(name: str) -> str:
-    """Read a shipped file. No own script or style holds the end tag of its element; a test checks it."""
+    """Read a shipped file. No own script or style contains the end tag of its element; a test checks it."""
     return (files("unitcad") / "report" / name).read_text("utf-8")
 
 

@@ -1,4 +1,4 @@
-"""The page of a variant or a batch: what it shows, collected, and its models."""
+"""The page of a variant or a batch: its data, collected, and its models."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def write_report(
     """Write `folder`/report.html for the variant or the batch in `folder`; returns its path.
 
     `warn` gets lines that say which results are damaged, and why; `modelled` gives the models of a unit's geometry.
-    Raises UnitcadError where the folder holds none.
+    Raises UnitcadError if the folder has none.
     """
     if kind := read_results.compound_in(folder):
         for unit in sorted((folder / "units").glob("*")):
@@ -65,7 +65,7 @@ def write_report(
 
 
 def _write_bench(folder: Path, warn: Callable[[str], None]) -> None:
-    """Write the bench page; where its files are damaged there is none, and a line says why."""
+    """Write the bench page; if its files are damaged, write none and warn why."""
     try:
         write_bench(folder)
     except UnitcadError as error:
@@ -78,7 +78,7 @@ _TABLE_OF_PAGE = "the batch's command with --table json makes the table that the
 def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str, Any], str, dict[str, str]]:
     """Collect the page's data, its title, and why a result is damaged by its folder's name.
 
-    Geometries are made by `modelled`, none without it. Raises UnitcadError where the folder holds no result.
+    Geometries are made by `modelled`, none without it. Raises UnitcadError if the folder has no result.
     """
     if not folder.is_dir():
         raise UnitcadError(f"{folder}: is not a folder")
@@ -100,7 +100,7 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
             damaged[batch_table.name_in(folder)] = str(error)
         if not folders and not batch:
             why = "; ".join(damaged.values()) or "no manifest.json in it or right below it"
-            raise UnitcadError(f"{folder}: holds no result of unitcad ({why})")
+            raise UnitcadError(f"{folder}: has no result of unitcad ({why})")
         for each in folders:
             try:
                 record, spec = read_results.read_variant(each, folder)
@@ -132,9 +132,9 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
 
 
 def _of_all(batch: dict[str, Any] | None, records: list[VariantRecord]) -> dict[str, Any]:
-    """Return what holds for the levels of all variants: typical error by model, and swept keys that it does not read.
+    """Return data on the levels of all variants: typical error by model, and swept keys that it does not read.
 
-    As batch.json has them; of a folder without one the errors are those of the first estimate.
+    As batch.json has them; a folder without one has the errors of the first estimate.
     """
     if batch and batch.get("estimate"):
         return batch["estimate"]

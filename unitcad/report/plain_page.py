@@ -1,4 +1,4 @@
-"""A page of its own markup in the styles of every page, under a policy that forbids all else; it may hold a 3D view."""
+"""A page of its own markup in the styles of every page, under a policy that forbids the rest; a 3D view is optional."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _STYLES = ("app/page.css", "app/print.css")
 
 _PROGRAMS = ("vendor/three.min.js", *(f"app/{name}.js" for name in ("dom", "glb", "viewer", "controls", "array")))
 VIEW = '<div class="stage-host"><p class="absent">A script draws the 3D view.</p></div>'
-"""Where in a page's markup the 3D view goes."""
+"""The place of the 3D view in a page's markup."""
 
 
 def plain_page(title: str, body: str, model: dict[str, Any] | None = None) -> str:
     """Return the HTML of a page that contacts nothing; `body` is markup, whose texts are escaped already.
 
-    With a `model` the programs of the 3D view are in it, and draw it where the markup holds VIEW.
+    With a `model` it contains the programs of the 3D view, which draw it in the place of VIEW.
     """
     sheets, markup = [asset(name) for name in _STYLES], [f'<main id="page">{body}</main>']
     if model is None:
@@ -33,7 +33,7 @@ def plain_page(title: str, body: str, model: dict[str, Any] | None = None) -> st
 
 
 def drawing(svg: str, alt: str, narrow: str = "") -> str:
-    """Return an SVG document as an image in the page, with what it shows in words; `narrow` stands in on a phone."""
+    """Return an SVG document as an image in the page, with a description in words; `narrow` replaces it on a phone."""
     image = f'<img class="drawing" alt="{html.escape(alt)}" src="{_data(svg)}">'
     if not narrow:
         return image
@@ -41,7 +41,7 @@ def drawing(svg: str, alt: str, narrow: str = "") -> str:
 
 
 def picture(png: bytes, alt: str) -> str:
-    """Return a PNG as an image in the page, with what it shows in words."""
+    """Return a PNG as an image in the page, with a description in words."""
     data = base64.b64encode(png).decode()
     return f'<img class="drawing" alt="{html.escape(alt)}" src="data:image/png;base64,{data}">'
 

@@ -23,7 +23,7 @@ class Pool:
         self._index: dict[bytes, int] = {}
 
     def put(self, data: Any) -> Any:
-        """Return `data` (what JSON can hold) with every larger part replaced by a reference."""
+        """Return `data` (of JSON's types) with every larger part replaced by a reference."""
         if not isinstance(data, dict | list | tuple | str):
             return data
         text = _encoded(data)
@@ -40,7 +40,7 @@ class Pool:
 
 
 def _encoded(data: Any) -> bytes:
-    """Return data as JSON, by the encoder that is ten times as fast as Python's where it can write all of it."""
+    """Return data as JSON, by the encoder that is ten times as fast as Python's if it can write all of it."""
     try:
         return _ENCODER.encode(data)
     except UnicodeEncodeError:  # names of files that are no text

@@ -1,7 +1,7 @@
-"""Reading a result folder. What is absent stays absent; the page names the option that makes it.
+"""Reading a result folder. Absent outputs stay absent; the page names the option that makes them.
 
 A folder may be damaged, or made to do harm: nothing outside it is read, no link is followed, no special
-file opened, and no code of a spec run. What can't be read is named with its reason, and the rest is shown.
+file opened, and no code of a spec run. Unreadable files are named with the reason, and the rest is shown.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LARGEST_DRAWING = 4_000_000
 MOST_CASTS = 200
 """Cast records of a variant that the page shows, at most."""
 STEPS = "steps/"
-"""Where the pictures of the procedure's steps lie in a variant's folder."""
+"""Place of the pictures of the procedure's steps in a variant's folder."""
 MOST_FILES = 2000
 """Files of a variant that the page lists, at most."""
 
@@ -64,7 +64,7 @@ def variant_folders(folder: Path) -> list[Path]:
 
 
 def read_variant(folder: Path, root: Path) -> tuple[VariantRecord, Spec | None]:
-    """Read a variant's folder, and its spec (None where it can't be read). Paths are relative to `root`.
+    """Read a variant's folder, and its spec (None if it can't be read). Paths are relative to `root`.
 
     Raises UnitcadError for a manifest that can't be read.
     """
@@ -98,7 +98,7 @@ def read_variant(folder: Path, root: Path) -> tuple[VariantRecord, Spec | None]:
 
 
 def _sound(read: Any, damage: list[str]) -> Any:
-    """Return what `read` returns; None without the file; None, and a line in `damage`, where it can't be read."""
+    """Return the result of `read`; None without the file; None, and a line in `damage`, if it can't be read."""
     try:
         return read()
     except files.NotThere:
@@ -124,9 +124,9 @@ def _regular(folder: Path, damage: list[str]) -> Iterator[str]:
             elif entry.is_file(follow_symlinks=False):
                 listed.append(Path(entry.path).relative_to(folder).as_posix())
             else:
-                damage.append(f"{entry.path}: is a link or a special file, left out")
+                damage.append(f"{entry.path}: is a link or a special file, skipped")
     if len(listed) >= MOST_FILES:
-        damage.append(f"{folder}: has more than {MOST_FILES} files, the others are left out")
+        damage.append(f"{folder}: has more than {MOST_FILES} files, the others are skipped")
     return iter(sorted(listed)[:MOST_FILES])
 
 
@@ -243,7 +243,7 @@ def _cell(value: Any) -> Any:
 
 
 def _json(path: Path) -> dict[str, Any]:
-    """Read a JSON file that holds a table."""
+    """Read a JSON file with a table."""
     data = files.read_json(path, links=False)
     expect(data, dict[str, Any], path)
     return data

@@ -44,9 +44,9 @@ class BatchFile(Struct):
 class VariantRecord(Struct, kw_only=True):
     """A variant on the page; a file that its folder lacks, or that can't be read, is None.
 
-    `casts` are the cast records in it, `drawings` SVG by path, `pictures` of the procedure's steps as data by path, for
-    a page of one variant alone, `files` (path, bytes); `damaged` says what can't be
-    read; `model` is the key of the geometry, and `no_model` says why there is none.
+    `casts`: the cast records in it; `drawings`: SVG by path; `pictures`: those of the procedure's steps as data by
+    path, only on the page of one variant; `files`: (path, bytes); `damaged`: unreadable files; `model`: the key of the
+    geometry, and `no_model` the reason for none.
     """
 
     folder: str

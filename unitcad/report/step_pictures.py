@@ -16,7 +16,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def step_pictures(folder: Path, paths: Iterable[str]) -> dict[str, str]:
-    """Return the pictures of these paths in a folder as data; what is not there, or no PNG in it, is left out."""
+    """Return the pictures of these paths in a folder as data, without files that are missing or no PNG."""
     read: dict[str, str] = {}
     for path in list(dict.fromkeys(path for path in paths if path))[:MOST_PICTURES]:
         parts = Path(path).parts

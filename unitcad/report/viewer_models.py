@@ -1,4 +1,4 @@
-"""What the viewer shows of a geometry: meshes as assembled, the moments of casting, where parts go when taken apart."""
+"""The viewer's data of a geometry: meshes as assembled, the moments of casting, places of parts when taken apart."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from unitcad.spec import Spec, read_toml, with_formats
 from unitcad.validation import from_data
 
 Modelled = Callable[[Spec], dict[str, Any]]
-"""Gives what `model` does for a spec."""
+"""Returns the result of `model` for a spec."""
 
 
 def spec_in(folder: Path) -> Spec:
-    """Read the effective spec of a result folder. Raises UnitcadError where it can't be read."""
+    """Read the resolved spec of a result folder. Raises UnitcadError if it can't be read."""
     return from_data(read_toml(folder / "spec.toml", links=False))
 
 
@@ -30,7 +30,7 @@ def model_key(spec: Spec) -> str:
 def model(spec: Spec) -> dict[str, Any]:
     """Return a geometry for the page; GLB files compressed and in base 64. Lengths in mm.
 
-    Raises UnitcadError where the geometry can't be made any more.
+    Raises UnitcadError if the geometry can't be made any more.
     """
     moulds = MouldSet(spec)
     plan = moulds.plan
@@ -45,6 +45,6 @@ def model(spec: Spec) -> dict[str, Any]:
 
 
 def cells(moulds: MouldSet) -> list[list[float]]:
-    """Return where the unit's layers stand in the moulds: x, y (mm) and quarter turns about z, a cell each."""
+    """Return the places of the unit's layers in the moulds: x, y (mm) and quarter turns about z, a cell each."""
     one_sided = moulds.dimensions.sides == (1,)
     return [[cell.x, cell.y, 2 if one_sided and cell.sides == (-1,) else 0] for cell in moulds.plan.layout.cells]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,8 +14,9 @@ from msgspec import structs
 
 from unitcad import catalogue
 from unitcad.attenuation.crosstalk import crosstalk_ratio
-from unitcad.attenuation.edge.closed_form import Section, Units
-from unitcad.attenuation.edge.predictive import Predictive, stack_of
+from unitcad.attenuation.edge import nearest
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.ranges import Predictive, lead_of
 from unitcad.attenuation.edge.variant_units import FIELDS, stacked
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 from unitcad.casting.figures import at_room
@@ -65,8 +66,9 @@ class Candidates:
     """Candidates as columns, one row each: `geometry` and `sequence` are indices into the two lists.
 
     mass in g; hours from the first weighing until the unit is out of the mould; crosstalk at the pitch, or at touching
-    units if the pitch is shorter, NaN without a pitch. `probability` is that of meeting the level. skipped: silicones
-    without a modulus, with the reason. refused: the reasons why lengths were refused, by design and field.
+    units if the pitch is shorter, NaN without a pitch. `probability` is that of meeting the level; `novelty`: how many
+    of lengths, motor and frequency no measured unit had. skipped: silicones without a modulus, with the reason.
+    refused: the reasons why lengths were refused, by design and field.
     """
 
     target: Target
@@ -77,6 +79,7 @@ class Candidates:
     sequence: np.ndarray
     predictive: Predictive
     probability: np.ndarray
+    novelty: np.ndarray
     mass_g: np.ndarray
     cure_hours: np.ndarray
     height_mm: np.ndarray
@@ -267,18 +270,22 @@ def tabulate(
         raise Refusal("at_hand.materials", list(target.materials), limit)
     say(f"{total} candidates")
     sequences = [one for n in by_count for one in by_count[n]]
-    stack = stack_of(target.models, target.fit, target.asked.estimate.moduli)
+    lead = lead_of(target.asked.estimate.moduli, target.fit)
     parts, start = [], 0
     for n, own in by_count.items():
         at = np.flatnonzero(counts == n)
         if own:
-            units, mass = _units([made[i] for i in at], [[silicones[name] for name in one] for one in own])
+            units, of, mass = _units([made[i] for i in at], [[silicones[name] for name in one] for one in own])
             sequence = np.tile(np.arange(len(own)) + start, at.size)
-            parts.append((np.repeat(at, len(own)), sequence, mass, stack.predictive(units)))
+            new = [len(nearest.differing(place)) for place in nearest.coordinates(units, of)[:: len(own)]]
+            columns = np.repeat(at, len(own)), sequence, mass, np.repeat(new, len(own))
+            parts.append((*columns, lead.predictive(units, of)))
         start += len(own)
-    geometry, sequence, mass = (np.concatenate([part[i] for part in parts]) for i in range(3))
-    centre, scale = (np.concatenate([getattr(part[3], end) for part in parts]) for end in ("centre", "scale"))
-    predictive = replace(parts[0][3], centre=centre, scale=scale)
+    geometry, sequence, mass, new = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    ends = ("centre", "below", "above")
+    predictive = replace(
+        parts[0][4], **{end: np.concatenate([getattr(part[4], end) for part in parts]) for end in ends}
+    )
     entries, room_c = catalogue.materials(made[0].spec.materials), made[0].spec.casting.room_c
     cures = np.array([_cure_hours(one, entries, room_c) for one in sequences])
     say("crosstalk")
@@ -290,7 +297,8 @@ def tabulate(
         geometry=geometry,
         sequence=sequence,
         predictive=predictive,
-        probability=probability_by_model(target, predictive) @ predictive.weights,
+        probability=probability(target, predictive),
+        novelty=new,
         mass_g=1e3 * mass,
         cure_hours=_bench_hours(made)[geometry] + cures[sequence],
         height_mm=np.array([one.height_mm for one in made])[geometry],
@@ -299,31 +307,34 @@ def tabulate(
     )
 
 
-def probability_by_model(target: Target, predictive: Predictive) -> np.ndarray:
-    """Return the probability of meeting the level by each model, shape (..., models)."""
+def probability(target: Target, predictive: Predictive) -> np.ndarray:
+    """Return the probability of meeting the level, shape (...)."""
     goals = target.goals
-    below = predictive.each_at_most(goals.edge_max) if goals.edge_max is not None else np.ones(predictive.centre.shape)
-    return below - predictive.each_at_most(goals.edge_min) if goals.edge_min is not None else below
+    below = predictive.at_most(goals.edge_max) if goals.edge_max is not None else np.ones(predictive.centre.shape)
+    return below - predictive.at_most(goals.edge_min) if goals.edge_min is not None else below
 
 
-def _units(made: Sequence[Geometry], own: Sequence[Sequence[SiliconeLayer]]) -> tuple[Units, np.ndarray]:
-    """Return the closed forms' input and the mass (kg) of each geometry with each sequence of silicones."""
-    base, count = stacked([one.variant for one in made]), len(own)
-    section = base.section
-    assert section is not None
+def _units(
+    made: Sequence[Geometry], own: Sequence[Sequence[SiliconeLayer]]
+) -> tuple[Units, nearest.Lengths, np.ndarray]:
+    """Return the closed forms' input, lengths and mass (kg) of each geometry with each sequence of silicones."""
+    variants = [one.variant for one in made]
+    base, each, count = stacked(variants), nearest.lengths(variants), len(own)
     of_silicones = {key: [[getattr(layer, key).middle for layer in one] for one in own] for key in FIELDS}
     of_silicones["density"] = [[layer.density for layer in one] for one in own]
     units = replace(
         base,
         **{key: np.tile(values, (len(made), 1)) for key, values in of_silicones.items()},
-        **{key: np.repeat(getattr(base, key), count, axis=0) for key in ("thickness", "omega", "passes")},
-        section=Section(*(np.repeat(getattr(section, one.name), count, axis=0) for one in fields(section))),
+        **{key: np.repeat(getattr(base, key), count, axis=0) for key in ("thickness", "omega", "passes", "whole")},
     )
-    tops = np.array([[layer.top for layer in one.variant.geometry.layers] for one in made])
-    inside = np.array(section.cavity_radius) ** 2 * np.array(section.core_height)
-    volumes = np.pi * np.diff(np.concatenate([inside[:, None], np.array(section.outer_radii) ** 2 * tops], axis=1))
-    motor = np.array([one.variant.geometry.motor_mass.middle for one in made])
-    return units, np.einsum("ij,ij->i", np.repeat(volumes, count, axis=0), units.density) + np.repeat(motor, count)
+    of = nearest.Lengths(*(np.repeat(part, count, axis=0) for part in vars(each).values()))
+    shapes = [one.geometry for one in variants]
+    cylinders = [[layer.outer_radius**2 * layer.top for layer in shape.layers] for shape in shapes]
+    inside = [[shape.cavity_radius**2 * shape.core_height] for shape in shapes]
+    volumes = np.pi * np.diff(np.concatenate([inside, cylinders], axis=1))
+    motor = np.array([shape.motor_mass.middle for shape in shapes])
+    mass = np.einsum("ij,ij->i", np.repeat(volumes, count, axis=0), units.density) + np.repeat(motor, count)
+    return units, of, mass
 
 
 def finish_hours(spec: Spec) -> float:

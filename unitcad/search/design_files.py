@@ -163,7 +163,7 @@ def page(data: Mapping[str, Any], charts: Mapping[str, str]) -> str:
 
 def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequence[str]) -> str:
     """Return the page of a result; `sections`: the SVG of each proposal."""
-    tried, models = (escape(line) for line in design_text.head_lines(data))
+    tried, *ranks = (escape(line) for line in design_text.head_lines(data))
     refused = [
         f"{one['what']}: {one['count']} sets of lengths refused, first {one['first']}"
         for one in data["tried"]["refused"]
@@ -173,9 +173,8 @@ def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequ
         f'<div class="top"><div><h1>{escape(data["name"])}</h1>',
         f'<p class="line">{escape(design_text.target_line(data["target"]))}</p></div></div>',
         f"<section><h2>Proposals</h2>{_table(data['proposals'])}",
-        f'<p class="note">Levels in per cent of the motor; mm: diameter x height. The {models}. The probability is '
-        "that of meeting the level; it counts the models' errors on measured units, not that a unit has never been "
-        "made.</p></section>",
+        f'<p class="note">Levels in per cent of the motor; mm: diameter x height. The {"; ".join(ranks)}. A '
+        "probability is that of meeting the level.</p></section>",
         *(
             f'<section id="proposal-{one["rank"]}"><h2>{escape(design_text.title(one))}</h2>'
             f"<p><strong>{escape(design_text.level_line(one))}</strong></p>{_list(design_text.lines(one))}"

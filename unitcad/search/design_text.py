@@ -9,8 +9,6 @@ from unitcad.text import listed, number
 
 OTHERS = "Nearest others: measured outside the target, or below the probability that is asked for"
 """The heading over the candidates that are no proposals."""
-_APART = 0.1
-"""Models whose probabilities differ by more are named one by one."""
 _GOALS = {
     "edge_min": "at least {} of the motor's amplitude at the edge",
     "edge_max": "at most {} of the motor's amplitude at the edge",
@@ -38,16 +36,15 @@ def target_line(goals: Mapping[str, Any]) -> str:
 
 
 def head_lines(data: Mapping[str, Any]) -> list[str]:
-    """Return how much was tried, and the models with their weights."""
-    tried, models = data["tried"], data["models"]
+    """Return the number of candidates, the source of the probabilities, and the order that the evidence supports."""
+    tried, leads = data["tried"], data["leads"]
     refused = sum(one["count"] for one in tried["refused"])
     not_made = f"; {refused} sets of lengths that no design accepts" if refused else ""
-    weights = listed(f"{name} {weight:.2f}" for name, weight in models["weights"].items())
-    none = f"; no weight: {listed(models['without_weight'])}" if models["without_weight"] else ""
     return [
         f"{tried['candidates']} candidates ({tried['geometries']} sets of lengths), {tried['within_limits']} within "
         f"the limits{not_made}",
-        f"models by their left-out score, {models['by']}: {weights}{none}",
+        f"probabilities by {leads['model']}, fitted to {leads['by']}; they rank {leads['ranks']}",
+        f"they do not rank {leads['does_not_rank']}",
     ]
 
 
@@ -94,7 +91,9 @@ def lines(one: Mapping[str, Any]) -> list[str]:
         f"{number(one['diameter_mm'], 3)} mm wide, {number(one['height_mm'], 3)} mm high, "
         f"{number(one['mass_g'], 3)} g with motor, out of the mould in {number(one['cure_hours'], 3)} h, {checks}"
     )
-    made, by_model = [size], one["by_model"]
+    made = [size]
+    if one["equal_to"]:
+        made.insert(0, f"as likely as number {one['equal_to']}: the order among equals is how easily they are made")
     if crosstalk := one.get("crosstalk"):
         value, low, high = (number(crosstalk[key], 2) for key in ("value", "low", "high"))
         made.append(
@@ -106,9 +105,8 @@ def lines(one: Mapping[str, Any]) -> list[str]:
             f"the measured unit of this kind ({sibling['label']}): {measured_words(sibling)}; "
             f"its probability is {sibling['probability']:.2f}"
         )
-    made += [f"not measured: {note}" for note in one["relies_on"]]
-    if max(by_model.values()) - min(by_model.values()) > _APART:
-        made.append(f"the models differ: {listed(f'{name} {p:.2f}' for name, p in by_model.items())}")
+    if one["relies_on"]:
+        made.append(f"the nearest measured unit differs in {listed(one['relies_on'])}")
     return [*made, one["lengths_gain"], *one["remarks"]]
 
 

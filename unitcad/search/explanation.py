@@ -10,7 +10,6 @@ import numpy as np
 from msgspec import structs
 
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.variant_units import MANY_LAYERS, MOST_LAYERS
 from unitcad.errors import unknown_name
 from unitcad.estimating import estimate_input
 from unitcad.search.candidates import Candidates, Geometry, Lengths, tabulate
@@ -60,8 +59,6 @@ def explain(made: Inversion, named: str) -> dict[str, Any]:
     if own and own["nearest_other"]:
         why = "was measured outside the target" if own["measured"] else "is below the probability that is asked for"
         reasons.append(f"it is no proposal: it {why}, and is among the nearest others as number {own['rank']}")
-    elif len(spec.layers) > MOST_LAYERS:
-        reasons.append(f"no level: {MANY_LAYERS}")
     elif unknown:
         names = listed(dict.fromkeys(layer.material for layer in unknown))
         reasons.append(f"{names}: {unknown[0].youngs_modulus.note}")

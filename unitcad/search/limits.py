@@ -13,7 +13,6 @@ from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.errors import Refusal
 from unitcad.search.candidates import Candidates
-from unitcad.search.ranking import novelty
 from unitcad.text import listed, number, some
 
 _PITCHES = np.unique(np.round([*np.arange(1.0, 100.0, 0.1), *np.arange(100.0, MOST_PITCH_MM + 1.0)], 1))
@@ -104,7 +103,7 @@ def _level_limits(found: Candidates, measured: Mapping[int, Mapping[str, Any]]) 
     if most is None:
         values = np.fmax(found.predictive.quantile(1 - share), own)
         return [Limit("edge_min", what, unit, least, values, met, is_least=True)]
-    low, high = found.predictive.quantile(((1 - share) / 2, (1 + share) / 2))
+    low, high = (found.predictive.quantile(end) for end in ((1 - share) / 2, (1 + share) / 2))
     nearer = np.maximum(own, most) / np.minimum(own, least) < np.maximum(high, most) / np.minimum(low, least)
     low, high = (np.where(nearer, own, end) for end in (low, high))
     met_low = met | (low >= least)
@@ -155,7 +154,7 @@ def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]])
 def _nearest(found: Candidates, far: np.ndarray, among: np.ndarray) -> int:
     """Return the nearest row; of equals the one with the fewest unmeasured inputs."""
     rows = np.flatnonzero(among)
-    return int(rows[np.lexsort((rows, novelty(found)[rows], np.round(far[rows], 9)))[0]])
+    return int(rows[np.lexsort((rows, found.novelty[rows], np.round(far[rows], 9)))[0]])
 
 
 def _pitch(found: Candidates, row: int) -> float | None:

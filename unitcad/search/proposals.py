@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 from unitcad.attenuation.crosstalk import RANGE as CROSSTALK_RANGE
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.predictive import Stack, stack_of
+from unitcad.attenuation.edge.ranges import lead_of
 from unitcad.casting.figures import MOST_ERROR_PCT, mix
 from unitcad.catalogue import materials as silicones
 from unitcad.catalogue import measurements
@@ -21,17 +20,9 @@ from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.search.candidates import (
-    Candidates,
-    Lengths,
-    Say,
-    candidates,
-    geometry_of,
-    probability_by_model,
-    tabulate,
-)
+from unitcad.search.candidates import Candidates, Lengths, Say, candidates
 from unitcad.search.limits import check_possible, label, limits, within
-from unitcad.search.ranking import ALIKE, Kind, kinds, measured_rows, measurement, novelty, unmeasured
+from unitcad.search.ranking import Kind, kinds, measured_rows, measurement, unmeasured
 from unitcad.search.target_file import Target
 from unitcad.spec import Spec
 from unitcad.text import listed, number
@@ -42,8 +33,9 @@ _LEAST_SHOWN = 0.005
 """A kind with a smaller probability, 0.00 with two digits, is no proposal."""
 _TRIES = 3
 """Candidates of a kind that are judged until one can be cast."""
-_FINE_STEPS = (0.1, 0.05)
-"""Steps of walls and caps between those of the grid, and half those of diameters, mm: the printers' play is larger."""
+RANKS = "design, which side is soft, silicones with another side soft"
+NOT_RANKED = "walls, caps, diameter, frequency, and silicones with the same side soft"
+"""The measured units do not tell these apart: another value only widens the range."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +66,9 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
         raise Refusal("at_hand.printer", target.asked.at_hand.printer, limit)
     specs = tuple(spec for spec, _ in chosen)
     proposals = [{**one, "rank": i} for i, (_, one) in enumerate(chosen, 1)]
+    for one in proposals:
+        first = next(other for other in proposals if other["group"] == one["group"])
+        one["equal_to"] = None if first is one or one["nearest_other"] else first["rank"]
     data = {
         "name": target.name,
         "target": {key: value for key, value in _goals(target).items() if value is not None},
@@ -85,7 +80,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
                 {"what": what, "count": len(why), "first": why[0]} for what, why in sorted(found.refused.items())
             ],
         },
-        "models": models_block(target),
+        "leads": leads_block(target),
         "skipped": found.skipped,
         "proposals": proposals,
         "not_castable": out,
@@ -93,14 +88,12 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
     return Inversion(found, rows, specs, rounded(data), measured)
 
 
-def models_block(target: Target) -> dict[str, Any]:
-    """Return which models were stacked, with their weights, and by which units."""
-    stack = stack_of(target.models, target.fit, target.asked.estimate.moduli)
+def leads_block(target: Target) -> dict[str, Any]:
+    """Return the leading model, the units behind it, the keys that the evidence ranks and those that it does not."""
     slow = ", by the moduli of a slow pull" if target.asked.estimate.moduli == "quasi-static" else ""
     by = f"the paper's nine levels{slow}" if target.fit is None else f"the lab's fit {target.fit.name}"
-    weights = {model: float(weight) for model, weight in zip(stack.models, stack.weights, strict=True)}
-    unweighted = list(stack.left_out) if isinstance(stack, Stack) else [m for m in target.models if m not in weights]
-    return {"weights": weights, "without_weight": unweighted, "by": by}
+    model = lead_of(target.asked.estimate.moduli, target.fit).model
+    return {"model": model, "by": by, "ranks": RANKS, "does_not_rank": NOT_RANKED}
 
 
 def _chosen(
@@ -113,17 +106,14 @@ def _chosen(
         if len(chosen) == SHOWN or (chosen and kind.most < _LEAST_SHOWN):
             break
         say(f"{len(chosen) + 1} of {SHOWN}: {label(found, kind.best)}")
-        tried = [(found, int(row)) for row in kind.rows[:_TRIES]]
-        if kind.most - kind.least > ALIKE and (better := refined(found, kind.best)):
-            tried.insert(0, (better, 0))
-        for table, row in tried:
-            spec = table.spec(row, name_of(table, row))
+        for row in map(int, kind.rows[:_TRIES]):
+            spec = found.spec(row, name_of(found, row))
             checked, failed = castability(spec) if check else (None, [])
             if not failed:
-                chosen.append((spec, proposal(table, row, spec, kind, checked, table is not found)))
+                chosen.append((spec, proposal(found, row, spec, kind, checked)))
                 break
-            out.append({"name": spec.name, "candidate": label(table, row), "failed": failed})
-    return sorted(chosen, key=lambda one: one[1]["nearest_other"]), out  # a refined one may have become a proposal
+            out.append({"name": spec.name, "candidate": label(found, row), "failed": failed})
+    return chosen, out
 
 
 def castability(spec: Spec) -> tuple[int, list[str]]:
@@ -136,48 +126,6 @@ def castability(spec: Spec) -> tuple[int, list[str]]:
     return len(every), [
         f"{one.code} {one.where}: {one.value:.3g} against {one.limit:.3g} {one.unit}".rstrip() for one in failed
     ]
-
-
-def refined(found: Candidates, row: int) -> Candidates | None:
-    """Return the best candidate between the grid's steps around a row; None if it gains less than `ALIKE`.
-
-    A pattern search by one or two lengths at a time, within the target's ranges and limits.
-    """
-    materials = found.materials(row)
-    best = found.alone(found.lengths(row), materials)
-    for step in _FINE_STEPS:
-        while True:
-            made = []
-            for lengths in _around(found.target, best.lengths(0), step):
-                try:
-                    made.append(geometry_of(found.target, lengths))
-                except Refusal:
-                    continue
-            table = tabulate(found.target, made, found.silicones, only=materials) if made else best
-            rows = within(table)
-            top = int(rows[np.argmax(table.probability[rows])]) if rows.size else 0
-            if not rows.size or table.probability[top] < best.probability[0] + 1e-4:
-                break
-            best = found.alone(table.lengths(top), materials)
-    return best if best.probability[0] > found.probability[row] + ALIKE else None
-
-
-def _around(target: Target, at: Lengths, step: float) -> Iterator[Lengths]:
-    """Yield the lengths whose walls, caps and diameter, as far as they vary, differ by a step in one or two."""
-    vary, count = target.asked.vary, len(at.walls)
-    own_caps = at.caps if vary.cap_mm else ()
-    start = [*at.walls, *own_caps, *([at.diameter] if vary.diameter_mm else [])]
-    ends = [vary.walls(count)] * count + [vary.cap_mm] * len(own_caps) + [vary.diameter_mm]
-    steps = [step] * (count + len(own_caps)) + [2 * step]
-    for moved in itertools.chain(*(itertools.combinations(range(len(start)), n) for n in (1, 2))):
-        for signs in itertools.product((-1, 1), repeat=len(moved)):
-            values = list(start)
-            for i, sign in zip(moved, signs, strict=True):
-                values[i] = round((round(start[i] / steps[i]) + sign) * steps[i], 6)
-            if all(low <= value <= high for value, (low, high) in zip(values, ends, strict=False)):  # type: ignore[misc]
-                walls = tuple(values[:count])
-                caps = tuple(values[count : count + len(own_caps)]) if own_caps else walls if at.caps else ()
-                yield replace(at, walls=walls, caps=caps, diameter=values[-1] if vary.diameter_mm else at.diameter)
 
 
 def _is_other(found: Candidates, probability: float, measured: Mapping[str, Any] | None) -> bool:
@@ -207,13 +155,10 @@ def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[
     return sorted(made, key=group)
 
 
-def proposal(
-    found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None, is_refined: bool
-) -> dict[str, Any]:
+def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int | None) -> dict[str, Any]:
     """Return a candidate as data: its kind, its probability and range, its measurement, limits, unmeasured inputs."""
     variant, lengths, goals = estimate_input(spec), found.lengths(row), found.target.goals
     low, middle, high = (float(end[row]) for end in found.range)
-    by_model = probability_by_model(found.target, found.predictive)[row]
     measured = measurement(found.target, variant)
     data: dict[str, Any] = {
         "name": spec.name,
@@ -227,18 +172,17 @@ def proposal(
         "nearest_other": _is_other(found, float(found.probability[row]), measured),
         "probability_min": goals.probability_min,
         "probability": float(found.probability[row]),
-        "by_model": dict(zip(found.predictive.models, map(float, by_model), strict=True)),
+        "group": kind.group,
         "edge": {"p10": low, "p50": middle, "p90": high},
         "diameter_mm": float(found.diameter_mm[row]),
         "height_mm": float(found.height_mm[row]),
         "mass_g": float(found.mass_g[row]),
         "cure_hours": float(found.cure_hours[row]),
-        "refined": is_refined,
         "within": [limit.shown(row) for limit in limits(found)],
         "checks": checked,
-        "lengths_measured": not novelty(found)[row],
-        "relies_on": unmeasured(found, row),
-        "lengths_gain": _gain(kind, is_refined),
+        "lengths_measured": not found.novelty[row],
+        "relies_on": unmeasured(variant),
+        "lengths_gain": _gain(kind),
         "remarks": [*warnings(spec), *_scale(spec)],
     }
     if goals.pitch_mm is not None:
@@ -297,15 +241,14 @@ def _sibling(found: Candidates, row: int) -> dict[str, Any] | None:
     return level and {**level, "label": label(table, 0), "probability": float(table.probability[0])}
 
 
-def _gain(kind: Kind, is_refined: bool) -> str:
-    """Say how the lengths change a kind's probability; `is_refined`: the proposal is between the steps."""
+def _gain(kind: Kind) -> str:
+    """Say how lengths change a kind's probability."""
     if kind.rows.size < 2:
         return "its lengths are the only ones within the limits"
-    of = f"{kind.rows.size} sets of lengths within the limits"
-    if kind.most - kind.least < 1e-6:
-        return f"lengths gain nothing: the probability is the same for all {of}"
-    between = "; this one is between the steps" if is_refined else ""
-    return f"lengths change the probability from {kind.least:.2f} to {kind.most:.2f} over the {of}{between}"
+    return (
+        f"{kind.rows.size} sets of lengths are within the limits: the evidence does not rank them; the farther from "
+        f"the measured ones, the wider the range (probability {kind.least:.2f} to {kind.most:.2f})"
+    )
 
 
 def _scale(spec: Spec) -> list[str]:

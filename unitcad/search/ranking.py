@@ -1,38 +1,33 @@
-"""The order of candidates: by probability, then by the number of their inputs that no measured unit had."""
+"""The order of candidates: by probability; those that the evidence can't tell apart by how easily they are made."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from unitcad.attenuation.edge.lab_fit import own_block
-from unitcad.attenuation.edge.paper_units import measured_block, unlike_measured
+from unitcad.attenuation.edge.nearest import measured_block, nearest
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.search.candidates import Candidates
 from unitcad.search.target_file import Target
-from unitcad.text import listed
 
-ALIKE = 0.02
-"""Between probabilities that differ by less, the number of unmeasured inputs decides: no model knows them better."""
-_BLIND = {
-    "crossings": ("walls", "caps", "diameter", "frequency"),
-    "fitted": ("walls", "caps", "diameter", "frequency"),
-    "bush": ("frequency",),
-    "paper": ("caps", "diameter"),
-    "consistent": ("caps", "diameter"),
-}
-"""The inputs that a model does not read."""
+EQUAL = 0.1
+"""Probabilities that differ by less are equal: nine units don't tell them apart."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Candidates that differ only in lengths: their rows, best first, and the range of their probabilities."""
+    """Candidates that differ only in lengths: their rows, best first, and the range of their probabilities.
+
+    `group`: kinds of one number are equal in probability.
+    """
 
     rows: np.ndarray
     least: float
     most: float
+    group: int = 0
 
     @property
     def best(self) -> int:
@@ -40,55 +35,48 @@ class Kind:
         return int(self.rows[0])
 
 
-def novelty(found: Candidates) -> np.ndarray:
-    """Return the number of inputs of each row that no measured unit had; silicones do not count."""
-    counts = [len(set(unlike_measured(one.variant)) - {"silicones"}) for one in found.geometries]
-    return np.array(counts)[found.geometry]
-
-
 def ordered(found: Candidates, rows: np.ndarray) -> np.ndarray:
     """Return rows by their probability, equal ones by novelty, then by mass."""
-    p, new = found.probability[rows], novelty(found)[rows]
-    return rows[np.lexsort((rows, np.round(found.mass_g[rows], 6), new, -np.round(p, 6)))]
+    return rows[np.lexsort((rows, *_ease(found, rows)[:0:-1], -np.round(found.probability[rows], 6)))]
+
+
+def _ease(found: Candidates, rows: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return sort keys, the first counts most: layers, lengths that nobody measured, hours, thinnest wall, mass."""
+    layers = np.array([len(found.materials(row)) for row in rows])
+    wall = np.array([min(found.lengths(row).walls) for row in rows])
+    hours = np.nan_to_num(found.cure_hours[rows], nan=np.inf)
+    return layers, found.novelty[rows], np.round(hours, 6), -wall, np.round(found.mass_g[rows], 6)
 
 
 def kinds(found: Candidates, rows: np.ndarray) -> list[Kind]:
-    """Return the kinds among rows, the best first.
-
-    In a kind, rows within `ALIKE` of the best are ordered by novelty.
-    """
+    """Return the kinds among rows, the most probable first; equal kinds, and equal rows of one, by ease."""
     by_kind: dict[object, list[int]] = {}
     for row in rows:
         by_kind.setdefault(found.kind(row), []).append(int(row))
-    new, made = novelty(found), []
+    made = []
     for own in by_kind.values():
         at = np.array(own)
         p = found.probability[at]
-        step = np.floor((p.max() - p) / ALIKE)
-        order = np.lexsort((at, np.round(found.mass_g[at], 6), new[at], step))
+        step = np.floor((p.max() - p) / EQUAL)
+        order = np.lexsort((at, *_ease(found, at)[::-1], step))
         made.append(Kind(at[order], float(p.min()), float(p.max())))
-    return sorted(
-        made,
-        key=lambda kind: (-round(found.probability[kind.best], 2), len(unmeasured(found, kind.best)), kind.best),
-    )
+    made.sort(key=lambda kind: (-kind.most, kind.best))
+    groups, top = [], np.inf
+    for kind in made:
+        if kind.most <= top - EQUAL:
+            top = kind.most
+            groups.append([])
+        groups[-1].append(replace(kind, group=len(groups)))
+    for group in groups:
+        best = np.array([kind.best for kind in group])
+        order = np.lexsort((best, *_ease(found, best)[::-1]))
+        group[:] = [group[i] for i in order]
+    return [kind for group in groups for kind in group]
 
 
-def unmeasured(found: Candidates, row: int) -> list[str]:
-    """Return the inputs of a candidate that no measured unit had, together with the models that do not read them."""
-    variant, models = found.variant(row), found.predictive.models
-    names = unlike_measured(variant)
-    by_blind: dict[tuple[str, ...], list[str]] = {}
-    for name in names:
-        by_blind.setdefault(tuple(model for model in models if name in _BLIND.get(model, ())), []).append(name)
-    notes = []
-    for blind, own in by_blind.items():
-        unread = (
-            "" if not blind else f" (not read by {'any model here' if len(blind) == len(models) else listed(blind)})"
-        )
-        notes.append(f"{listed(own)}{unread}")
-    if not {"number of layers", "design", "silicones"} & set(names) and measured_block(variant) is None:
-        notes.append("these silicones in this order in this design")
-    return notes
+def unmeasured(variant: EstimateInput) -> list[str]:
+    """Return the inputs in which a candidate differs from the nearest measured unit."""
+    return nearest(variant)["differs_in"]
 
 
 def measurement(target: Target, variant: EstimateInput) -> dict[str, Any] | None:
@@ -111,6 +99,6 @@ def measurement(target: Target, variant: EstimateInput) -> dict[str, Any] | None
 
 def measured_rows(found: Candidates) -> dict[int, dict[str, Any]]:
     """Return the measurements of rows that were measured themselves, by row."""
-    looked = range(found.count) if found.target.fit else np.flatnonzero(novelty(found) == 0)
+    looked = range(found.count) if found.target.fit else np.flatnonzero(found.novelty == 0)
     every = ((int(row), measurement(found.target, found.variant(int(row)))) for row in looked)
     return {row: one for row, one in every if one}

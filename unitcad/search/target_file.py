@@ -21,10 +21,7 @@ from typing import Annotated, Any
 from msgspec import Meta, Struct
 
 from unitcad import catalogue
-from unitcad.attenuation.edge.fitted_models import MODELS
 from unitcad.attenuation.edge.lab_fit import LabFit
-from unitcad.attenuation.edge.predictive import STACKED, check_models
-from unitcad.attenuation.edge.variant_units import MOST_LAYERS
 from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
@@ -32,7 +29,7 @@ from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
 from unitcad.spec import convert, read_toml
-from unitcad.spec.asked import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
+from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
 from unitcad.validation.fit_text import lab_fit
 from unitcad.validation.shipped_files import named_file, shipped_files
 
@@ -44,7 +41,8 @@ Pitch = Annotated[float, Meta(ge=1, le=MOST_PITCH_MM, description="between the m
 CureHours = Annotated[
     float, Meta(ge=0.01, le=1e5, description="from the first weighing until the unit is out of the mould")
 ]
-Layers = Annotated[int, Meta(ge=1, le=MOST_LAYERS, description="units of more have no level")]
+MOST_LAYERS = 2
+Layers = Annotated[int, Meta(ge=1, le=MOST_LAYERS, description="no unit of more was measured")]
 Wall = Annotated[float, Meta(ge=LEAST_LAYER, le=20)]
 Step = Annotated[float, Meta(ge=0.01, le=10)]
 Name = Annotated[str, Meta(min_length=1, max_length=60)]
@@ -122,9 +120,7 @@ class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         tuple[kinds.MotorDiameter, kinds.MotorDiameter] | None,
         Meta(description="smallest and largest diameter; default: 14, or the smallest that takes the motor"),
     ] = None
-    step_mm: Annotated[
-        Step, Meta(description="step of walls and caps; the best candidates are refined between the steps")
-    ] = 0.25
+    step_mm: Annotated[Step, Meta(description="step of walls and caps")] = 0.25
     diameter_step_mm: Annotated[Step, Meta(description="step of the diameter")] = 1.0
 
     def walls(self, layers: int) -> tuple[float, float]:
@@ -138,14 +134,11 @@ class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class ModelsTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Inputs of the estimate."""
 
-    models: Annotated[
-        tuple[Name, ...] | None, Meta(description="closed forms, weighted by their leave-one-out score; default: all")
-    ] = None
-    fit: Annotated[str | None, Meta(description="lab-fit.toml of unitcad fit, in place of models")] = None
+    fit: Annotated[str | None, Meta(description="lab-fit.toml of unitcad fit")] = None
     tissue: Annotated[Name, Meta(description="body under the unit")] = "forearm"
     moduli: Annotated[
-        Moduli, Meta(description="moduli of the silicones: at the motor's frequency, or of a slow pull")
-    ] = "dynamic"
+        Moduli, Meta(description="moduli of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")
+    ] = "small-strain"
 
 
 class TargetFile(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -174,7 +167,6 @@ class Target:
     asked: TargetFile
     materials: tuple[str, ...]
     designs: tuple[str, ...]
-    models: tuple[str, ...]
     entries: Mapping[str, Any]
     fit: LabFit | None = None
 
@@ -222,9 +214,7 @@ def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path
     _named("at_hand.printer", [at_hand.printer], catalogue.printers(asked.printers))
     catalogue.tissue(asked.estimate.tissue, asked.tissue)
     text, fit = _fit(asked.estimate, folder)
-    models = tuple(asked.estimate.models or (fit.model if fit else STACKED))
-    check_models(models, fit.model if fit else STACKED, "estimate.models")
-    return Target(name, asked, names, chosen, models, _entries(asked, data, text), fit)
+    return Target(name, asked, names, chosen, _entries(asked, data, text), fit)
 
 
 def _named(field: str, given: Sequence[str] | None, known: Mapping[str, Any]) -> tuple[str, ...]:
@@ -301,10 +291,6 @@ def _entries(asked: TargetFile, data: Mapping[str, Any], fit_text: str) -> dict[
     lab = {"scale_resolution_g": asked.at_hand.scale_g, "room_c": asked.at_hand.room_c, "vacuum": asked.at_hand.vacuum}
     tables["casting"] = {**lab, **tables.get("casting", {})}
     estimate: dict[str, Any] = {"tissue": asked.estimate.tissue, "moduli": asked.estimate.moduli}
-    if asked.estimate.models is not None:
-        shown = [model for model in asked.estimate.models if model in MODELS]
-        estimate |= {"models": shown} if shown else {}
-        estimate |= {} if asked.estimate.fit else {"stack": list(asked.estimate.models)}
     if asked.target.frequency_hz is not None:
         estimate["frequency_hz"] = asked.target.frequency_hz
     if asked.estimate.fit is not None:

@@ -78,8 +78,8 @@ def answers_about(data: Mapping[str, Any]) -> Any:
     return import_module(kind.page) if kind else unit_answers
 
 
-def effective(text: bytes, trusted: bytes) -> bytes:
-    """Return {"text": the effective spec as TOML, "asked", "code"} of a text, or {"refused": why}.
+def resolved(text: bytes, trusted: bytes) -> bytes:
+    """Return {"text": the resolved spec as TOML, "asked", "code"} of a text, or {"refused": why}.
 
     `asked` has only the keys of the text, so that defaults follow other values; `code`: whether it has code. Both
     include the texts of the files that the text may name, and no other code.

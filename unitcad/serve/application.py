@@ -169,7 +169,7 @@ class Live:
         # Work in progress is saved too, and the page says that it is refused.
         refused = None
         try:
-            await self._effective(save.text)
+            await self._resolved(save.text)
         except UnitcadError as error:
             refused = str(error)
         return msgspec.json.encode(
@@ -181,7 +181,7 @@ class Live:
         return await _handled(request, Build, self._build)
 
     async def _build(self, build: Build) -> bytes:
-        given, code = await self._effective(build.text)
+        given, code = await self._resolved(build.text)
         out = self.setting.out
         arguments = ["build", "{spec}", "-o", _plain(out), *code]
         state = self.jobs.start("the build", arguments, {"spec.toml": given["text"]}, build_folder(out))
@@ -194,7 +194,7 @@ class Live:
     async def _sweep(self, sweep: Sweep) -> bytes:
         if not sweep.low < sweep.high:
             raise Refusal("high", sweep.high, f"must be above low, {sweep.low:g}")
-        given, code = await self._effective(sweep.text)
+        given, code = await self._resolved(sweep.text)
         step = (sweep.high - sweep.low) / (sweep.count - 1)
         values: list[float] = [round(sweep.low + i * step, 6) for i in range(sweep.count)]
         if all(value.is_integer() for value in values):
@@ -207,14 +207,14 @@ class Live:
         state = self.jobs.start("the sweep", arguments, files, sweep_folder(self.setting.out), first)
         return msgspec.json.encode(state)
 
-    async def _effective(self, text: str) -> tuple[dict[str, Any], list[str]]:
-        """Return the effective spec of a text as `text`, the text without files as `asked`, the option its code needs.
+    async def _resolved(self, text: str) -> tuple[dict[str, Any], list[str]]:
+        """Return the resolved spec of a text as `text`, the text without files as `asked`, the option its code needs.
 
         Raises UnitcadError for a text that is refused.
         """
         async with self.questions.turns["unit"]:
             content = await self.questions.call(
-                "unit", "unitcad.serve.answers:effective", text.encode("utf-8", "replace"), self.questions.trusted,
+                "unit", "unitcad.serve.answers:resolved", text.encode("utf-8", "replace"), self.questions.trusted,
                 seconds=10.0,
             )  # fmt: skip
         given = msgspec.json.decode(content)

@@ -13,8 +13,8 @@ from unitcad.catalogue import Material, materials, motors, printers, tissue
 from unitcad.designs import shipped
 from unitcad.serve.messages import Field, Group
 from unitcad.spec import Spec, to_data
-from unitcad.spec.asked import (
-    AskedSpec,
+from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, notes, titled
+from unitcad.spec.raw import (
     CastingTable,
     EstimateTable,
     FpcbTable,
@@ -22,9 +22,9 @@ from unitcad.spec.asked import (
     MotorTable,
     MouldsTable,
     OutputTable,
+    RawSpec,
     WiresTable,
 )
-from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, notes, titled
 from unitcad.text import number, toml
 from unitcad.validation.dotted import ABSENT, at
 
@@ -50,10 +50,10 @@ _TEXTS_OF_FILES = ("estimate.fit_source",)
 
 
 def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
-    """Return the form of a spec's plain data; `spec` is the effective one, None if the data is refused."""
+    """Return the form of a spec's plain data; `spec` is the resolved one, None if the data is refused."""
     settled = to_data(spec) if spec else {}
     choices = choices_of(data)
-    made = [Group("", "Unit", [*fields(AskedSpec, "", data, settled, choices, ("name", "design", "diameter_mm"))])]
+    made = [Group("", "Unit", [*fields(RawSpec, "", data, settled, choices, ("name", "design", "diameter_mm"))])]
     layers = data.get("layers")
     for i in range(len(layers) if isinstance(layers, list) else 0):
         made.append(
@@ -185,6 +185,6 @@ def choices_of(data: Mapping[str, Any]) -> Choices:
 
 
 def _modulus(entry: Material) -> str:
-    """Return the remark on a material in the list: its modulus at the motor's frequency."""
+    """Return the remark on a material in the list: its small-strain modulus."""
     modulus = entry.youngs_modulus_kpa
     return f"{number(modulus.value, 3)} kPa" if modulus else "no modulus at small strain"

@@ -144,7 +144,7 @@ class Answer(Struct, kw_only=True, omit_defaults=True):
     """An answer: the text after its edits, the faults, and the results if there is none.
 
     `milliseconds` is the time that it took, `processor_ms` that of the processor.
-    `groups` are the form's; `spec` the effective spec; `figures` are (name, value, unit), `drawings` (caption, SVG).
+    `groups` are the form's; `spec` the resolved spec; `figures` are (name, value, unit), `drawings` (caption, SVG).
     """
 
     text: str

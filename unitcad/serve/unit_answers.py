@@ -22,10 +22,10 @@ from unitcad.report.viewer_models import cells
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Trusted
 from unitcad.spec import Spec, convert, to_data, to_toml
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, is_custom, with_source
+from unitcad.spec.raw import RawSpec
 from unitcad.validation import from_data, warnings
-from unitcad.validation.defaults import effective
+from unitcad.validation.defaults import resolve
 from unitcad.validation.load import all_faults
 
 form = groups
@@ -35,7 +35,7 @@ faults_of = all_faults
 
 
 def settled(data: Mapping[str, Any], trusted: Trusted) -> Spec:
-    """Return the effective spec of a text's plain data. Raises Refusal."""
+    """Return the resolved spec of a text's plain data. Raises Refusal."""
     return from_data(data, folder_for(data, trusted))
 
 
@@ -47,13 +47,13 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
 
 def judge(data: dict[str, Any]) -> Mapping[str, Any]:
     """Return plain data that has its files' texts, settled. Raises UnitcadError."""
-    return to_data(effective(convert(data, AskedSpec)))
+    return to_data(resolve(convert(data, RawSpec)))
 
 
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:
     """Return the result of `judge`. Raises UnitcadError also for a unit that has no moulds."""
 
-    spec = effective(convert(data, AskedSpec))
+    spec = resolve(convert(data, RawSpec))
     _ = MouldSet(spec).plan
     return to_data(spec)
 

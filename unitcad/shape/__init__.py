@@ -1,4 +1,15 @@
-"""Solids as data: profiles and trees of them. No kernel is loaded here."""
+"""Solids as data: profiles and trees of them. No kernel is loaded here.
+
+Examples
+--------
+A disc with a round pocket, in mm:
+
+>>> from unitcad.shape import cut, cylinder, exact_volume
+>>> disc = cylinder(7, 0, 4)
+>>> unit = cut(disc, [cylinder(3.5, 0, 2)])
+>>> round(exact_volume(disc), 1)
+615.8
+"""
 
 from unitcad.shape.profile import (
     Profile,

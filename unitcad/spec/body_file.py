@@ -1,6 +1,6 @@
 """A design that is a file of bodies: `design = "body.step"`, also .stp, .stl and .3mf. Lengths in mm.
 
-The bodies' meshes become part of the effective spec, as text: a line a body, with its name, vertices and faces. So a
+The bodies' meshes become part of the resolved spec, as text: a line a body, with its name, vertices and faces. So a
 result's spec.toml is complete, the result's hash covers them, and reading it again needs no B-rep library.
 """
 

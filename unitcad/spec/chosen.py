@@ -7,8 +7,8 @@ from functools import lru_cache
 from msgspec import structs
 
 from unitcad import catalogue
-from unitcad.spec.asked import FpcbTable
-from unitcad.spec.effective import Moulds, Spec
+from unitcad.spec.raw import FpcbTable
+from unitcad.spec.resolved import Moulds, Spec
 from unitcad.text import number
 
 MOTOR_SIZES = ("diameter_mm", "thickness_mm")

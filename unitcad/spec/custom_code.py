@@ -1,6 +1,6 @@
 """A custom design: `design = "path/to/file.py:NAME"`, a function or a Design in that file, or a file of bodies.
 
-The file's text becomes part of the effective spec. So a result's spec.toml is complete, the result's hash covers the
+The file's text becomes part of the resolved spec. So a result's spec.toml is complete, the result's hash covers the
 code, and a worker elsewhere needs no file.
 """
 

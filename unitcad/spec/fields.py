@@ -1,7 +1,9 @@
-"""Introspection of the spec's tables: their keys, the kinds of value that a key takes, the meaning of a key."""
+"""Introspection of the spec's tables: their keys, the values that a key takes, the meaning of a key."""
 
 from __future__ import annotations
 
+import inspect
+import json
 import types
 import typing
 from collections.abc import Iterator, Mapping
@@ -79,3 +81,52 @@ def titled(kind: Any) -> str:
 def meaning(kind: Any) -> str:
     """Return the description that a kind is annotated with, or nothing."""
     return next((note.description for note in notes(kind) if note.description), "")
+
+
+def default_of(field: msgspec.structs.FieldInfo) -> str:
+    """Return a key's default as JSON; "" for none, an empty one or a table."""
+    value = field.default if field.default is not msgspec.NODEFAULT else field.default_factory()
+    if value is None or isinstance(value, msgspec.Struct) or value in ((), {}, ""):
+        return ""
+    return json.dumps(value, default=list)
+
+
+def values_of(kind: Any) -> str:
+    """Return the values that a key takes in words: words, a range, or a type."""
+    words: list[str] = []
+    for one in alternatives(kind):
+        origin = typing.get_origin(one)
+        if origin is typing.Literal:
+            words += [json.dumps(value) for value in typing.get_args(one)]
+        elif one in (int, float):
+            words.append(_range(kind, one))
+        elif one in (str, bool):
+            words.append("text" if one is str else "true, false")
+        elif origin in (tuple, list):
+            words.append(f"list of {values_of(entry_in(one))}")
+        elif one is not type(None):
+            words.append("table")
+    return ", ".join(dict.fromkeys(words))
+
+
+def _range(kind: Any, number: type) -> str:
+    low = next((note.ge for note in notes(kind) if note.ge is not None), None)
+    high = next((note.le for note in notes(kind) if note.le is not None), None)
+    if low is None or high is None:
+        name = "whole number" if number is int else "number"
+        return name if low is None else f"{name} from {low:g}"
+    if low == high:
+        return f"{low:g}"
+    return f"{low:g} to {high:g}{', whole' if number is int else ''}"
+
+
+def documented(table: type[msgspec.Struct]) -> str:
+    """Return the docstring of a table with its keys as the parameters of numpydoc."""
+    about, _, examples = inspect.cleandoc(table.__doc__ or "").partition("Examples\n")
+    lines = [about.rstrip(), "", "Parameters", "----------"]
+    for key, field in fields_of(table).items():
+        default = "" if field.required else f", default {default_of(field)}" if default_of(field) else ", optional"
+        text = meaning(field.type)
+        lines += [f"{key} : {values_of(field.type)}{default}", f"    {text[:1].upper()}{text[1:]}."]
+    raises = ["", "Raises", "------", "Refusal", "    When a Spec is made of a value that is not valid."]
+    return "\n".join([*lines, *raises, *(["", "Examples", examples] if examples else [])])

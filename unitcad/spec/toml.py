@@ -15,7 +15,7 @@ from msgspec import structs
 
 from unitcad.errors import UnitcadError
 from unitcad.files import read_text
-from unitcad.spec.effective import Spec, with_formats
+from unitcad.spec.resolved import Spec, with_formats
 from unitcad.spec.toml_lines import has_more
 
 MOST = 20_000
@@ -80,7 +80,7 @@ def from_json(text: str) -> Spec:
 
 
 def spec_hash(spec: Spec) -> str:
-    """Return the SHA-256 of the effective spec without name and formats; a result's folder ends in 12 digits of it."""
+    """Return the SHA-256 of the resolved spec without name and formats; a result's folder ends in 12 digits of it."""
     return hashlib.sha256(to_json(structs.replace(with_formats(spec), name="")).encode()).hexdigest()
 
 

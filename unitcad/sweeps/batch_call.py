@@ -15,7 +15,7 @@ from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.pipeline.plan import checked_outputs
 from unitcad.report import write_report
 from unitcad.report.batch_table import read_batch
-from unitcad.spec.asked import OUTPUTS, Format
+from unitcad.spec.raw import OUTPUTS, Format
 from unitcad.sweeps.batch_options import BatchOptions
 from unitcad.sweeps.batch_records import Summary
 from unitcad.sweeps.estimate_table import write_estimates

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from unitcad.cache import DEFAULT_LIMIT_MB, absolute
-from unitcad.spec.asked import OUTPUTS
+from unitcad.spec.raw import OUTPUTS
 from unitcad.sweeps.shards import Shard
 
 

@@ -10,17 +10,15 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.edge.bush import sections
-from unitcad.attenuation.edge.closed_form import CONTROL_PASSES, Section, Units
-from unitcad.attenuation.edge.fitted_models import edge_levels, stored
-from unitcad.attenuation.edge.variant_units import MANY_LAYERS, MOST_LAYERS
-from unitcad.attenuation.inputs import Geometry
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.measured_levels import Moduli, whole_ratio
+from unitcad.attenuation.edge.models import edge_levels, stored
 from unitcad.errors import UnitcadError
 from unitcad.estimating import closed_forms, drawn_input
 from unitcad.spec import Spec
@@ -57,26 +55,21 @@ class _Known:
     diameter_mm: float
     passes: float
     omega: float
-    geometry: Geometry
     walls: tuple[float, ...]
     materials: tuple[str, ...]
     silicones: np.ndarray
     models: tuple[str, ...]
     fit: str | None = None
-    moduli: Literal["dynamic", "quasi-static"] = "dynamic"
+    moduli: Moduli = "small-strain"
 
 
 @dataclass(frozen=True)
 class EstimateBlock:
-    """Variants from `start` on: edge levels by model (NaN: no number), and the input of each or why it is refused.
-
-    `layered`: whether a variant has too many layers for a level.
-    """
+    """Variants from `start` on: edge levels by model (NaN: no number), and the input of each or why it is refused."""
 
     start: int
     levels: dict[str, np.ndarray]
     known: list[_Known | UnitcadError]
-    layered: np.ndarray
 
 
 def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
@@ -156,7 +149,6 @@ def _known(spec: Spec) -> _Known:
         diameter_mm=spec.diameter_mm,
         passes=asked.passes,
         omega=2.0 * np.pi * asked.frequency.middle,
-        geometry=asked.geometry,
         walls=tuple(layer.thickness for layer in asked.layers),
         materials=tuple(layer.material for layer in asked.layers),
         silicones=np.array([_silicone(layer) for layer in asked.layers]),
@@ -177,7 +169,6 @@ def _block(
 ) -> EstimateBlock:
     """Evaluate one block: the combinations' inputs, with the free axes' values put in."""
     levels: dict[str, np.ndarray] = {}
-    layered = np.zeros(len(known), dtype=bool)
     by_layers: dict[int, list[int]] = {}
     for row, entry in enumerate(known):
         if isinstance(entry, _Known):
@@ -209,11 +200,9 @@ def _block(
             thickness=np.array([entry.walls for entry in there]),
             omega=omega,
             passes=np.array([entry.passes for entry in there]),
-            section=sections([entry.geometry for entry in there]),
+            whole=np.array([whole_ratio(entry.moduli) for entry in there]),
         )
         alike = list(_merged(units, materials[:, 1:] == materials[:, :-1]))
-        for rows, own in alike:
-            layered[chosen[rows]] = own.thickness.shape[1] > MOST_LAYERS
         unknown = np.isnan(silicones).any(axis=(1, 2))
         for model in dict.fromkeys(model for entry in there for model in entry.models):
             column = levels.setdefault(model, np.full(len(known), np.nan))
@@ -224,7 +213,7 @@ def _block(
                 for rows, own in alike:
                     found[rows] = edge_levels(own, model, constants)
                 column[chosen] = np.where(np.array(of_these) & ~unknown, found, column[chosen])
-    return EstimateBlock(start, levels, known, layered)
+    return EstimateBlock(start, levels, known)
 
 
 def _merged(units: Units, same: np.ndarray) -> Iterator[tuple[np.ndarray, Units]]:
@@ -232,22 +221,15 @@ def _merged(units: Units, same: np.ndarray) -> Iterator[tuple[np.ndarray, Units]
 
     `same` (rows, N - 1) tells if a layer is of the silicone of the one inside it.
     """
-    assert units.section is not None
     for pattern in np.unique(same, axis=0):
         rows = np.flatnonzero((same == pattern).all(axis=1))
         first = np.flatnonzero(np.append(True, ~pattern))
-        last = np.append(first[1:], units.thickness.shape[1]) - 1
-        section = {field.name: getattr(units.section, field.name)[rows] for field in fields(Section)}
-        section["outer_radii"] = section["outer_radii"][:, last]
-        section["caps"] = np.add.reduceat(section["caps"], first, axis=1)
         yield (
             rows,
             Units(
                 **{field: getattr(units, field)[rows][:, first] for field in FIELDS},
                 thickness=np.add.reduceat(units.thickness[rows], first, axis=1),
-                omega=units.omega[rows],
-                passes=units.passes[rows] if len(first) > 1 else np.full(len(rows), CONTROL_PASSES),
-                section=Section(**section),
+                **{field: getattr(units, field)[rows] for field in ("omega", "passes", "whole")},
             ),
         )
 
@@ -290,8 +272,7 @@ def _entries(sweep: Sweep, blocks: list[EstimateBlock]) -> Iterator[JournalEntry
             edges = {name: _rounded(column[row]) for name, column in levels.items()}
             name = values.get("name", known.name)
             columns = {"name": name, "design": known.design, "diameter_mm": known.diameter_mm, **edges}
-            reason = MANY_LAYERS if block.layered[row] else ""
-            yield JournalEntry(index=index, status=OK, reason=reason, values=values, row=columns)
+            yield JournalEntry(index=index, status=OK, values=values, row=columns)
 
 
 def _rounded(level: float) -> float | None:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from unitcad.attenuation.edge.answer import typical_errors
-from unitcad.attenuation.edge.fitted_models import edge_levels, stored
-from unitcad.attenuation.edge.variant_units import MOST_LAYERS, nominal
+from unitcad.attenuation.edge.answer import left_out
+from unitcad.attenuation.edge.models import edge_levels, stored
+from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.errors import UnitcadError
@@ -72,7 +72,7 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
             if told and all(np.ptp(np.log(levels)) < _SAME for levels in told):
                 unread[model].append(path)
     fit = fit_of(starts[0][1])
-    errors = typical_errors(fit, starts[0][1].estimate.moduli)
+    errors = left_out(starts[0][1].estimate.moduli, fit)
     ordered = sorted(models, key=lambda model: errors[model])
     return SweptEstimate(
         {model: float(f"{errors[model]:.6g}") for model in ordered},
@@ -85,7 +85,7 @@ def _not_measured(sweep: Sweep, specs: Sequence[Spec]) -> dict[str, float]:
     """Return the swept lengths with values that no measured unit of as many layers had, and the one that these had."""
     shared, found = measurements().unit, dict[str, float]()
     counts = {len(spec.layers) for spec in specs}
-    walls = [2 * shared.wall_mm / count for count in sorted(counts) if count <= MOST_LAYERS]
+    walls = [2 * shared.wall_mm / count for count in sorted(counts) if count <= 2]
     for path in sweep.paths:
         if not _LENGTH.fullmatch(path) or not walls:
             continue
@@ -130,14 +130,14 @@ def _spread(count: int, most: int) -> list[int]:
 
 
 def _spec(sweep: Sweep, index: int) -> Spec | None:
-    """Return a variant's spec; None if it is refused, or has no estimate or no level for its layers."""
+    """Return a variant's spec; None if it is refused or has no estimate."""
     try:
         spec = sweep.spec(index)
         assert isinstance(spec, Spec)
-        variant = estimate_input(spec)
+        estimate_input(spec)
     except UnitcadError:
         return None
-    return spec if len(variant.layers) <= MOST_LAYERS else None
+    return spec
 
 
 def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[str, list[float]]:

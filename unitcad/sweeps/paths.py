@@ -9,8 +9,8 @@ from typing import Any
 
 from unitcad.errors import Refusal
 from unitcad.rooms import load
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
+from unitcad.spec.raw import RawSpec
 from unitcad.validation import compound_kind
 
 
@@ -57,7 +57,7 @@ def known_paths(base: dict[str, Any]) -> list[str]:
 
 def _kind(base: dict[str, Any]) -> Any:
     kind = compound_kind(base)
-    return load(kind.model) if kind else AskedSpec
+    return load(kind.model) if kind else RawSpec
 
 
 def _walk(kind: Any, prefix: str, node: Any) -> Iterator[str]:

@@ -185,7 +185,7 @@ class Sweep:
         return self.bases[base][0], {axis.path: chosen[axis.path] for axis in self.axes}
 
     def spec(self, index: int) -> Any:
-        """Return the effective spec, or the array, of variant `index`. Raises Refusal."""
+        """Return the resolved spec, or the array, of variant `index`. Raises Refusal."""
         return subject_of_data(self._data(index)).of
 
     def faults(self, index: int, first: UnitcadError) -> str:

@@ -14,7 +14,6 @@ from functools import cache, partial
 from pathlib import Path
 
 from unitcad import files
-from unitcad.attenuation.edge.variant_units import MANY_LAYERS
 from unitcad.cache import Bundle, DiskStore, MemoryStore, MissingContent, SharedStore, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import write as folders
@@ -225,14 +224,13 @@ def _outcome(
     job: Job, spec: Subject, folder: str, manifest: Manifest, sha256: str, counts: Counter[str]
 ) -> VariantOutcome:
     """Return the outcome of a variant that is there; `sha256` is that of its manifest.json."""
-    codes, level = failed_codes(manifest), manifest["estimate"]
-    reason = MANY_LAYERS if level and MANY_LAYERS in level["answer"] else ""
+    codes = failed_codes(manifest)
     return VariantOutcome(
         job.index,
         BROKEN if codes else OK,
         folder,
         row(spec.unit, manifest),
-        f"broken: {', '.join(codes)}" if codes else reason,
+        f"broken: {', '.join(codes)}" if codes else "",
         manifest=sha256,
         built=counts["file built"] + counts["data built"],
         reused=counts["file reused"] + counts["data reused"],

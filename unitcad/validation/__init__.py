@@ -1,4 +1,4 @@
-"""Validation: from a TOML file, a template or plain data to an effective spec, or one refusal that names the field."""
+"""Validation: from a TOML file, a template or plain data to a resolved spec, or one refusal that names the field."""
 
 from unitcad.validation.advice import warnings
 from unitcad.validation.dotted import put

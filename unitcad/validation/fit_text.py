@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from unitcad.errors import Refusal
 from unitcad.spec import convert
-from unitcad.spec.asked import EstimateTable
+from unitcad.spec.raw import EstimateTable
 
 if TYPE_CHECKING:
     from unitcad.attenuation.edge.lab_fit import LabFit

@@ -14,10 +14,10 @@ from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
 from unitcad.files import read_text
 from unitcad.rooms import FileKind, file_kinds
 from unitcad.spec import Spec, check_plain, convert, read_toml
-from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
+from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml_lines import line_of
-from unitcad.validation.defaults import effective
+from unitcad.validation.defaults import resolve
 from unitcad.validation.dotted import ABSENT, at, put
 from unitcad.validation.faults import every_fault, settled
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files, shipped_of
@@ -25,7 +25,19 @@ from unitcad.validation.tables import Changes, Source, asked_of, changes_of, pla
 
 
 def templates() -> dict[str, Path]:
-    """Return the shipped templates by name."""
+    """Return the shipped templates.
+
+    Returns
+    -------
+    dict of str to Path
+        The TOML file of each template, by name.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> "encapsulating" in unitcad.templates()
+    True
+    """
     return shipped_files()
 
 
@@ -72,14 +84,35 @@ def default_template() -> str:
 
 
 def load(source: Source, set: Changes = ()) -> Spec:
-    """Return the effective spec of a template, a file, plain data, or another spec or variant.
+    """Return the resolved spec of a template, a file, plain data, or another spec or variant.
 
-    A text is a template's name (such as custom/strap-lugs), or a file where it holds a path separator or ends in .toml.
-    `set` changes values:
-    a dict by dotted path ({"layers.0.wall_mm": 1.2}), or texts "path=value" with a value in TOML syntax (a bare word
-    counts as a string). Lengths in mm. Values that follow from others follow the changed ones. A custom design's
-    path starts at the file's folder, else at the working directory. Raises Refusal or UnitcadError, naming the
-    field, for an invalid value; the refusal's `others` are the spec's further faults, each with `file` and `line`.
+    Parameters
+    ----------
+    source : str, path, dict, Spec or Variant
+        Name of a template, path of a TOML file (with a path separator or ending in .toml), or a spec's data.
+    set : dict or sequence of str, optional
+        Changes by dotted path: ``{"layers.0.wall_mm": 1.2}`` or ``["layers.0.wall_mm=1.2"]``. Lengths in mm.
+        Values that follow from others follow the changed ones.
+
+    Returns
+    -------
+    Spec
+        The spec with every default written out.
+
+    Raises
+    ------
+    Refusal
+        For an invalid value: field, value, limit and nearest accepted value. Its ``others`` are the spec's further
+        faults, each with ``file`` and ``line``.
+    UnitcadError
+        For a file that can't be read, and for a source of another type.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> spec = unitcad.load("encapsulating", set={"diameter_mm": 15})
+    >>> spec.diameter_mm, spec.motor.thickness_mm
+    (15.0, 2.0)
     """
     changes = list(changes_of(set))
     if kind := compound_kind(source):
@@ -122,7 +155,7 @@ def _is_compound(kind: FileKind, source: object) -> UnitcadError:
 
 
 def from_tables(keys: Mapping[str, object]) -> Spec:
-    """Return the effective spec of a spec's keys, tables as their classes or as dicts: what calling `Spec` does.
+    """Return the resolved spec of a spec's keys, tables as their classes or as dicts: what calling `Spec` does.
 
     Raises as `from_data`.
     """
@@ -151,14 +184,14 @@ def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any
 
 
 def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
-    """Return the validated, effective `Spec` of plain data.
+    """Return the validated, resolved `Spec` of plain data.
 
     `folder` is where the path of a custom design starts, whose file is then read and may run; without one no
     file is. Raises Refusal for the first fault; the value that it offers is accepted in that field.
     """
     plain = with_source(dict(data), folder) if folder else dict(data)
     try:
-        return effective(convert(plain, AskedSpec))
+        return resolve(convert(plain, RawSpec))
     except UnknownKey:
         raise
     except Refusal as refusal:
@@ -166,7 +199,7 @@ def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
 
 
 def _judge(data: dict[str, Any]) -> None:
-    effective(convert(data, AskedSpec))
+    resolve(convert(data, RawSpec))
 
 
 def _sound(data: Mapping[str, Any]) -> dict[str, Any]:

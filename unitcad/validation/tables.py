@@ -14,7 +14,7 @@ from msgspec import Struct
 from unitcad.catalogue import Printer
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import Spec, to_data
-from unitcad.spec.effective import CastLayer, Moulds
+from unitcad.spec.resolved import CastLayer, Moulds
 
 
 class HasSpec(Protocol):

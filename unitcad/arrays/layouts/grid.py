@@ -11,7 +11,7 @@ from unitcad.arrays.layouts.kind import LayoutKind, Point, named, needs
 from unitcad.designs.limits import up
 from unitcad.errors import Refusal
 from unitcad.spec import convert
-from unitcad.spec.asked import Table
+from unitcad.spec.raw import Table
 
 Count = Annotated[int, Meta(ge=1, le=100)]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from unitcad.errors import Refusal
-from unitcad.spec.asked import Table
+from unitcad.spec.raw import Table
 
 
 class Point(NamedTuple):

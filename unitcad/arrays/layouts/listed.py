@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from unitcad.arrays.layouts.kind import LayoutKind, Point, needs
 from unitcad.errors import Refusal
-from unitcad.spec.asked import Table
+from unitcad.spec.raw import Table
 
 Coordinate = Annotated[float, Meta(ge=-1000, le=1000)]
 

@@ -11,7 +11,7 @@ from unitcad.arrays.array_tables import Pitch
 from unitcad.arrays.layouts.kind import LayoutKind, Point, named, needs
 from unitcad.designs.limits import up
 from unitcad.errors import Refusal
-from unitcad.spec.asked import Table
+from unitcad.spec.raw import Table
 
 
 class RingTable(Table, frozen=True, kw_only=True):

@@ -1,1 +1,1 @@
-"""The level at a unit's edge: closed forms, what is fitted to the measured levels, and how well each does."""
+"""The level at a unit's edge: closed forms, fits to the measured levels, and their scores."""

@@ -1,4 +1,4 @@
-"""The paper's closed forms, as printed and corrected, and the empirical divider, over arrays of variants. SI.
+"""The paper's closed forms, as published and corrected, and inputs of the empirical models, over arrays of units. SI.
 
 Every function broadcasts: a `Units` holds any number of variants of N layers each. A path runs from the motor outwards
 through the walls of the layers, inside out, at the skin, and ends at the outer face, in air (equations 4 to 6).
@@ -6,7 +6,6 @@ through the walls of the layers, inside out, at the skin, and ends at the outer 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
@@ -23,8 +22,6 @@ READINGS: dict[Reading, str] = {
     "literal": "eta is a viscosity in Pa s and the exponent is taken as printed: its unit is a second, not a number",
 }
 AIR_IMPEDANCE: dict[str, float] = {"p": 1.204 * 343.0, "s": 0.0}  # Pa s/m at 20 degC; air carries no shear wave
-CONTROL_PASSES = math.sqrt(2.0)
-"""Of a single-layer control: the geometric mean of 1 and 2, since the paper does not say which shape it measured."""
 
 
 def _quiet() -> np.errstate:
@@ -33,26 +30,12 @@ def _quiet() -> np.errstate:
 
 
 @dataclass(frozen=True)
-class Section:
-    """Lengths of variants of N layers, m: outer_radii and caps (0: open rings) have the layers as last axis."""
-
-    cavity_radius: Any
-    motor_radius: Any
-    core_height: Any
-    outer_radii: Any
-    caps: Any
-
-    def __post_init__(self) -> None:
-        _as_arrays(self)
-
-
-@dataclass(frozen=True)
 class Units:
-    """Variants of N layers: arrays whose last axis runs over the layers, inside out; omega and passes lack it.
+    """Units of N layers: arrays whose last axis runs over the layers, inside out; omega, passes and whole lack it.
 
-    youngs_modulus Pa, density kg/m3, poisson_ratio, tan_delta, thickness m (of the walls), omega rad/s; passes is the
-    divider's n: how often the wave from motor to skin passes the border between the layers; `CONTROL_PASSES` for a
-    control. Only `bush` reads the section.
+    youngs_modulus Pa, density kg/m3, poisson_ratio, tan_delta, thickness m (of the walls), omega rad/s; passes: how
+    often the wave from motor to skin passes a border between layers; whole: the least ratio of moduli at which a
+    border's effect was measured (`measured_levels.whole_ratio`).
     """
 
     youngs_modulus: Any
@@ -62,22 +45,16 @@ class Units:
     thickness: Any
     omega: Any
     passes: Any
-    section: Section | None = None
+    whole: Any
 
     def __post_init__(self) -> None:
-        _as_arrays(self)
+        for field in fields(self):
+            object.__setattr__(self, field.name, np.asarray(getattr(self, field.name), dtype=float))
 
     def control(self, layer: int) -> Units:
         """Return own-material controls: the same unit, every layer of the material of `layer`."""
         one = {name: np.broadcast_to(v[..., layer, None], v.shape) for name in _MATERIAL for v in [getattr(self, name)]}
-        return replace(self, **one, passes=CONTROL_PASSES)
-
-
-def _as_arrays(record: Units | Section) -> None:
-    for field in fields(record):
-        value = getattr(record, field.name)
-        if value is not None and not isinstance(value, Section):
-            object.__setattr__(record, field.name, np.asarray(value, dtype=float))
+        return replace(self, **one)
 
 
 _MATERIAL = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
@@ -118,13 +95,13 @@ def with_air(layered: Any, wave: Wave) -> Any:
     return np.concatenate([layered, np.full((*layered.shape[:-1], 1), AIR_IMPEDANCE[wave])], axis=-1)
 
 
-def paper_transmissions(units: Units, wave: Wave = "s") -> Any:
+def transmissions(units: Units, wave: Wave = "s") -> Any:
     """Return k_t at each interface, shape (..., N): Layer 1 to 2, ..., the last layer to air."""
     z = with_air(impedances(units, wave), wave)
     return transmission(z[..., :-1], z[..., 1:])
 
 
-def paper_exponents(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
+def exponents(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
     """Return omega eta d/(E v) of each layer, equation 5, shape (..., N), by one of the `READINGS` of eta."""
     speed = wave_speed(units.youngs_modulus, units.density, units.poisson_ratio, wave)
     omega = units.omega[..., None]
@@ -132,22 +109,24 @@ def paper_exponents(units: Units, wave: Wave = "s", reading: Reading = "loss_mod
     return loss_rate * {"loss_modulus": 1.0, "kelvin_voigt": 0.5, "literal": 1.0 / omega}[reading]
 
 
-def paper_path(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
+def published_path(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
     """Return equation 5's product of k_t and exponentials along the walls, shape (...).
 
     f1, f2 and the skin's part cancel.
     """
-    return paper_paths(units, wave, (reading,))[reading]
+    return published_paths(units, wave, (reading,))[reading]
 
 
-def paper_paths(units: Units, wave: Wave = "s", readings: Iterable[Reading] = tuple(READINGS)) -> dict[Reading, Any]:
-    """Return `paper_path` by several readings, which share the transmissions."""
+def published_paths(
+    units: Units, wave: Wave = "s", readings: Iterable[Reading] = tuple(READINGS)
+) -> dict[Reading, Any]:
+    """Return `published_path` by several readings, which share the transmissions."""
     with _quiet():
-        passed = np.prod(paper_transmissions(units, wave), axis=-1)
-        return {one: passed * np.exp(-np.sum(paper_exponents(units, wave, one), axis=-1)) for one in readings}
+        passed = np.prod(transmissions(units, wave), axis=-1)
+        return {one: passed * np.exp(-np.sum(exponents(units, wave, one), axis=-1)) for one in readings}
 
 
-def consistent_path(units: Units, wave: Wave = "s") -> Any:
+def corrected_path(units: Units, wave: Wave = "s") -> Any:
     """Return the path by complex moduli: product of |2 Z1/(Z1+Z2)|, Z = sqrt(rho M*), exp(Im(omega sqrt(rho/M*)) d)."""
     shear = units.youngs_modulus / (2.0 * (1.0 + units.poisson_ratio)) * (1.0 + 1j * units.tan_delta)
     with _quiet():
@@ -159,24 +138,34 @@ def consistent_path(units: Units, wave: Wave = "s") -> Any:
         return passed * np.exp(-np.sum(rate * units.thickness, axis=-1))
 
 
-def transmission_only(units: Units) -> Any:
+def crossings(units: Units) -> Any:
     """Return k_t of shear waves to the power of `passes` and no exponential: a reading that the print does not have."""
-    inner = np.prod(paper_transmissions(units)[..., :-1], axis=-1)
-    return inner**units.passes
+    return np.prod(transmissions(units)[..., :-1], axis=-1) ** units.passes
 
 
-def divider(units: Units, kappa: Any) -> Any:
-    """Return 1/(1 + kappa n E_outer/E_inner), the empirical divider without its constant s.
-
-    E_outer and E_inner are those of the outermost and the innermost layer.
-    """
+def contrast(units: Units) -> Any:
+    """Return n E_outer/E_inner of the outermost and the innermost layer: the divider is s / (1 + kappa contrast)."""
     e = units.youngs_modulus
-    return 1.0 / (1.0 + kappa * units.passes * e[..., -1] / e[..., 0])
+    return units.passes * e[..., -1] / e[..., 0]
+
+
+def borders(units: Units) -> Any:
+    """Return how much each border between layers counts, shape (..., N - 1): 1 if its inside is softer, -1 if stiffer.
+
+    Between equal moduli and the ratio `whole` it grows with the logarithm of the ratio.
+    """
+    ratio = np.diff(np.log(units.youngs_modulus), axis=-1)
+    return np.clip(ratio / np.log(units.whole)[..., None], -1.0, 1.0)
+
+
+def softer_passes(units: Units) -> Any:
+    """Return how often the wave passes a border whose inside is the softer one: the rule is s q^n with this n."""
+    return units.passes * np.sum(np.maximum(borders(units), 0.0), axis=-1)
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """One of the paper's inequalities 6: `left` `relation` `right` for a unit against a control, as arrays."""
+    """One of the paper's inequalities 5 and 6: `left` `relation` `right` for a unit against a control, as arrays."""
 
     name: str
     text: str
@@ -197,18 +186,22 @@ class Constraint:
 
 
 def constraints(units: Units, control: Units) -> list[Constraint]:
-    """Return inequalities 6a to 6d, eta = E tan(delta)/omega in Pa s; 6c and 6d for each pair of neighbouring layers.
+    """Return inequalities 5a, 5b and 6a to 6d; 6c and 6d for each pair of neighbouring layers.
 
-    6a and 6b compare sums of eta d/(E v), whose unit is s2; another reading of eta multiplies both sides by the same
-    number. 6c and 6d say that the impedance grows outwards; they need no control.
+    5 compares `published_path`. 6a and 6b compare sums of eta d/(E v) with eta = E tan(delta)/omega in Pa s, whose unit
+    is s2; another reading of eta multiplies both sides by the same number. 6c and 6d say that the impedance grows
+    outwards; they need no control.
     """
     inequalities = []
-    attenuation: list[tuple[str, Wave]] = [("6a", "p"), ("6b", "s")]
-    for name, wave in attenuation:
-        sides = [np.sum(paper_exponents(u, wave, "literal"), axis=-1) / u.omega for u in (units, control)]
-        inequalities.append(
-            Constraint(name, f"attenuation of {wave.upper()} waves: unit above control", ">", sides[0], sides[1], "s2")
-        )
+    waves: list[tuple[str, Wave]] = [("a", "p"), ("b", "s")]
+    for name, wave in waves:
+        text = f"path of {wave.upper()} waves: unit below control"
+        paths = published_path(units, wave), published_path(control, wave)
+        inequalities.append(Constraint(f"5{name}", text, "<", *paths, "1"))
+    for name, wave in waves:
+        text = f"attenuation of {wave.upper()} waves: unit above control"
+        left, right = (np.sum(exponents(u, wave, "literal"), axis=-1) / u.omega for u in (units, control))
+        inequalities.append(Constraint(f"6{name}", text, ">", left, right, "s2"))
     growth: list[tuple[str, Wave]] = [("6c", "p"), ("6d", "s")]
     for name, wave in growth:
         squared = impedances(units, wave) ** 2 * (2.0 if wave == "s" else 1.0)

@@ -1,4 +1,4 @@
-"""What of an estimate goes into tables and manifests. It loads no solver."""
+"""The part of an estimate for tables and manifests. It loads no solver."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 def summary(estimated: dict[str, Any]) -> dict[str, Any]:
     """Return an estimate for a table or a manifest: edge level and its geometric-mean error by model, measured.
 
-    `measured` is that of this very unit. `model` is the one to go by, `answer` the sentence that leads the estimate.
+    `measured` is that of this very unit. `model` is the one that leads, `lines` the two lines of the answer.
     """
     measured = estimated["measured"] or {}
     models = {
@@ -21,7 +21,7 @@ def summary(estimated: dict[str, Any]) -> dict[str, Any]:
     return {
         "models": models,
         "model": estimated["answer"]["model"],
-        "answer": estimated["answer"]["lines"][0],
+        "lines": estimated["answer"]["lines"],
         "measured": measured.get("level") if measured.get("same_size") else None,
         "frequency_hz": estimated["variant"]["frequency_hz"]["value"],
     }

@@ -12,41 +12,52 @@ from msgspec.structs import replace
 
 from unitcad.attenuation.curve import decay_at, layered_block
 from unitcad.attenuation.edge.answer import answer
-from unitcad.attenuation.edge.fitted_models import MODELS, assessments, choice, forms, in_order, pairwise
 from unitcad.attenuation.edge.lab_fit import LabFit, error_block, own_block
-from unitcad.attenuation.edge.level import model_block, ranged, unknown
+from unitcad.attenuation.edge.level import edge_level, model_block, ranged, unknown
 from unitcad.attenuation.edge.measured_levels import Moduli
-from unitcad.attenuation.edge.paper_units import measured_block, unlike_measured
-from unitcad.attenuation.edge.predictive import HELD, STACKED, predictive_of
+from unitcad.attenuation.edge.models import (
+    BASELINE,
+    MODELS,
+    assessments,
+    choice,
+    classes_out,
+    in_order,
+    pairwise,
+    rules,
+)
+from unitcad.attenuation.edge.nearest import measured_block
 from unitcad.attenuation.edge.scores import RANGE_PERCENT, Assessment
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 
 SIGNIFICANT_DIGITS = 9
-SIDEWAYS_FORM = "bush is a form of sideways motion, but this motor drives along its axis (motor.drive = axial)."
 ASSUMPTIONS = [
-    "A flat ERM's sideways force turns in the skin's plane. The layered curve takes it so (`layered.drives`), and bush "
-    "its motion; the other models of the edge level know no direction of the force.",
-    "Amplitude at the edge is |u_z| of the skin at r = D/2, z = 0, over the motor's amplitude; the paper does not say "
-    "which axis it measured.",
+    "A flat ERM's sideways force turns in the skin's plane. The layered curve takes it so (`layered.drives`); the "
+    "models of the edge level know no direction of the force.",
+    "The edge is the skin at r = D/2, z = 0; a level is an amplitude over the motor's. published and corrected are "
+    "|u_z|; the paper states neither surface nor axis of what it measured, to which the rule is fitted.",
     "Poisson's ratio and loss factor of the silicones are assumed, with ranges; nobody has measured them for this.",
     "The cavity's air, the circuit's stiffness, the bond and the motor's mass are in none of the closed forms.",
 ]
 TABLE_NOTE = (
     "nine measured levels; twelve ratios of six units to the controls of their own materials (eight of them "
     "independent); geometric-mean factor, 1 is exact; left out: each unit predicted by constants fitted without it; "
-    "null: two constants, the softer layer inside or not; computed when this was made"
+    "baseline: the mean of each of four classes; computed when this was made"
 )
 RANGE_NOTE = (
     "5 to 95 % of the score over units drawn again with replacement; of nine units it holds the score of new ones less "
-    "often than that (docs/model.md has the share)"
+    "often than that (docs/estimate.md has the share)"
 )
 P_NOTE = (
     "two-sided p of the mean difference of two models' errors with the unit left out, over all flips of the units' "
     "signs; not corrected for the number of pairs"
 )
 CHOICE_NOTE = (
-    "each unit predicted by the form that is best on the other units, each of them left out; its constants are fitted "
-    "without the unit too"
+    "the rule when its form, n and what counts, is chosen without the unit too: each unit predicted by the form that "
+    "is best on the other units, its constants fitted without the unit"
+)
+CLASSES_NOTE = (
+    "geometric-mean factor error of each class, predicted by constants fitted without the whole class; the baseline, "
+    "which has no mean of it, takes that of all others. Four classes calibrate nothing"
 )
 SAME_P = 0.05
 """Two models whose sign-flip p is above it are not told apart."""
@@ -66,14 +77,13 @@ def estimate(
     models: Sequence[str] = MODELS,
     layered: Layered = rounded_layered,
     fit: LabFit | None = None,
-    stack: Sequence[str] | None = None,
 ) -> dict[str, Any]:
     """Return {variant, answer, models, layered, measured, table_error, assumptions}; numbers to nine digits.
 
-    With a lab's `fit` the constants are its own, each model has a predictive range, and the data have `fit` and
-    `own_measured`. `stack` names the closed forms behind the answer's range, where they are not `models`.
-    `layered` gives the layered solver's block, rounded; it reads no silicone: variants on one body share it.
-    A quantity that can't be given is null beside a `reason`. Raises `Refusal` for values that no body has.
+    `models` have a block each; the answer does not depend on them. With a lab's `fit` the constants are its own, each
+    model has a predictive range, and the data have `fit` and `own_measured`. `layered` gives the layered solver's
+    block, rounded; it reads no silicone: variants on one body share it. A quantity that can't be given is null next to
+    a `reason`. Raises `Refusal` for values that no body has.
     """
     errors = table_error(variant.moduli)
     blocks = {}
@@ -82,10 +92,7 @@ def estimate(
         block["table_error"] = errors[model]
         if fit:
             block["fit_error"] = error_block(fit, model)
-        if noted := not_of_this_drive(variant, [model]):
-            block["not_of_this_drive"] = noted[0]
         blocks[model] = block
-    notes = ranged(variant)
     data = {
         "variant": variant_block(variant),
         "models": blocks,
@@ -93,22 +100,16 @@ def estimate(
         "measured": measured_block(variant),
         "table_error": errors,
         "assumptions": [
-            *not_of_this_drive(variant, models),
             *ASSUMPTIONS,
-            *(f"A range, not a value: {note}" for note in notes),
+            *(f"A range, not a value: {note}" for note in ranged(variant)),
             *dict.fromkeys(_noted(variant)),
         ],
     }
     if fit:
         data["table_error"] = errors | {"constants": "the stored ones, not this fit's; fit_error has the fit's own"}
         data |= {"fit": fit_block(fit, models), "own_measured": own_block(fit, variant)}
-    # Where no model is singled out `crossings`, which gives no estimate of its own, is stacked too.
-    names = stack or (STACKED if fit is None and set(models) == set(MODELS) else models)
-    of_this_drive = [name for name in names if not not_of_this_drive(variant, [name])] or names
-    expected = predictive_of([variant], of_this_drive, fit) if names else None
-    held = HELD.get(tuple(of_this_drive)) if variant.moduli == "dynamic" else None
-    # The units of a lab's fit may have other lengths than the paper's.
-    lead = answer(data, expected) if fit else answer(data, expected, unlike_measured(variant), held)
+    levels = {name: edge_level(variant, name, fit) for name in MODELS}
+    lead = answer(variant, data, levels, fit)
     whole = {"variant": data.pop("variant"), "answer": lead, **data}
     # The solver's block and every table_error are rounded already.
     models_rounded = {
@@ -119,16 +120,12 @@ def estimate(
     return {name: done[name] if name in done else rounded(block) for name, block in whole.items()}
 
 
-def not_of_this_drive(variant: EstimateInput, models: Sequence[str]) -> list[str]:
-    """Return what is to be said of models that describe another drive than the motor's."""
-    return [SIDEWAYS_FORM] if variant.drive == "axial" and "bush" in models else []
-
-
 def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
-    """Return what a fit is and how well the models do there, the null's score beside them."""
-    scores = {name: fit.model[name] for name in models} | {"null": fit.null}
+    """Return a description of a fit, the model that leads by it, and the scores of models and baseline there."""
+    scores = {name: fit.model[name] for name in (*models, BASELINE)}
     return {
         "name": fit.name,
+        "leads": fit.leads,
         "own_units": fit.units,
         "with_paper": fit.with_paper,
         "moduli": fit.moduli,
@@ -166,9 +163,7 @@ def frequency_table(
     block = variant_block(variant)
     value = frequencies[0] if len(frequencies) == 1 else None
     block["frequency_hz"] = {"value": value, "low": min(frequencies), "high": max(frequencies)}
-    return rounded(
-        {"variant": block, "frequencies": rows, "assumptions": [*not_of_this_drive(variant, models), *ASSUMPTIONS]}
-    )
+    return rounded({"variant": block, "frequencies": rows, "assumptions": ASSUMPTIONS})
 
 
 def variant_block(variant: EstimateInput) -> dict[str, Any]:
@@ -199,11 +194,11 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
 
 
 @lru_cache
-def table_error(moduli: Moduli = "dynamic") -> dict[str, Any]:
-    """Return every model's errors against the measured table by such moduli, and the null model's, to nine digits.
+def table_error(moduli: Moduli = "small-strain") -> dict[str, Any]:
+    """Return every model's errors against the measured table by such moduli, the baseline's too, to nine digits.
 
     `order`: by the score with a unit left out, the best first. `sign_flip`: p of each pair, the better one first.
-    `chosen_without`: the score when the form is chosen without the unit too.
+    `chosen_without`: the rule's score when its form is chosen without the unit too. `classes_out`: by class left out.
     """
     found = assessments(moduli)
     order = in_order(found)
@@ -227,9 +222,10 @@ def table_error(moduli: Moduli = "dynamic") -> dict[str, Any]:
             "what": CHOICE_NOTE,
             **asdict(chosen.score),
             "range": _range(chosen.range),
-            "forms": list(forms()),
+            "forms": list(rules()),
             "chosen": list(chosen.chosen),
         },
+        "classes_out": {"what": CLASSES_NOTE, "by_class": classes_out(moduli)},
     }
     return rounded(table)
 
@@ -248,7 +244,7 @@ def assessment_block(assessment: Assessment) -> dict[str, Any]:
 
 
 def _noted(variant: EstimateInput) -> list[str]:
-    """Return what is to be said of moduli that are known but not at the motor's frequency."""
+    """Return notes on moduli that are known but not at the motor's frequency."""
     moduli = [(layer.material, layer.youngs_modulus) for layer in variant.layers]
     return [f"{name} youngs_modulus: {one.note}" for name, one in moduli if one.note and one.value is not None]
 
@@ -266,7 +262,7 @@ def _quantity(quantity: Quantity, factor: float) -> dict[str, Any]:
 
 
 def rounded(data: Any, digits: int = SIGNIFICANT_DIGITS) -> Any:
-    """Return `data` with its floats to `digits` significant digits, and None for what is not finite.
+    """Return `data` with its floats to `digits` significant digits, and None for floats that are not finite.
 
     So the last bits of a platform do not show.
     """

@@ -34,7 +34,7 @@ _TISSUE = ("shear_modulus", "damping", "thickness", "density")
 def inputs_seen(variant: EstimateInput, levels: Levels, step: float = STEP) -> dict[str, Any]:
     """Return {by: d ln level / d ln input by input, not_seen: the inputs that change nothing}, to four decimals.
 
-    Without a finite level `by` is None and a `reason` stands beside it.
+    Without a finite level `by` is None, with a `reason`.
     """
     with np.errstate(all="ignore"):
         low, high = np.log(np.asarray(levels(ends(variant, step)), dtype=float)).reshape(-1, 2).T
@@ -107,7 +107,7 @@ def _with(variant: EstimateInput, **lengths: Any) -> EstimateInput:
 
 
 def _cavity(geometry: Geometry, wider: float) -> float:
-    """Return the cavity's radius; where Layer 1 reaches the motor it stays the motor's."""
+    """Return the cavity's radius; if Layer 1 reaches the motor it stays the motor's."""
     return geometry.cavity_radius + (wider if geometry.gap > 0 else 0.0)
 
 
@@ -166,7 +166,7 @@ def _pad_radius(variant: EstimateInput, factor: float) -> EstimateInput:
 
 
 def _pad_thickness(variant: EstimateInput, factor: float) -> EstimateInput:
-    """Thicken the circuit; where it is part of the core, under a cap, the layers rise with it."""
+    """Thicken the circuit; if it is part of the core, under a cap, the layers rise with it."""
     geometry = variant.geometry
     pad = geometry.pad
     if pad is None:

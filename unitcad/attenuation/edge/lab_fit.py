@@ -1,4 +1,4 @@
-"""A lab's fit as it is stored: the models' constants, what a new unit's level may be, the lab's own measurements.
+"""A lab's stored fit: the models' constants, the prediction for a new unit, the lab's own measurements.
 
 A new unit's ln level is Student-t distributed: `scale`^2 = discrepancy^2 (1 + g' C g), where g is the gradient of the
 model's ln level in the logarithms of its constants, and C their covariance over discrepancy^2.
@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
 
-from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels
+from unitcad.attenuation.edge.models import BASELINE, COMPARED, MODELS, edge_levels
+from unitcad.attenuation.edge.nearest import COORDINATES
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.text import some
@@ -26,11 +25,11 @@ PERCENT = (10, 90)
 
 
 class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A model fitted to a lab's units: constants, where they were stored, and the predictive.
+    """A model fitted to a lab's units: constants, their stored values, and the predictive.
 
     `discrepancy`: standard deviation of a unit's ln level about the model. `covariance`: of the constants' logarithms,
     in the order of `constants`, over discrepancy^2. `left_out` is the factor with the unit left out.
-    `at_bound`: the constant that the search left on its bound, None where the units determine all.
+    `at_bound`: the constant that the search left on its bound, None if the units determine all.
     """
 
     constants: dict[str, Positive]
@@ -45,15 +44,18 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     left_out_high: Positive
     own_left_out: Positive | None = None
     own_by_stored: Positive | None = None
-    against_null: float | None = None
-    against_null_error: float | None = None
-    against_null_p: float | None = None
+    against_baseline: float | None = None
+    against_baseline_error: float | None = None
+    against_baseline_p: float | None = None
     held: str = ""
     at_bound: str | None = None
 
 
 class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A unit's level as the lab measured it, with its 95 % interval; `key` is its `unit_key`."""
+    """A unit's level as the lab measured it, with its 95 % interval; `key` is its `unit_key`.
+
+    `place`: its `nearest.COORDINATES`; `residual`: ln(measured/predicted) by the model that leads.
+    """
 
     unit: str
     key: str
@@ -61,6 +63,8 @@ class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     low: Positive | None = None
     high: Positive | None = None
     frequency_hz: Positive
+    place: Annotated[list[float], Meta(min_length=len(COORDINATES), max_length=len(COORDINATES))]
+    residual: float
     source: str = ""
 
 
@@ -72,7 +76,7 @@ class InputFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A lab's fit: `units` of its own, beside the paper's nine or not, by which moduli.
+    """A lab's fit: `units` of its own, with or without the paper's nine, by which moduli; `leads`: `models.leader`.
 
     `between_labs`: standard deviation between labs of a constant's logarithm over that between units of one lab.
     """
@@ -80,13 +84,13 @@ class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     format: Annotated[int, Meta(ge=1, le=1)]
     name: Annotated[str, Meta(min_length=1, max_length=100)]
     units: Annotated[int, Meta(ge=1, le=100000)]
-    moduli: Literal["dynamic", "quasi-static"]
+    moduli: Literal["small-strain", "quasi-static"]
     with_paper: bool
     between_labs: Annotated[float, Meta(ge=0, le=100)]
     seed: int
+    leads: Literal["rule", "published", "corrected", "divider"]
     model: dict[str, ModelFit]
-    null: ModelFit
-    measured: list[OwnLevel] = []
+    measured: Annotated[list[OwnLevel], Meta(min_length=1)]
     input: list[InputFile] = []
 
     def constants(self, model: str) -> dict[str, float]:
@@ -96,8 +100,8 @@ class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 def fault(fit: LabFit) -> tuple[str, Any, str] | None:
     """Return (field, value, limit) of the first thing wrong with a fit that its types do not show."""
-    needed = {model: {"kappa", "s"} if model == "fitted" else {"s"} for model in MODELS}
-    for model, names in needed.items():
+    for model in (*MODELS, BASELINE):
+        names = set(COMPARED[model].names)
         if model not in fit.model:
             return f"model.{model}", None, "is required"
         one = fit.model[model]
@@ -112,24 +116,16 @@ def fault(fit: LabFit) -> tuple[str, Any, str] | None:
     return None
 
 
-def gradient(model: str, units: Units, constants: Mapping[str, float]) -> np.ndarray:
-    """Return d ln level / d ln constant, shape (..., constants), in the order of `constants`."""
-    columns = {"s": np.ones(np.shape(units.passes))}
-    if model == "fitted":
-        e = units.youngs_modulus
-        x = constants["kappa"] * units.passes * e[..., -1] / e[..., 0]
-        columns["kappa"] = -x / (1.0 + x)
-    return np.stack([np.broadcast_to(columns[name], np.shape(units.passes)) for name in constants], axis=-1)
-
-
 def predictive(fit: LabFit, model: str, variant: EstimateInput) -> tuple[int, float, float]:
     """Return (degrees of freedom, centre, scale) of the Student-t distribution of a variant's ln level in the lab.
 
-    At the middle of the inputs' ranges; centre and scale are NaN where an input is not known.
+    At the middle of the inputs' ranges, for a unit like the measured ones; centre and scale are NaN if an input is not
+    known.
     """
     units, one = nominal(variant), fit.model[model]
     centre = float(np.log(edge_levels(units, model, one.constants))[0])
-    g = gradient(model, units, one.constants)[0]
+    own = np.array([one.constants[name] for name in COMPARED[model].names])
+    g = COMPARED[model].gradient(units, own)[0]
     scale = one.discrepancy * float(np.sqrt(1.0 + g @ np.array(one.covariance) @ g))
     return one.degrees_of_freedom, centre, scale if np.isfinite(centre) else float("nan")
 
@@ -161,7 +157,7 @@ def predictive_block(fit: LabFit, model: str, variant: EstimateInput, reason: st
 def error_block(fit: LabFit, model: str) -> dict[str, Any]:
     """Return a model's error by a fit, as factors: each unit left out, then of the lab's own units alone.
 
-    `own_by_stored`: the own units' by the stored constants, without the fit. `null`: of the two levels, left out too.
+    `own_by_stored`: the own units' by the stored constants, without the fit. `baseline`: of the class means.
     """
     one = fit.model[model]
     return {
@@ -169,12 +165,12 @@ def error_block(fit: LabFit, model: str) -> dict[str, Any]:
         "own_left_out": one.own_left_out,
         "own_by_stored": one.own_by_stored,
         "held_80": one.held,
-        "null": fit.null.left_out,
+        BASELINE: fit.model[BASELINE].left_out,
     }
 
 
 def unit_key(variant: EstimateInput) -> str:
-    """Return what tells one unit from another: a hash of design, silicones and lengths; not of body or frequency."""
+    """Return the identity of a unit: a hash of design, silicones and lengths; not of body or frequency."""
     geometry = variant.geometry
     lengths = [
         geometry.cavity_radius,

@@ -1,31 +1,33 @@
-"""Measured units as data, what a model's levels of them are, and the catalogue's own table: the paper's nine levels."""
+"""Measured units as data, their classes, and the catalogue's own table: the paper's nine levels."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
 
-from unitcad.attenuation.edge.closed_form import CONTROL_PASSES, Section, Units
-from unitcad.catalogue import Material, materials, measurements, motors
+from unitcad.attenuation.edge.closed_form import Units, softer_passes
+from unitcad.catalogue import Material, materials, measurements
 
 CONTROL = "single"
-"""What stands for the design in a control's name."""
-
-Moduli = Literal["dynamic", "quasi-static", "data sheet"]
-"""At the motor's frequency, as the paper has them; of a slow pull; of the data sheet, at 100 % strain."""
+"""Word in place of the design in a control's name."""
+CLASSES = ("control", "stiff inside", "soft inside, one pass", "soft inside, two passes")
+"""One layer; no border with the softer layer inside; such a border, passed once (open rings); passed more often."""
+Moduli = Literal["small-strain", "quasi-static", "data sheet"]
+"""As the paper prints them, or from a test at the motor's frequency; of a slow pull; of the data sheet, at 100 %."""
 Predict = Callable[[Units], Any]
-"""Levels of units of one number of layers, shape (...)."""
+"""Values of units of one number of layers, shape (...)."""
 
 
 @dataclass(frozen=True)
 class MeasuredTable:
     """Measured units: names, design (`CONTROL`: one layer), layers inside out, level (motor = 1), the models' input.
 
-    A unit of which more than one shape is possible has an input with a row for each; its level is the geometric mean.
+    Each input has a row for each shape that the unit may have; a model's ln level is the mean over them.
     """
 
     names: tuple[str, ...]
@@ -41,37 +43,45 @@ class MeasuredTable:
         return [(i, single[name]) for i, layers in enumerate(self.layers) if len(layers) > 1 for name in layers]
 
     @property
-    def soft_inside(self) -> np.ndarray:
-        """Whether the innermost layer of a unit is softer than the outermost, a truth value each."""
-        return self.evaluate(lambda units: units.youngs_modulus[..., -1] / units.youngs_modulus[..., 0]) > 1
+    def classes(self) -> np.ndarray:
+        """The number of each unit's class in `CLASSES`."""
+        return np.round(self.mean(unit_class)).astype(int)
 
-    def evaluate(self, predict: Predict) -> np.ndarray:
-        """Return `predict` of every unit."""
-        return np.array([np.exp(np.mean(np.log(predict(units)))) for units in self.inputs])
+    def mean(self, predict: Predict) -> np.ndarray:
+        """Return `predict` of every unit, the mean over its shapes."""
+        return np.array([np.mean(predict(units), axis=0) for units in self.inputs])
 
-    @property
-    def contrast(self) -> np.ndarray:
-        """n E_outer/E_inner of every unit, the divider's variable."""
-        return self.evaluate(lambda u: u.passes * u.youngs_modulus[..., -1] / u.youngs_modulus[..., 0])
+    def rows(self, kept: list[int]) -> MeasuredTable:
+        """Return the table of some of its units."""
+        names, designs, layers, inputs = (
+            tuple(values[i] for i in kept) for values in (self.names, self.designs, self.layers, self.inputs)
+        )
+        return MeasuredTable(names, designs, layers, self.levels[kept], inputs)  # pyright: ignore[reportArgumentType]
 
     def without(self, index: int) -> MeasuredTable:
         """Return the table without one unit."""
-        kept = [i for i in range(len(self.names)) if i != index]
-        return MeasuredTable(
-            tuple(self.names[i] for i in kept),
-            tuple(self.designs[i] for i in kept),
-            tuple(self.layers[i] for i in kept),
-            self.levels[kept],
-            tuple(self.inputs[i] for i in kept),
-        )
+        return self.rows([i for i in range(len(self.names)) if i != index])
 
-    def units(self, index: int) -> Units:
-        """Return the closed forms' input for one unit of the table."""
-        return self.inputs[index]
+
+def unit_class(units: Units) -> Any:
+    """Return the number of each unit's class in `CLASSES`, shape (...)."""
+    count, passes = softer_passes(units), np.broadcast_to(units.passes, units.thickness.shape[:-1])
+    if units.thickness.shape[-1] == 1:
+        return np.zeros(passes.shape)
+    return np.where(count <= 0.0, 1.0, np.where(passes <= 1.0, 2.0, 3.0))
 
 
 @cache
-def measured_table(moduli: Moduli = "dynamic") -> MeasuredTable:
+def whole_ratio(moduli: Moduli = "small-strain") -> float:
+    """Return the least ratio of moduli, the softer layer inside, at which a unit was measured, by such moduli."""
+    data = measurements()
+    pairs = [data.layers(unit) for design in data.designs.values() for unit in design.levels]
+    values = [[_modulus(materials()[name], moduli) for name in pair] for pair in pairs]
+    return min(outer / inner for inner, outer in values if outer > inner)
+
+
+@cache
+def measured_table(moduli: Moduli = "small-strain") -> MeasuredTable:
     """Return the nine levels of the catalogue's measurements, as the results section prints them.
 
     `moduli`: which of the silicones' moduli stand in the models' input.
@@ -88,38 +98,49 @@ def measured_table(moduli: Moduli = "dynamic") -> MeasuredTable:
     return MeasuredTable(tuple(names), tuple(designs), tuple(layers), np.array(levels), inputs)
 
 
+@cache
+def measured_slopes(moduli: Moduli = "small-strain") -> dict[tuple[str, int], list[float]]:
+    """Return d ln level / d ln modulus between measured units that differ in the silicone of one layer.
+
+    By kind (the first word of a class) and the number of the layer, from 0.
+    """
+    table, found = measured_table(moduli), dict[tuple[str, int], list[float]]()
+    for i, j in combinations(range(len(table.names)), 2):
+        one, other = table.layers[i], table.layers[j]
+        differ = [at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b]
+        same = table.designs[i] == table.designs[j] and table.classes[i] == table.classes[j]
+        if not same or len(one) != len(other) or len(differ) != 1:
+            continue
+        at = differ[0]
+        e = [table.inputs[row].youngs_modulus[0, at] for row in (i, j)]
+        slope = np.log(table.levels[j] / table.levels[i]) / np.log(e[1] / e[0])
+        found.setdefault((CLASSES[table.classes[i]].split(" ")[0], at), []).append(float(slope))
+    return found
+
+
 def _units(design: str, layers: tuple[str, ...], moduli: Moduli) -> Units:
-    """Return the input of a unit of the paper, at the catalogue's nominal values; a control's in every design."""
+    """Return the input of a unit of the paper at the catalogue's nominal values; a control's in every design."""
     known = [materials()[name] for name in layers]
-    all_designs, shared = measurements().designs, measurements().unit
-    shapes = list(all_designs.values()) if design == CONTROL else [all_designs[design]]
-    motor = motors()[shared.motor]
-    height, radius = float(motor.thickness_mm) * 1e-3, shared.diameter_mm * 1e-3 / 2
-    walls = 2 * shared.wall_mm * 1e-3
-    wall = walls / len(layers)
-    section = Section(
-        cavity_radius=[radius - walls] * len(shapes),
-        motor_radius=[float(motor.diameter_mm) * 1e-3 / 2] * len(shapes),
-        core_height=[height + (shared.circuit_mm * 1e-3 if shape.caps else 0.0) for shape in shapes],
-        outer_radii=[[radius - wall * i for i in reversed(range(len(layers)))]] * len(shapes),
-        caps=[[wall if shape.caps else 0.0] * len(layers) for shape in shapes],
-    )
+    data, shared = measurements(), measurements().unit
+    shapes = [shape for name, shape in data.designs.items() if design in (CONTROL, name)]
+    one = {
+        "youngs_modulus": [_modulus(material, moduli) for material in known],
+        "density": [1e3 * float(m.density_g_cm3) for m in known],
+        "poisson_ratio": [float(m.poisson_ratio) for m in known],
+        "tan_delta": [float(m.loss_factor) for m in known],
+        "thickness": [2e-3 * shared.wall_mm / len(layers)] * len(layers),
+        "omega": 2 * np.pi * shared.frequency_hz,
+        "whole": whole_ratio(moduli),
+    }
     return Units(
-        youngs_modulus=[_modulus(material, moduli) for material in known],
-        density=[1e3 * float(m.density_g_cm3) for m in known],
-        poisson_ratio=[float(m.poisson_ratio) for m in known],
-        tan_delta=[float(m.loss_factor) for m in known],
-        thickness=[wall] * len(layers),
-        omega=2 * np.pi * shared.frequency_hz,
-        passes=CONTROL_PASSES if design == CONTROL else all_designs[design].passes,
-        section=section,
+        **{key: [value] * len(shapes) for key, value in one.items()}, passes=[shape.passes for shape in shapes]
     )
 
 
 def _modulus(material: Material, moduli: Moduli) -> float:
-    """Return Young's modulus in Pa, NaN where there is none."""
+    """Return Young's modulus in Pa, NaN if there is none."""
     by_source = {
-        "dynamic": material.youngs_modulus_kpa,
+        "small-strain": material.youngs_modulus_kpa,
         "quasi-static": material.quasistatic_modulus_kpa,
         "data sheet": material.modulus_100pct_kpa,
     }

@@ -74,9 +74,14 @@ def assess(fit: Fit, fitted_ratios: bool, table: MeasuredTable) -> Assessment:
     )
 
 
+def left_out_levels(fit: Fit, table: MeasuredTable) -> np.ndarray:
+    """Return the level of each unit, predicted by constants fitted without it."""
+    return np.diagonal(fit(table, all_but_one(table)))
+
+
 def left_out_errors(fit: Fit, table: MeasuredTable) -> np.ndarray:
     """Return |ln(predicted/measured)| of each unit, predicted by constants fitted without it."""
-    return np.abs(np.log(np.diagonal(fit(table, all_but_one(table))) / table.levels))
+    return np.abs(np.log(left_out_levels(fit, table) / table.levels))
 
 
 def all_but_one(table: MeasuredTable) -> np.ndarray:

@@ -1,24 +1,23 @@
 """Models fitted to two campaigns, the paper's and a lab's, whose constants may differ: shrunk, judged, predictive.
 
 A unit's ln level scatters about its model with the standard deviation sigma (the discrepancy), and between campaigns
-the logarithms of a model's constants scatter by `between_labs` times what a unit of the other campaign tells. The
-likelihood of a campaign of n units then counts for another one with the weight 1/(n between_labs^2 + 1) a unit: a power
-prior (Ibrahim and Chen, Statistical Science 15, 46, 2000), for a model that is linear in its constants the conjugate
-normal prior centred at the other campaign's own fit. Nine units count as 0.9 of a lab's own if between_labs is 1.
-sigma^2 has the conjugate inverse gamma's estimate, so a prediction is Student-t with units less constants degrees of
-freedom. A unit measured with the standard error u of ln level counts 1/(1 + (u/sigma0)^2), where sigma0 is
-the paper's own sigma.
+the logarithms of a model's constants scatter by `between_labs` times the information of a unit of the other campaign.
+The likelihood of a campaign of n units then counts for another one with the weight 1/(n between_labs^2 + 1) a unit: a
+power prior (Ibrahim and Chen, Statistical Science 15, 46, 2000), for a model that is linear in its constants the
+conjugate normal prior centred at the other campaign's own fit. Nine units count as 0.9 of a lab's own if between_labs
+is 1. sigma^2 has the conjugate inverse gamma's estimate, so a prediction is Student-t with units less constants degrees
+of freedom. A unit measured with the standard error u of ln level counts 1/(1 + (u/sigma0)^2), where sigma0 is the
+paper's own sigma.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from unitcad.attenuation.edge.fitted_models import compared, fit_divider, path_of
 from unitcad.attenuation.edge.measured_levels import MeasuredTable
+from unitcad.attenuation.edge.models import Model
 from unitcad.attenuation.edge.scores import bootstrap_range, sign_flip_p
 
 BETWEEN_LABS = 1.0
@@ -38,19 +37,6 @@ class Campaigns:
         """Return the campaigns without one unit."""
         kept = np.arange(self.own.size) != index
         return replace(self, table=self.table.without(index), own=self.own[kept], error=self.error[kept])
-
-
-@dataclass(frozen=True)
-class Model:
-    """A model of ln level: its constants' names, their weighted least squares, and level and gradient by them.
-
-    `fit` takes a table and weights (units,); `logs` and `gradient` a table and constants: (units,), (units, constants).
-    """
-
-    names: tuple[str, ...]
-    fit: Callable[[MeasuredTable, np.ndarray], np.ndarray]
-    logs: Callable[[MeasuredTable, np.ndarray], np.ndarray]
-    gradient: Callable[[MeasuredTable, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -104,57 +90,51 @@ class Judged:
         return None if self.by_stored is None else _factor(self.by_stored[self.own])
 
     def held(self, content: float = 0.8) -> int:
-        """Return how many units lie in the middle `content` of what was predicted without them."""
+        """Return how many units are in the middle `content` of their prediction without them."""
         return int(np.sum(np.abs(self.share - 0.5) <= content / 2))
-
-
-def models() -> dict[str, Model]:
-    """Return every model that is compared, the null too."""
-    made = {name: _one_constant(name) for name in compared() if name not in ("fitted", "null")}
-    return {**made, "fitted": _divider(), "null": _null()}
 
 
 def shrunk(model: Model, campaigns: Campaigns, own: bool = True) -> Shrunk:
     """Fit a model for the lab (`own`) or for the paper, the other campaign's units as prior.
 
-    Raises ValueError where units are no more than constants.
+    Raises ValueError if units are no more than the constants that they determine.
     """
     table, here = campaigns.table, campaigns.own == own
     logs, count = np.log(table.levels), table.levels.size
-    df = count - len(model.names)
-    if df < 1:
-        raise ValueError(f"{count} units fit no model of {len(model.names)} constants")
     precision = _precision(model, campaigns)
     there = int(np.sum(~here))
     power = 1.0 / (there * campaigns.between_labs**2 + 1.0)
     weights = np.where(here, precision, power * precision)
-    constants = model.fit(table, weights)
-    left = float(weights @ (logs - model.logs(table, constants)) ** 2)
+    constants = _fitted(model, table, weights)
+    left = float(weights @ (logs - _logs(model, table, constants)) ** 2)
     if there:
         others = np.where(here, 0.0, precision)
-        misfit = float(others @ (logs - model.logs(table, model.fit(table, others))) ** 2)
+        misfit = float(others @ (logs - _logs(model, table, _fitted(model, table, others))) ** 2)
         left += (1.0 - power) * misfit
-    g = model.gradient(table, constants)
+    g = gradients(model, table, constants)
+    df = count - int(np.linalg.matrix_rank(g))
+    if df < 1:
+        raise ValueError(f"{count} units fit no model of {count - df} constants")
     covariance = np.linalg.pinv(g.T @ (weights[:, None] * g), hermitian=True)
     return Shrunk(constants, covariance, float(np.sqrt(left / df)), df)
 
 
 def judge(model: Model, campaigns: Campaigns) -> Judged:
-    """Predict each unit by the constants of its campaign, fitted without it; the paper's alone stand beside them."""
+    """Predict each unit by the constants of its campaign, fitted without it, and by only the paper's."""
     from scipy.special import stdtr
 
     table, logs = campaigns.table, np.log(campaigns.table.levels)
     centre, scale, df = np.empty(logs.size), np.empty(logs.size), 1
     for i in range(logs.size):
         found = shrunk(model, campaigns.without(i), bool(campaigns.own[i]))
-        at = float(model.logs(table, found.constants)[i])
-        df, centre[i], scale[i] = found.predictive(at, model.gradient(table, found.constants)[i])
+        at = float(_logs(model, table, found.constants)[i])
+        df, centre[i], scale[i] = found.predictive(at, gradients(model, table, found.constants)[i])
     scale = np.hypot(scale, campaigns.error)
     errors = centre - logs
     paper = ~campaigns.own
     by_stored = None
     if paper.any():
-        by_stored = model.logs(table, model.fit(table, paper.astype(float))) - logs
+        by_stored = _logs(model, table, _fitted(model, table, paper.astype(float))) - logs
     return Judged(errors, stdtr(df, -errors / scale), centre, scale, df, campaigns.own, by_stored)
 
 
@@ -177,48 +157,20 @@ def _precision(model: Model, campaigns: Campaigns) -> np.ndarray:
     table = campaigns.table
     used = ~campaigns.own if np.sum(~campaigns.own) > len(model.names) else np.ones(campaigns.own.size, dtype=bool)
     weights = used.astype(float)
-    left = np.log(table.levels) - model.logs(table, model.fit(table, weights))
+    left = np.log(table.levels) - _logs(model, table, _fitted(model, table, weights))
     sigma2 = float(weights @ left**2) / max(int(used.sum()) - len(model.names), 1)
     return sigma2 / (sigma2 + campaigns.error**2) if sigma2 > 0 else np.ones(campaigns.own.size)
 
 
-def _one_constant(name: str) -> Model:
-    path = path_of(name)
-
-    def logs(table: MeasuredTable, constants: np.ndarray) -> np.ndarray:
-        return np.log(constants[0] * table.evaluate(path))
-
-    def fit(table: MeasuredTable, weights: np.ndarray) -> np.ndarray:
-        return np.exp([np.average(np.log(table.levels / table.evaluate(path)), weights=weights)])
-
-    return Model(("s",), fit, logs, lambda table, constants: np.ones((table.levels.size, 1)))
+def gradients(model: Model, table: MeasuredTable, constants: np.ndarray) -> np.ndarray:
+    """Return d ln level / d ln constant of every unit, (units, constants)."""
+    return table.mean(lambda units: model.gradient(units, constants))
 
 
-def _divider() -> Model:
-    def logs(table: MeasuredTable, constants: np.ndarray) -> np.ndarray:
-        return np.log(constants[1]) - np.log1p(constants[0] * table.contrast)
-
-    def fit(table: MeasuredTable, weights: np.ndarray) -> np.ndarray:
-        return np.concatenate(fit_divider(table, weights[None]))
-
-    def gradient(table: MeasuredTable, constants: np.ndarray) -> np.ndarray:
-        x = constants[0] * table.contrast
-        return np.stack([-x / (1.0 + x), np.ones(x.size)], axis=-1)
-
-    return Model(("kappa", "s"), fit, logs, gradient)
+def _logs(model: Model, table: MeasuredTable, constants: np.ndarray) -> np.ndarray:
+    """Return ln level of every unit, (units,)."""
+    return table.mean(lambda units: model.logs(units, constants))
 
 
-def _null() -> Model:
-    def sides(table: MeasuredTable) -> np.ndarray:
-        soft = table.soft_inside
-        return np.stack([soft, ~soft], axis=-1).astype(float)
-
-    def fit(table: MeasuredTable, weights: np.ndarray) -> np.ndarray:
-        found = compared()["null"].fit(table, weights[None])[0]
-        soft, everywhere = table.soft_inside, float(np.exp(np.average(np.log(table.levels), weights=weights)))
-        return np.array([found[side][0] if side.any() else everywhere for side in (soft, ~soft)])
-
-    def logs(table: MeasuredTable, constants: np.ndarray) -> np.ndarray:
-        return sides(table) @ np.log(constants)
-
-    return Model(("softer_inside", "others"), fit, logs, lambda table, constants: sides(table))
+def _fitted(model: Model, table: MeasuredTable, weights: np.ndarray) -> np.ndarray:
+    return model.fit(table, weights[None])[0]

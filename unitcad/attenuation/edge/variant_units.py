@@ -7,18 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec.structs import replace
 
-from unitcad.attenuation.edge.bush import sections
-from unitcad.attenuation.edge.closed_form import CONTROL_PASSES, Units
-from unitcad.attenuation.inputs import EstimateInput
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.measured_levels import whole_ratio
+from unitcad.attenuation.inputs import EstimateInput, SiliconeLayer
 
 FIELDS = ("youngs_modulus", "poisson_ratio", "tan_delta")
-"""What a silicone has a range of."""
-MOST_LAYERS = 2
-"""Layers that a unit with a level may have, neighbours of one material merged."""
-MANY_LAYERS = (
-    "no measured unit has more than two layers, and the models would give this one another level if its layers were "
-    "cut differently"
-)
+"""Properties of a silicone that have a range."""
 
 
 def nominal(variant: EstimateInput) -> Units:
@@ -35,16 +29,24 @@ def stacked(variants: Sequence[EstimateInput]) -> Units:
         thickness=[[layer.thickness for layer in row] for row in layers],
         omega=[2.0 * np.pi * variant.frequency.middle for variant in variants],
         passes=[variant.passes for variant in variants],
-        section=sections([variant.geometry for variant in variants]),
+        whole=[whole_ratio(variant.moduli) for variant in variants],
     )
 
 
-def merged(variant: EstimateInput) -> EstimateInput:
-    """Return a unit with neighbouring layers of one material as one layer: how a body is cut changes no level."""
+def merged(variant: EstimateInput, within: float = 0.0) -> EstimateInput:
+    """Return a unit with neighbouring layers of one material as one layer: how a body is cut changes no level.
+
+    `within`: layers whose properties differ by less, relative, are of one material too, that of the innermost.
+    """
     layers, shapes = variant.layers, variant.geometry.layers
     groups: list[list[int]] = []
+
+    def alike(one: SiliconeLayer, other: SiliconeLayer) -> bool:
+        values = [[layer.density, *(getattr(layer, field).middle for field in FIELDS)] for layer in (one, other)]
+        return one.material == other.material or bool(np.allclose(*values, rtol=within, atol=0.0))
+
     for i, layer in enumerate(layers):
-        if groups and layers[groups[-1][-1]].material == layer.material:
+        if groups and alike(layers[groups[-1][0]], layer):
             groups[-1].append(i)
         else:
             groups.append([i])
@@ -52,16 +54,4 @@ def merged(variant: EstimateInput) -> EstimateInput:
         return variant
     whole = (replace(layers[g[0]], thickness=sum(layers[i].thickness for i in g), first=g[0]) for g in groups)
     outer = tuple(replace(shapes[g[-1]], cap=sum(shapes[i].cap for i in g)) for g in groups)
-    return replace(
-        variant,
-        passes=CONTROL_PASSES if len(groups) == 1 else variant.passes,
-        layers=tuple(whole),
-        geometry=replace(variant.geometry, layers=outer),
-    )
-
-
-def no_level(variant: EstimateInput) -> str:
-    """Return why no model gives the unit a level, its layers or a silicone's modulus; empty if they may."""
-    if len(variant.layers) > MOST_LAYERS:
-        return MANY_LAYERS
-    return next((layer.youngs_modulus.note for layer in variant.layers if not layer.youngs_modulus.known), "")
+    return replace(variant, layers=tuple(whole), geometry=replace(variant.geometry, layers=outer))

@@ -1,11 +1,11 @@
-"""Where a Hankel integral may stop: a bound of what lies beyond each wavenumber, measured on the kernel itself.
+"""The end of a Hankel integral: a bound of the tail beyond each wavenumber, measured on the kernel itself.
 
 The Hankel integral of a medium's compliance along a path of panels, with a bound on its error.
 
 Composite Gauss-Legendre (`quadrature`); a panel whose last Legendre coefficients have not died is halved towards the
 pole that they show, or goes around it. Each row of the load's kernel meets the Bessel function of its own order. At the
-surface the static half-space of one of the layers, known in closed form, is taken out first. What bounds the tail and
-the first panels are sampled in one call: most of what a call takes does not hang on how many wavenumbers there are.
+surface the static half-space of one of the layers, known in closed form, is taken out first. The bound of the tail and
+the first panels are sampled in one call: most of a call's time does not depend on the number of wavenumbers.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ from unitcad.errors import UnitcadError
 
 _PER_DECADE = 8
 _LOOSE = 1e-4
-"""rtol from which on a tail stops early, so that half as many wavenumbers show what is far out."""
+"""rtol from which on a tail stops early, so that half as many wavenumbers show the far part."""
 _FALLING = 30.0
 """Over the first wavenumber, and over the thinnest layer's thickness: beyond both a kernel falls off as a power."""
 _MARGIN = 1.5
 _SOON = 10.0
-"""Over the first wavenumber: where a tail may stop by the top layer's half-space, no other one is tried."""
+"""Over the first wavenumber: if a tail may stop there by the top layer's half-space, no other one is tried."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def measure_tail(
     if static is None:
         bounds = _bounds(k, raw, loads, r)[..., :within]
         return Tail(k[:within], bounds, (None,), min(float(bounds[..., 0].max()), largest))
-    # As on a half-space of the compliance at the wavenumber of the load's size: a film is not what the disc rests on.
+    # As on a half-space of the compliance at the wavenumber of the load's size: the disc does not rest on a film alone.
     at = min(int(k.searchsorted(1.0 / max(loads[0].reach, float(r.min())))), k.size - 1)
     scale = min(float((np.abs(static).max(axis=1) * np.abs(raw[:, at])).max()), largest)
     directions = tuple(load.direction for load in loads)
@@ -150,7 +150,7 @@ def measure_tail(
 
 
 def _left(tail: Tail, rtol: float) -> tuple[float, float, float]:
-    """Return what it leaves where it stops, nothing below the tolerance being better, and how far that is.
+    """Return the rest at its end, of which nothing below the tolerance is better, and the end's wavenumber.
 
     Among equals the one that leaves the least: the scale may have been guessed too large.
     """
@@ -206,7 +206,7 @@ def _summed_from_right(f: np.ndarray) -> np.ndarray:
 
 
 def _beyond(k: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Integrate what goes on as k^-1.5, or as fast as it fell from the last wavenumber but two to the last one."""
+    """Integrate a tail that falls as k^-1.5, or as fast as from the last wavenumber but two to the last one."""
     least = np.maximum(ends, 1e-300)
     power = np.log(least[..., :1] / least[..., 1:]) / np.log(k[-1] / k[-3])
     return ends[..., 1:] * (k[-1] / np.maximum(power - 1.0, 1e-3))
@@ -223,15 +223,15 @@ _CLEAR = 0.3
 """Of a pole's distance from its panel: how uncertain it may be where it says how far to halve."""
 _MOST_TIMES = 9
 _PANELS_SHARE = 0.3
-"""Of the tolerance: what the panels may be off by together. The tail may leave 0.4."""
+"""Share of the tolerance for the error of all panels together. The tail may have 0.4."""
 _DETOURS_SHARE = 0.25
-"""Of the tolerance: what detours may leave out together beyond the share of their panels.
+"""Share of the tolerance for the error of all detours together, in addition to that of their panels.
 
 Panels are only ever halved, so those of a tighter tolerance are pieces of those of a looser one. The tighter one takes
-the looser one's detours too, unless they leave out more than this: its panels then leave 0.3 / 0.25 of that at most.
+the looser one's detours too, unless their error exceeds this: its panels then have 0.3 / 0.25 of that at most.
 """
 _WORTH = 0.2
-"""Of the error: what another attempt must be able to gain.
+"""Share of the error that another attempt must be able to gain.
 
 A tighter rtol that is not reached then is at most 1.25 times worse than a looser one, but for rare media: one of 2,000
 random ones was 2.5 times worse (`random_media.trial("extreme contrast", 90143)`).
@@ -301,7 +301,7 @@ class Problem:
         return np.concatenate([static_kernels(body.reference, directions) for body in self.bodies if body.reference])
 
     def static_part(self, static: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what was taken out, shape (rows, n), and a bound of its rounding; both of a body's loads are given."""
+        """Return the part taken out, shape (rows, n), and a bound of its rounding, for both of a body's loads."""
         kernel = self.taken_out.reshape(len(self.bodies), -1, 1)
         rounded = np.abs(kernel).max(axis=1, keepdims=True) * rounding
         return (kernel * static).reshape(-1, self.r.size), rounded.reshape(-1, self.r.size)
@@ -311,8 +311,8 @@ class Problem:
 class Integrals:
     """A row an order of the load at each radius, shape (rows, n), and a bound of its error.
 
-    cut_short: all but little of it is rounding's, or the tail's beyond what can be afforded; exhausted: there were
-    panels left to be halved.
+    cut_short: the error is dominated by round-off, or by the tail beyond the affordable wavenumbers; exhausted: there
+    were panels left to be halved.
     """
 
     total: np.ndarray
@@ -349,7 +349,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     least = float(tail.bounds[..., -1].max())
 
     def tolerance(size: float) -> float:
-        return max(rtol * min(size, largest), 0.3 * least)  # what the tail leaves anyway is worth no halving
+        return max(rtol * min(size, largest), 0.3 * least)  # no halving below the error of the tail
 
     referred = zip(bare.bodies, tail.references, strict=True)
     bodies = tuple(Body(body.medium, body.omega, reference) for body, reference in referred)
@@ -394,7 +394,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             quadrature += found.errors[good].sum(0)
             size += found.sizes[good].sum(0)
             gained += float(found.gains[good].sum())
-            sure = tolerance(float(np.max(whole - off - skipped)))  # beside a pole |u| is at first far too large
+            sure = tolerance(float(np.max(whole - off - skipped)))  # next to a pole |u| is at first far too large
             left_out = _DETOURS_SHARE * sure - float(skipped.max())
             now, later, pieces = _detours(problem, pending, found, bad, limit, left_out, span)
             skipped += found.hidden[now].sum(0)
@@ -412,14 +412,14 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     error = quadrature + skipped + rest + 4e-15 * size + rounded
     total = known + total
     cut_short = False
-    if not error.max() <= rtol * np.abs(total).max():  # where it is reached, nobody asks
+    if not error.max() <= rtol * np.abs(total).max():  # never read if it is reached
         gained += sum(float(found.gains.sum()) for found in settled)
         cut_short = gained + float(skipped.max() + rest.max()) - least < _WORTH * float(np.max(error))
     return Integrals(total, error, count, cut_short, exhausted)
 
 
 class _Opening(NamedTuple):
-    """What a path begins with: where its tail is sampled, its first panels, and where they end.
+    """Start of a path: the samples of its tail, its first panels, and their end.
 
     beyond (n,), the wavenumbers (1/m) of the tail's samples; panels; k, these wavenumbers and those of the panels'
     nodes; slope (panels, nodes); stop, of shape (1,); static, rounding (rows, radii), the loads' static integrals and
@@ -471,7 +471,7 @@ def _first_stop(beyond: np.ndarray, end: float, rtol: float, longest: float) -> 
 def _times(found: Evaluated) -> np.ndarray:
     """Return how often each panel is to be halved towards its pole until that is not much nearer than `_AWAY`, (n,).
 
-    Once where no single pole is seen, or where so many times would not suffice: a detour may serve, and panels too
+    Once if no single pole is seen, or if so many times would not suffice: a detour may serve, and panels too
     short for it keep more of its rounding. No tolerance is in it: those of a tighter
     rtol stay pieces of a looser one's.
     """
@@ -509,7 +509,7 @@ def _cuts(found: Evaluated, put_off: _PutOff, limit: float, panels: int) -> _Cut
     due = put_off.due(found, bad)
     dropped = np.isin(put_off.of, due) if due.size else np.zeros_like(bad)
     bad &= ~dropped
-    room = panels // 4  # quarters of them are what is left
+    room = panels // 4  # quarters of them remain
     some = _worst(found.gains, bad, room)
     return _Cuts(some, ~(some | dropped), due, bool(np.count_nonzero(bad) > room))
 
@@ -531,7 +531,7 @@ class _PutOff(NamedTuple):
     def due(self, found: Evaluated, bad: np.ndarray) -> np.ndarray:
         """Return those to take after all: the worst panel in their place is bad and would leave out no less.
 
-        What is left of its last coefficients is rounding, which grows with each halving.
+        The rest of its last coefficients is rounding, which grows with each halving.
         """
         if not len(self.hidden):
             return np.arange(0)
@@ -546,7 +546,7 @@ def _detours(
 ) -> tuple[np.ndarray, np.ndarray, Array]:
     """Return which of the `bad` panels go around a pole, which only if halving does not help, and the pieces of both.
 
-    enough: what a detour may leave out in any case; left: what those may that leave out more, the least ones first;
+    enough: error permitted to any detour; left: error permitted to the others together, the least ones first;
     pieces: shape (panels, 4, 4).
     """
     hidden = found.hidden.max(axis=(1, 2))

@@ -1,10 +1,10 @@
-"""What hangs on wavenumbers, radii and loads alone, kept for the last of them: most calls have the same radii.
+"""Functions of only wavenumbers, radii and loads, cached for the last of them: most calls have the same radii.
 
 Bessel functions of the Hankel transforms, and the moment of J1 that is a radial disc's transform.
 
 A static homogeneous half-space under each load, in closed form.
 
-It is what is taken out of a Hankel integral at the surface.
+It is taken out of a Hankel integral at the surface.
 
 Rows are those of a load's kernel, with its `orders`: (u_r, u_z) under an axisymmetric load, and under a sideways one
 (A, B, Z), of which u_r = A - B, u_theta = -(A + B) and u_z = -Z are made.
@@ -13,8 +13,8 @@ Loads on the surface, in the Hankel domain.
 
 A normal load (F1 of the paper's equation 2a) is a pressure, positive into the body, with a J0 transform; a radial load
 (F2, equation 2b) is a traction outwards from the axis, with a J1 transform. q(k) = integral of q(r) J(kr) r dr.
-A tangential load is a traction in one direction of the plane, theta = 0, the same everywhere on the disc: a motor that
-drives sideways. Its transform is that of the normal one.
+A tangential load is a traction in one direction of the plane, theta = 0. It is the same everywhere on the disc: a
+motor that drives sideways. Its transform is that of the normal one.
 
 A force that turns in the plane, as a coin ERM's does, is two tangential ones in quadrature: F along theta = 0 and -i F
 along theta = pi/2. Together they move a point at theta by F e^{-i theta} (u_r, i u_theta, u_z), in the amplitudes
@@ -74,7 +74,7 @@ def kept(make: Callable[..., Made]) -> Callable[..., Made]:
 _SERIES = 1.0  # |x| up to which the power series of the moment is summed
 _FAR = 40.0  # |x| from which the expansion in 1/x is good to 1e-16
 _FIRST_ORDER = 100  # J of this order is below 1e-25 for |x| up to _FAR
-_LEAST = 1e-220  # where the downward recurrence starts: at |x| = _SERIES it grows by 1e189
+_LEAST = 1e-220  # start of the downward recurrence: at |x| = _SERIES it grows by 1e189
 
 
 def bessel(order: int, x: Any) -> Any:
@@ -225,16 +225,16 @@ _UNIT = 2.0**-53
 def static_rounding(integrals: Any, s: Any = None) -> Any:
     """Bound the rounding of `static_kernel` times the integrals of a load, shape (rows, n); s: radii over the disc's.
 
-    It is over the kernel's largest row: the rows of a compliance come from one solution, and what is taken out of the
+    It is over the kernel's largest row: the rows of a compliance come from one solution, and the part taken out of the
     integrand leaves the compliance's rounding in the integral: that of 1 / k all over, which adds up to the closed form
     again. In units of 2^-53, times the integral:
 
     - 16: the moduli with their damping and eps 3 each, the solution for the compliance 6, the kernel 2, the product
       and the sum 2;
-    - 24: the integral itself. That is what the second order needs, at m next to `_ELLIPTIC`, where its terms are seven
+    - 24: the integral itself. The second order needs it, at m next to `_ELLIPTIC`, where its terms are seven
       times their sum; the others are within 8, a point's within 4.
 
-    And beside it: s is rounded, once, and the integral follows by s times its slope. That is at most
+    In addition: s is rounded, once, and the integral follows by s times its slope. That is at most
     three times the integral and min(s, 1 / s) (1 - ln |1 - s|): the slope is logarithmic at the rim, and a radial
     load's 1 - s goes to 0 there.
     """
@@ -347,10 +347,25 @@ def _orders(direction: Direction) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Point:
-    """One newton at the origin. Radial: the traction 1 / (2 pi r^2), its transform as constant as the normal one's.
+    """A force of one newton at the origin.
 
-    (A radial traction that vanishes outside a point has no resultant and no effect; this one is what the paper's F2
-    means once its F1 is a point.)
+    A radial point load is the traction 1 / (2 pi r^2), whose transform is constant like that of the normal one.
+
+    Parameters
+    ----------
+    direction : {"normal", "radial", "tangential"}, default "normal"
+        Direction of the force.
+
+    Raises
+    ------
+    Refusal
+        For an unknown direction.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import Point
+    >>> Point("tangential").reach
+    0.0
     """
 
     direction: Direction = "normal"
@@ -397,7 +412,26 @@ class Point:
 
 @dataclass(frozen=True)
 class UniformDisc:
-    """One pascal, everywhere the same, on a disc of `radius` (m): a pressure, a traction outwards or one sideways."""
+    """A uniform stress of one pascal on a disc.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the disc, m, above 0.
+    direction : {"normal", "radial", "tangential"}, default "normal"
+        A pressure, a traction outwards, or one sideways.
+
+    Raises
+    ------
+    Refusal
+        For a radius that is not positive, and for an unknown direction.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import UniformDisc
+    >>> UniformDisc(3.5e-3).reach
+    0.0035
+    """
 
     radius: float
     direction: Direction = "normal"

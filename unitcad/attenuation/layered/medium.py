@@ -72,7 +72,24 @@ def out_of_range(field: str, number: float) -> Refusal:
 
 @dataclass(frozen=True)
 class KelvinVoigt:
-    """mu + i omega eta, with the shear viscosity eta in Pa s."""
+    """Damping by a viscosity: mu + i omega eta.
+
+    Parameters
+    ----------
+    viscosity : float
+        Shear viscosity eta, Pa s, at least 0.
+
+    Raises
+    ------
+    Refusal
+        For a value that is negative or not finite.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import KelvinVoigt
+    >>> KelvinVoigt(2.0).complex_shear(10e3, omega=500.0)
+    (10000+1000j)
+    """
 
     viscosity: float
 
@@ -85,7 +102,24 @@ class KelvinVoigt:
 
 @dataclass(frozen=True)
 class LossFactor:
-    """mu (1 + i tan delta), the same at every frequency, 0 included."""
+    """Damping by a constant loss factor: mu (1 + i tan delta), the same at every frequency.
+
+    Parameters
+    ----------
+    tan_delta : float
+        Loss factor, at least 0.
+
+    Raises
+    ------
+    Refusal
+        For a value that is negative or not finite.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import LossFactor
+    >>> LossFactor(0.5).complex_shear(10e3, omega=785.0)
+    (10000+5000j)
+    """
 
     tan_delta: float
 
@@ -98,7 +132,27 @@ class LossFactor:
 
 @dataclass(frozen=True)
 class FractionalKelvinVoigt:
-    """mu (1 + (i omega tau)^n), tau in seconds, 0 <= n <= 1; n = 1 is Kelvin-Voigt with eta = mu tau."""
+    """Damping by a fractional law: mu (1 + (i omega tau)^n).
+
+    Parameters
+    ----------
+    tau : float
+        Time constant, s, at least 0.
+    n : float
+        Order, 0 to 1; n = 1 is Kelvin-Voigt with eta = mu tau.
+
+    Raises
+    ------
+    Refusal
+        For a value out of range or not finite.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import FractionalKelvinVoigt
+    >>> modulus = FractionalKelvinVoigt(tau=2e-3, n=1.0).complex_shear(10e3, omega=500.0)
+    >>> round(modulus.real), round(modulus.imag)
+    (10000, 10000)
+    """
 
     tau: float
     n: float
@@ -130,7 +184,31 @@ def compressibility(poisson_ratio: float) -> float:
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer: thickness (m), density (kg/m3), Young's modulus (Pa), Poisson's ratio in (-1, 1/2], damping law."""
+    """A layer of a layered medium.
+
+    Parameters
+    ----------
+    thickness : float
+        Thickness, m, at least 0.
+    density : float
+        Density, kg/m3.
+    youngs_modulus : float
+        Young's modulus, Pa.
+    poisson_ratio : float
+        Poisson's ratio, above -1, at most 1/2.
+    damping : Damping, optional
+        Damping of the shear modulus. Default: none.
+
+    Raises
+    ------
+    Refusal
+        For a value out of range or not finite.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import Layer, LossFactor
+    >>> skin = Layer(1.5e-3, 1100.0, 100e3, 0.5, LossFactor(0.3))
+    """
 
     thickness: float
     density: float
@@ -145,7 +223,29 @@ class Layer:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """The body under all layers; units as `Layer`. A Young's modulus of 0 means a free underside."""
+    """The body under all layers.
+
+    Parameters
+    ----------
+    density : float
+        Density, kg/m3.
+    youngs_modulus : float
+        Young's modulus, Pa; 0 means a free underside.
+    poisson_ratio : float
+        Poisson's ratio, above -1, at most 1/2.
+    damping : Damping, optional
+        Damping of the shear modulus. Default: none.
+
+    Raises
+    ------
+    Refusal
+        For a value out of range or not finite.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import HalfSpace
+    >>> muscle = HalfSpace(1060.0, 20e3, 0.5)
+    """
 
     density: float
     youngs_modulus: float
@@ -172,7 +272,7 @@ def _check_material(what: str, body: Layer | HalfSpace, above: bool) -> None:
 class Stack:
     """Layers, top first, on a half-space: its compliance and its transfer to a depth, per wavenumber.
 
-    Raises `Refusal` for what is no `Layer` or no `HalfSpace`.
+    Raises `Refusal` for objects other than `Layer` and `HalfSpace`.
     """
 
     def __init__(self, layers: Iterable[Layer], half_space: HalfSpace, least_loss: float = 0.0) -> None:
@@ -214,7 +314,7 @@ class Stack:
     def without_empty_layers(self) -> Stack:
         """Return the same stack without layers of no thickness, which change nothing."""
         if all(layer.thickness > 0 for layer in self.layers):
-            return self  # and what it knows of its materials
+            return self  # and its cached properties of materials
         return Stack([layer for layer in self.layers if layer.thickness > 0], self.half_space, self.least_loss)
 
     def with_loss(self, tan_delta: float) -> Stack:
@@ -234,7 +334,7 @@ class Stack:
     def last_pole(self, omega: float) -> float:
         """Return a wavenumber (1/m) above every pole and branch point: slow surface waves, bending of layers as plates.
 
-        The softest layer bends with what it lies on, not as a plate. Raises as `materials`.
+        The softest layer bends with the layers under it, not as a plate. Raises as `materials`.
         """
         if self._pole is None or self._pole[0] != omega:
             self._pole = omega, _last_pole(self.layers, self.materials(omega), omega)

@@ -21,7 +21,7 @@ A state is (u_r, u_z, t_r, t_z). A plane is a (4, 2, n) block of them, (U, T): a
 stack below can carry. By reciprocity any two of them have u . t' = t . u', so the plane's own equation is
 T^T u = U^T t.
 
-Horizontally polarised shear (SH) in a stack: what a sideways force adds to the waves of an axial one.
+Horizontally polarised shear (SH) in a stack: the waves of a sideways force besides those of an axial one.
 
 A field is u_theta = V(z) J'(kr) and the like; its traction on a plane z = const, acting on the body below, is -mu V'.
 Per wavenumber the state is the pair (V, -mu V'), carried upwards from the half-space by decaying exponentials only:
@@ -127,7 +127,7 @@ def _expm1_over(x: Array) -> Array:
 THIN = 0.4
 """Below this max(|k|, |k_s|) h the series is summed: stiffness blocks, like 1/h, lose digits."""
 _SUMMED = 1.6
-"""Of the same: up to where the series is summed at once."""
+"""Of the same: up to this the series is summed at once."""
 _LEFT_OUT = 1e-18
 """Of 1: the first term that is not summed. The eigenvalues of h^2 M are at most 2 (max(|k|, |k_s|) h)^2."""
 _MOST_TERMS = 14
@@ -137,7 +137,7 @@ _COEFFICIENTS = np.array([[1.0 / factorial(2 * n + first) for n in range(_MOST_T
 
 
 class Exponential(NamedTuple):
-    """exp(-A h) at wavenumbers k, shape (n,), by what it does to a state.
+    """exp(-A h) at wavenumbers k, shape (n,), by its effect on a state.
 
     rates (2, 2, 2, n): B and C; cosh, sinh (2, n): the p and q of cosh(h sqrt(M)) - 1 and of -h times sinh(h sqrt(M)) /
     (h sqrt(M)), where p is of M itself.
@@ -158,7 +158,7 @@ class Exponential(NamedTuple):
 
 
 def exponential(material: Material, k: Array, h: float) -> Exponential:
-    """Return what a layer of thickness h (m) does to a state at wavenumbers k (1/m), shape (n,).
+    """Return the effect of a layer of thickness h (m) on a state at wavenumbers k (1/m), shape (n,).
 
     By the series of a thin layer, doubled until it is h thick: cosh 2x - 1 = 2 sinh^2 x, sinh 2x = 2 sinh x cosh x.
     """
@@ -319,10 +319,10 @@ def charted(raw: Plane) -> Plane:
 
 
 def parameter(plane: Plane, u: Array, t: Array, stiffness: Array) -> Array:
-    """Return the c, shape (2, m, n), of a state (u, t) that lies on a plane and comes from a layer above it.
+    """Return the c, shape (2, m, n), of a state (u, t) on a plane, from a layer above it.
 
-    stiffness: traction over displacement of that layer's waves (Pa/m), which is how their rounding compares. On
-    something stiffer u is what is left of waves that cancel, on something softer t is: each would lose the contrast.
+    stiffness: traction over displacement of that layer's waves (Pa/m), which is how their rounding compares. On a
+    stiffer medium u is the rest of cancelling waves, on a softer one t is: each would lose the contrast.
     """
     det_u, det_t = det(plane.u), det(plane.t)
     with np.errstate(divide="ignore", invalid="ignore"):  # of the one that is singular, which is not taken

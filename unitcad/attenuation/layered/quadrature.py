@@ -9,8 +9,8 @@ Nothing of it is the medium's: it is kept for the next medium, frequency or tole
 
 Detours of the path around single poles that lie on the real axis or next to it.
 
-Where nothing is damped, or only a body that a wave hardly reaches, poles lie on the axis or closer to it than any
-panel. Between two wavenumbers with one such pole the path leaves the axis, over two legs on the pole's other side.
+If nothing is damped, or only a body that a wave hardly reaches, poles are on the axis or closer to it than any panel.
+Between two wavenumbers with one such pole the path leaves the axis, over two legs on the pole's other side.
 
 A pole is where the kernel times (t - t_pole) is a polynomial of the panel's t, from -1 to 1, though the kernel is not:
 the last Legendre coefficients of the two agree up to that factor. The side on which it belongs is that of its imaginary
@@ -20,7 +20,7 @@ Gauss and Legendre over the panels of a Hankel integral, with a bound of the err
 
 A panel's kernel is known at a few nodes. Where the Bessel functions swing faster than they can be seen there, the panel
 is cut into pieces, and the kernel's Legendre series is read off at the nodes of each: the kernel, which costs most, is
-sampled as it varies, not as the waves do. What the waves of all pieces come to at a panel's node is its weight.
+sampled as it varies, not as the waves do. The sum of the waves of all pieces at a panel's node is its weight.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ _FEWER = ((0.05, 8), (5e-3, 10))
 _DAMPED = 0.1
 """Loss factor from which on a layer's poles are seen from afar."""
 _STIFF = 100.0
-"""Over the stiffest layer: a half-space whose poles lie next to 0, where panels are short."""
+"""Over the stiffest layer: a half-space whose poles are next to 0, where panels are short."""
 _ALIKE = 12.0
-"""The last pole over the least wavenumber of a layer: up to that, no panel is longer than what is to be seen on it."""
+"""The last pole over the least wavenumber of a layer: up to that, no panel is longer than its features."""
 _NEAR = 4.0 * PHASE
 """Up to the last pole: farther out, waves turn so much over a panel that few nodes save no time."""
 _CLOSE = 4
@@ -76,7 +76,7 @@ def wavenumbers(panels: Array, s: Array) -> tuple[Array, Array]:
 def first_nodes(rtol: float, end: float, span: float, layers: Sequence[Material], half_space: Material) -> int:
     """Return how many nodes each panel has at first; end, span: the last pole (1/m), phase per unit wavenumber (m).
 
-    Where all layers are damped, and their waves not too different, the kernel is smooth over each panel, and few nodes
+    If all layers are damped, and their waves not too different, the kernel is smooth over each panel, and few nodes
     show it to a loose rtol.
     """
     stiffest = max((abs(m.shear) for m in layers), default=np.inf)
@@ -123,7 +123,7 @@ def _thinned(line: np.ndarray, start: float) -> np.ndarray:
 def _continued(line: np.ndarray, stop: float, longest: float) -> np.ndarray:
     """Continue the corners to `stop`, each panel as long as its distance from 0, if that is no more than it may be.
 
-    There the kernel varies as slowly as that: what swings faster are the waves alone.
+    There the kernel varies as slowly as that: only the waves swing faster.
     """
     corners = list(line)
     while corners[-1] < stop and len(corners) < MAX_PANELS:
@@ -155,7 +155,7 @@ def _turned(line: np.ndarray, branch_points: list[float], longest: float) -> Arr
     panels = []
     for k in inside:
         i = int(np.searchsorted(line, k))
-        # Half of what lies between two corners is each one's: the next may be a branch point too.
+        # Half of the way between two corners is each one's: the next may be a branch point too.
         low, high = max(k - longest, (line[i - 1] + k) / 2.0), min(k + longest, (k + line[i + 1]) / 2.0)
         panels += [[(k - low) ** 0.5, 0.0, k, -1.0], [0.0, (high - k) ** 0.5, k, 1.0]]
         line = np.concatenate([line[:i], [low, k, high], line[i + 1 :]])
@@ -194,7 +194,7 @@ class Rule(NamedTuple):
     """Gauss's rule of n nodes from -1 to 1.
 
     to_legendre (n, n): from values at the nodes to coefficients of degrees 0 to n - 1; degrees (n,): of the waves, the
-    least that meets an error of the rule beside each coefficient; odd_factorials: (2m - 1)!! of these.
+    least that meets an error of the rule for each coefficient; odd_factorials: (2m - 1)!! of these.
     """
 
     nodes: np.ndarray
@@ -216,7 +216,7 @@ def rule(count: int) -> Rule:
 class Turns(NamedTuple):
     """How panels lie to the waves, shape (panels,).
 
-    closeness: the wavenumber over half of what a panel covers of it; off_axis: whether it leaves the real axis; pieces:
+    closeness: the wavenumber over half of the panel's span of it; off_axis: whether it leaves the real axis; pieces:
     into how many it has to be cut, that the waves turn little enough over each; level: whether none leaves the axis;
     total: pieces of all.
     """
@@ -229,7 +229,7 @@ class Turns(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """What the kernel at each node is multiplied by, a row an order, shape (orders, panels, nodes, radii).
+    """Factors of the kernel at each node, a row an order, shape (orders, panels, nodes, radii).
 
     values: of each panel's nodes, or of those of each piece; covered (orders, panels, radii): the integral of the
     absolute waves; swing (panels, degrees) and most (orders, panels, radii): a bound of the rule's error is the sum of
@@ -249,7 +249,7 @@ def nodes(panels: Array, count: int) -> tuple[Array, Array]:
 
 
 def closeness(panels: Array) -> np.ndarray:
-    """Return the wavenumber over half of what a panel covers of it, shape (panels,)."""
+    """Return the wavenumber over half of a panel's span of it, shape (panels,)."""
     ends = wavenumbers(panels, panels[:, :2])[0]
     return np.abs(ends).max(axis=1) / (np.abs(ends[:, 1] - ends[:, 0]) / 2.0)
 
@@ -280,8 +280,8 @@ def weights(
 ) -> Weights:
     """Return the weights of panels of `count` nodes, all on the axis or all off it, each cut into so many `pieces`.
 
-    At the nodes of a piece the kernel is what its panel's Legendre series says. folded: whether the weights are summed
-    to those of the panel's nodes, which pays where they are kept.
+    At the nodes of a piece the kernel has the value of its panel's Legendre series. folded: whether the weights are
+    summed to those of the panel's nodes, which pays if they are cached.
     """
     if pieces.sum() == len(panels):
         return _of_pieces(load, orders, r, panels, count)
@@ -308,7 +308,7 @@ def weights(
 
 @lru_cache(maxsize=128)
 def spread(number: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return what leads from a panel of `count` nodes to its equal pieces.
+    """Return the matrices from a panel of `count` nodes to its equal pieces.
 
     The matrix from the nodes' values (one more row) to those at the nodes of the pieces, and of each piece one that
     bounds the coefficients of the kernel there by those of the panel, shape (pieces, count, count).
@@ -325,8 +325,8 @@ def _of_pieces(load: Load, orders: tuple[int, ...], r: np.ndarray, panels: Array
 
     The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `load.weight`: their coefficient of degree m is
     at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
-    meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
-    six halves: there their envelope takes the place of the weight. Off the axis both grow by e^{|Im k| span}.
+    meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times a factor that hardly changes
+    within six halves: there their envelope replaces the weight. Off the axis both grow by e^{|Im k| span}.
     """
     span = _span(load, r)
     half = (panels[:, 1] - panels[:, 0]) / 2.0
@@ -365,7 +365,7 @@ LOST = 4e-15
 
 
 class Poles(NamedTuple):
-    """The pole of each panel in its t, shape (n,), how far off it may be, and what of the last coefficients is left.
+    """The pole of each panel in its t, shape (n,), its uncertainty, and the rest of the last coefficients.
 
     rest (rows, n): of the kernel times (t - t_pole).
     """
@@ -418,9 +418,9 @@ def around(
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
 _CANCELLED = 4e-15
-"""Of what was taken out of the kernel: what rounding leaves of the last coefficients of the difference."""
+"""Of the part taken out of the kernel: rounding in the last coefficients of the difference."""
 _SINGLE = 1e-7
-"""Uncertainty of a pole below which a panel has no other, or one that is next to nothing beside it."""
+"""Uncertainty of a pole below which a panel has no other, or only a negligible one."""
 _LESS = 0.75
 """Times their share of the phase: of fewer nodes, which see less of the waves."""
 _CHUNK = 200_000  # integrand values held at once
@@ -444,7 +444,7 @@ class Seen(Protocol):
 
     @property
     def taken_out(self) -> Array:
-        """Return what each row of the kernel is less by, shape (rows,)."""
+        """Return the constant subtracted from each row of the kernel, shape (rows,)."""
         ...
 
 
@@ -459,11 +459,11 @@ class Each(NamedTuple):
     swing: np.ndarray
 
     def errors(self, rest: np.ndarray) -> np.ndarray:
-        """Return bounds of the errors; rest (rows, panels): what the kernel's series leaves out."""
+        """Return bounds of the errors; rest (rows, panels): the error of the kernel's series."""
         return self.times(rest) + self.swing
 
     def times(self, kernel: np.ndarray) -> np.ndarray:
-        """Return what a kernel of that size comes to on each panel; kernel (rows, panels)."""
+        """Return the integral of a kernel of that size over each panel; kernel (rows, panels)."""
         return kernel.T[..., None] * self.covered
 
 
@@ -471,10 +471,10 @@ class Each(NamedTuple):
 class Evaluated:
     """Integrals over panels, of all together and, when asked, of each.
 
-    total, error, size (rows, radii): the integral over all panels, a bound of its error, what it would be if nothing
-    cancelled; kernel (with dk/ds): what was integrated; closeness: the wavenumber over half of what a panel covers of
-    it; peak, rest (rows, panels): the kernel's largest value, a bound of what its Legendre series leaves out; known:
-    what was taken out of each row. What is of each panel is worked out when asked: where no panel is bad, nobody does.
+    total, error, size (rows, radii): the integral over all panels, a bound of its error, its size if nothing cancelled;
+    kernel (with dk/ds): the integrand; closeness: the wavenumber over half of the panel's span of it; peak, rest (rows,
+    panels): the kernel's largest value, a bound of the error of its Legendre series; known: the constant taken out of
+    each row. Values of single panels are computed on request: only bad panels need them.
     """
 
     total: Array
@@ -498,7 +498,7 @@ class Evaluated:
 
     @cached_property
     def sizes(self) -> np.ndarray:
-        """What each panel's part would be if nothing cancelled."""
+        """Size of each panel's part if nothing cancelled."""
         return self.each.times(self.peak)
 
     @cached_property
@@ -516,12 +516,12 @@ class Evaluated:
 
     @cached_property
     def hidden(self) -> np.ndarray:
-        """What a detour around each panel's pole may leave out, shape (panels, rows, radii)."""
+        """Error of a detour around each panel's pole, shape (panels, rows, radii)."""
         return HIDDEN * self.each.times(self.poles.rest)
 
     @property
     def blurred(self) -> np.ndarray:
-        """Where what a detour may leave out may be rounding's alone."""
+        """Whether the error of a detour may be only rounding."""
         return self.poles.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * self.closeness)
 
 
@@ -547,8 +547,8 @@ def evaluate(seen: Seen, panels: Array, kernel: Array, phase: float) -> Evaluate
     that were seen, as soon as they halve within n degrees or so (to count on the rate at which they seem to fall was
     too bold: a pole of small residue next to the panel shows in the last ones only); it enters the integral and the
     rule. Next to a pole the wavenumber's own rounding, times the kernel's slope of at most itself over the panel, is
-    all that is left of the last coefficients: halving doubles it. Where the kernel is little beside what it is less by,
-    their difference's rounding is left, and stays.
+    all that is left of the last coefficients: halving doubles it. If the kernel is small relative to the constant taken
+    out, their difference's rounding is left, and stays.
     """
     count = kernel.shape[-1]
     lie = turns(seen.load, seen.r, panels, phase if count == NODES else phase * _LESS * count / NODES)
@@ -572,7 +572,7 @@ def evaluate(seen: Seen, panels: Array, kernel: Array, phase: float) -> Evaluate
 
 
 def _rounding(peak: np.ndarray, close: np.ndarray) -> np.ndarray:
-    """Return what of the kernel may be the rounding of its wavenumbers, shape (rows, panels)."""
+    """Return the part of the kernel that may be the rounding of its wavenumbers, shape (rows, panels)."""
     return ROUNDING * close * peak
 
 
@@ -581,8 +581,8 @@ def _together(
 ) -> tuple[Array, np.ndarray, np.ndarray]:
     """Return the integral over all panels, a bound of its error and its size if nothing cancelled, (rows, radii).
 
-    series (rows, panels, degrees): the kernel's coefficients, absolute; rest_and_peak (2, rows, panels): what they
-    leave out, and the kernel's largest value.
+    series (rows, panels, degrees): the kernel's coefficients, absolute; rest_and_peak (2, rows, panels): their error,
+    and the kernel's largest value.
     """
     orders, *_, radii = met.values.shape
     total = products(kernel.reshape(-1, orders, kernel[0].size), met.values.reshape(orders, -1, radii))

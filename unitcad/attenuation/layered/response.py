@@ -11,12 +11,12 @@ and of layers on a stiff base) and the bending of a stiff layer on a soft one ha
 no damping, poles may lie on the axis or too close to it to pass: there the path goes around each of them (`detours`),
 on the side on which a little loss would leave it. No loss is put into the medium for that, and nothing is extrapolated.
 
-All layers count at every wavenumber: no bound is known of what a lower layer sends back that is both proved and
-cheaper than the layer.
+All layers count at every wavenumber: no bound of the waves from a lower layer is known that is both proved and cheaper
+than the layer.
 
 A layered half-space and its displacement under a load.
 
-The response at any number of radii: solved one by one where they are few, else read off one radial curve.
+The response at any number of radii: solved one by one if they are few, otherwise read off one radial curve.
 
 The curve is a cubic spline through solved points. They lie a sixth of the distance to the load's edge apart, where
 the slope is steep, up to half a millimetre, and a millimetre farther out. Waves in soft tissue are 4 mm long or longer
@@ -47,13 +47,31 @@ _MOST_WAVENUMBERS = 8_000_000
 
 @dataclass(frozen=True)
 class Response:
-    """Displacement (m per pascal or per newton, complex) with the shape of r, and how far off each value may be.
+    """The displacement of a medium under a load, with a bound of its error.
 
-    Under a tangential load in the direction theta = 0: u_r and u_z times cos(theta), u_theta times sin(theta). A force
-    that rotates (two in quadrature) gives the same amplitudes at every theta. Elsewhere u_theta is 0.
+    Under a tangential load in the direction theta = 0, multiply u_r and u_z by cos(theta) and u_theta by sin(theta). A
+    rotating force gives the same amplitudes at every theta. For other loads u_theta is 0.
 
-    error_r, error_theta, error_z: bound of the error of each component at each radius, same unit and shape;
-    wavenumbers: how many were evaluated.
+    Attributes
+    ----------
+    u_r, u_theta, u_z : complex array
+        Displacement, m per pascal (disc) or per newton (point), in the shape of r.
+    error_r, error_theta, error_z : float array
+        Bound of the error of each value, in the same unit and shape.
+    wavenumbers : int
+        Number of evaluated wavenumbers.
+    error : float
+        The largest bound.
+    largest : float
+        The largest |u| of a component.
+
+    Examples
+    --------
+    >>> from unitcad.attenuation import HalfSpace, LayeredMedium, LossFactor, UniformDisc
+    >>> medium = LayeredMedium((), HalfSpace(1060.0, 20e3, 0.5, LossFactor(0.3)))
+    >>> response = medium.response(UniformDisc(3.5e-3), omega=785.0, r=[0.01, 0.02])
+    >>> response.u_z.shape, bool(response.error < 1e-6 * response.largest)
+    ((2,), True)
     """
 
     u_r: Any
@@ -66,7 +84,7 @@ class Response:
 
     @property
     def error(self) -> float:
-        """The largest of all bounds: what rtol times the largest |u| is compared with."""
+        """The largest of all bounds, which is compared with rtol times the largest |u|."""
         return float(max(np.max(self.error_r), np.max(self.error_theta), np.max(self.error_z)))
 
     @property
@@ -79,7 +97,7 @@ def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rto
     """Return the displacement of `medium` under `load` at radii r (m, any shape), a depth z (m) and omega (rad/s).
 
     rtol: wanted error over the largest |u| of all radii, 1e-12 to 0.1. Raises `Refusal` for invalid values, and
-    for r = 0 under a surface point load, `UnitcadError` where no finite answer was found. If rtol can't be reached
+    for r = 0 under a surface point load, `UnitcadError` if no finite answer was found. If rtol can't be reached
     the errors say so.
     """
     return responses([(medium, omega)], [load], r, z, rtol)[0][0]
@@ -134,7 +152,7 @@ def _on_one_path(
     end = max(body.medium.last_pole(body.omega) for body in bodies)
     _check_size(end, float(flat.max()) + loads[0].reach + 2.0 * z, max(body.omega for body in bodies))
     sideways = any(load.direction == "tangential" for load in loads)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what is no number is refused below
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # values that are no numbers are refused below
         # Each component is made of at most two rows, and one of them is at least as large as each row.
         problem = Problem(tuple(bodies), tuple(loads), flat, z)
         integrals = _solve(problem, end, rtol / 2.0 if sideways else rtol)
@@ -182,8 +200,8 @@ def _radii(r: Any) -> Array:
 def _solve(bare: Problem, end: float, rtol: float) -> Integrals:
     """Return the best that is reached in a few attempts, for each row and radius.
 
-    What was integrated first may have been accepted beside a largest |u| that the rest then took away: again, beside
-    the one that came out. Where the panels do not suffice for rtol, a larger one may spend them better.
+    The first integrals may have been accepted relative to a largest |u| that the rest then reduced: they are repeated
+    relative to the final one. If the panels do not suffice for rtol, a larger one may spend them better.
     """
     best, size = None, np.inf
     for _ in range(_MOST_ATTEMPTS):
@@ -217,8 +235,24 @@ def _check_size(end: float, span: float, omega: float) -> None:
 
 
 class LayeredMedium(Stack):
-    """Layers, top first, on a half-space: `LayeredMedium(layers, half_space)`.
+    """Layers, top first, on a half-space.
 
+    Parameters
+    ----------
+    layers : sequence of Layer
+        The layers from the surface down; may be empty.
+    half_space : HalfSpace
+        The body under them.
+    least_loss : float, default 0
+        Least loss factor of all materials; the solver sets it for undamped media.
+
+    Raises
+    ------
+    Refusal
+        For a layer or a half-space of another type.
+
+    Examples
+    --------
     >>> from unitcad.attenuation import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
     >>> skin = Layer(thickness=1.5e-3, density=1100, youngs_modulus=130e3, poisson_ratio=0.49, damping=LossFactor(0.14))
     >>> medium = LayeredMedium([skin], HalfSpace(density=1050, youngs_modulus=12e3, poisson_ratio=0.495))
@@ -230,10 +264,40 @@ class LayeredMedium(Stack):
     """
 
     def response(self, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
-        """Return the displacement at radii r (m, any shape) and depth z (m) under `load` at omega (rad/s).
+        """Return the displacement at some radii and a depth under a load.
 
-        In metres per pascal under a `UniformDisc`, per newton under a `Point`; rtol is the wanted error over the
-        largest |u| of all radii. Raises `Refusal` and `UnitcadError` as `unitcad.attenuation.layered.response.respond`.
+        Parameters
+        ----------
+        load : Load
+            A `Point` (per newton) or a `UniformDisc` (per pascal).
+        omega : float
+            Angular frequency, rad/s.
+        r : float or array
+            Radii, m, in any shape.
+        z : float, default 0
+            Depth, m.
+        rtol : float, default 1e-6
+            Wanted error over the largest |u| of all radii, 1e-12 to 0.1. If it can't be reached, the errors state so.
+
+        Returns
+        -------
+        Response
+            Complex displacement in the shape of r, with bounds of the error.
+
+        Raises
+        ------
+        Refusal
+            For an invalid value, and for r = 0 under a point load at the surface.
+        UnitcadError
+            If no finite answer was found.
+
+        Examples
+        --------
+        >>> from unitcad.attenuation import HalfSpace, LayeredMedium, Point
+        >>> medium = LayeredMedium([], HalfSpace(1000.0, 3e3, 0.5))
+        >>> static = medium.response(Point(), omega=1e-6, r=1.0)
+        >>> bool(abs(static.u_z.real - 1 / (4 * 3.141592653589793 * 1e3)) < 1e-9)  # 1 / (4 pi mu r)
+        True
         """
         return respond(self, load, omega, r, z, rtol)
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from unitcad.geometry.arrays import Floats
-from unitcad.spec.asked import Table
+from unitcad.spec.raw import Table
 
 
 @dataclass(frozen=True)

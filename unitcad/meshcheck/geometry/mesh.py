@@ -1,4 +1,4 @@
-"""A mesh as the rules see it: vertices in mm, faces as indices, and where in its file its triangles stand.
+"""A mesh as the rules see it: vertices in mm, faces as indices, and the places of its triangles in the file.
 
 Readers give a triangle soup or an indexed mesh; `weld_exact` makes the one into the other without moving a vertex.
 """
@@ -19,9 +19,9 @@ _NO_INDEX = np.empty(0, np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """The places of a mesh's triangles (m) in its file, by polygon (p); what is None or empty is not known.
+    """The places of a mesh's triangles (m) in its file, by polygon (p); None or empty: unknown.
 
-    `polygons` (m,) gives the polygon of each triangle, None where every triangle is one by itself. `lines` (p,) are
+    `polygons` (m,) gives the polygon of each triangle, None if every triangle is one by itself. `lines` (p,) are
     line numbers from 1. `starts` (s,) are the first polygons of the file's objects, `names` their names, a line each.
     """
 
@@ -59,10 +59,10 @@ _BLOCK = 1 << 15  # points that stay in the processor's cache
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Vertices (n, 3) float64 mm, faces (m, 3) int32 into them; `normals` (m, 3) as stored, where the format has them.
+    """Vertices (n, 3) float64 mm, faces (m, 3) int32 into them; `normals` (m, 3) as stored, if the format has them.
 
-    `name` says which object of the file this is, `source` where its triangles stand in the file. `indexed` is false
-    where vertices were shared by their place alone. `single` is true where coordinates were stored as float32.
+    `name`: the object of the file, `source`: the places of its triangles in the file. `indexed` is false if vertices
+    were shared only by their place. `single` is true if coordinates were stored as float32.
     """
 
     vertices: Floats
@@ -75,7 +75,7 @@ class Mesh:
 
 
 def representable(points: Floats) -> Floats:
-    """Return the points with 0 for each coordinate below SMALLEST; the same array where there is none."""
+    """Return the points with 0 for each coordinate below SMALLEST; the same array if there is none."""
     size = np.abs(points)
     tiny = (size < SMALLEST) & (size > 0)
     return np.where(tiny, 0.0, points) if tiny.any() else points
@@ -85,8 +85,8 @@ def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
     """Return distinct points as float64 (v, 3), and for each of the corners (m, k, 3) which of them it is, (m, k).
 
     Points with the same three numbers are one; -0.0 is 0.0. They are in the order in which they first appear: those of
-    a face are mostly near each other then, which the processor's cache needs. By blocks, since memory that is used for
-    the first time takes longer than what is done with it.
+    a face are mostly near each other then, which the processor's cache needs. By blocks, since first use of memory
+    takes longer than the computation.
     """
     if corners.dtype != np.float32:
         corners = representable(corners)
@@ -122,7 +122,7 @@ def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
 
 
 def weld_points(points: Floats) -> tuple[Floats, Ints]:
-    """Return what `weld_exact` does of points (n, 3): distinct ones, and for each which of them it is, (n,)."""
+    """Return the result of `weld_exact` for points (n, 3): distinct ones, and for each which of them it is, (n,)."""
     vertices, index = weld_exact(points[:, None])
     return vertices, index.reshape(-1)
 
@@ -170,7 +170,7 @@ def float32_steps(places: Floats) -> Floats:
 
 
 def solid_of(vertices: Floats, faces: Ints) -> Manifold:
-    """Make manifold3d's solid of a mesh, vertices (n, 3) mm and faces (m, 3); empty where it refuses the mesh."""
+    """Make manifold3d's solid of a mesh, vertices (n, 3) mm and faces (m, 3); empty if it refuses the mesh."""
     return Manifold(Mesh64(vert_properties=vertices, tri_verts=faces.astype(np.uint64)))
 
 

@@ -1,12 +1,12 @@
-"""Signs of determinants that are never wrong: a float filter with an error bound, exact arithmetic for what it leaves.
+"""Signs of determinants that are never wrong: a float filter with an error bound, exact arithmetic for the rest.
 
-orient3d(a, b, c, d) is the sign of det(a - d, b - d, c - d): positive where d lies below the plane through a, b, c
-(seen so that a, b, c turn anticlockwise), zero where all four are coplanar. The filter's bound is Shewchuk's (1997),
-for differences that are rounded themselves.
+orient3d(a, b, c, d) is the sign of det(a - d, b - d, c - d): positive if d is below the plane through a, b, c (seen so
+that a, b, c turn anticlockwise), zero if all four are coplanar. The filter's bound is Shewchuk's (1997), for
+differences that are rounded themselves.
 
-What the filter leaves is small beside its terms. In whole numbers, 64-bit arithmetic gives it modulo 2**64; where the
-bound says that it is less than half of that, it is known. Elsewhere pairs of floats (Dekker, 1971) narrow the bound.
-Python's integers decide the rest: coordinates of very different size.
+The rest is small relative to its terms. In whole numbers, 64-bit arithmetic gives it modulo 2**64; if its bound is less
+than half of that, it is known. Elsewhere pairs of floats (Dekker, 1971) narrow the bound. Python's integers decide the
+rest: coordinates of very different size.
 
 Triangles that are not coplanar: Devillers and Guigue, "Faster triangle-triangle intersection tests" (INRIA RR-4488,
 2002): on the line of the two planes each triangle cuts an interval; two determinants compare the intervals' ends. Both
@@ -43,7 +43,7 @@ def orient2d(a: Floats, b: Floats, c: Floats) -> Ints:
 
 
 def orient2d_columns(a: Floats, b: Floats, c: Floats) -> Ints:
-    """Return what `orient2d` does, for points by axis: (2, n) arrays."""
+    """Return the result of `orient2d` for points by axis: (2, n) arrays."""
     (ax, ay), (bx, by) = a - c, b - c
     left, right = ax * by, ay * bx
     value = left - right
@@ -55,7 +55,7 @@ def orient2d_columns(a: Floats, b: Floats, c: Floats) -> Ints:
 def sides(a: Floats, b: Floats) -> Ints:
     """Return the side of the plane of each triangle `a` that each corner of `b` lies on: int8 (corner, n).
 
-    Both are (corner, axis, n). Positive where `a` is seen anticlockwise; zero for all corners where `a` has no area.
+    Both are (corner, axis, n). Positive if `a` is seen anticlockwise; zero for all corners if `a` has no area.
     """
     one, two = a[1] - a[0], a[2] - a[0]
     normal, size = np.empty_like(one), np.empty_like(one)
@@ -75,7 +75,7 @@ def sides(a: Floats, b: Floats) -> Ints:
 
 
 def _orient3d_columns(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
-    """Return what `orient3d` does, for points by axis: (3, n) arrays."""
+    """Return the result of `orient3d` for points by axis: (3, n) arrays."""
     rows = np.stack([a - d, b - d, c - d])
     value = _determinant(rows)
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = np.abs(rows, out=rows)
@@ -84,7 +84,7 @@ def _orient3d_columns(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
 
 
 def _sure(points: Sequence[Floats], value: Floats, size: Floats) -> Ints:
-    """Return the signs of determinants: of their values (n,), or exact where these are too small beside `size`.
+    """Return the signs of determinants: of their values (n,), or exact if these are too small relative to `size`.
 
     `size`: the sum of the sizes of a determinant's terms; points: (axes, n) arrays.
     """
@@ -141,7 +141,7 @@ def _exact(points: Floats, size: Floats) -> Ints:
 def _modular(points: Floats, bound: Floats) -> tuple[Bools, Ints]:
     """Return which determinants, at most `bound`, 64-bit whole numbers hold, and the signs of those."""
     lowest = _lowest_bits(points).min(axis=(0, 1), initial=_ZERO)
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not held
+    with np.errstate(over="ignore", invalid="ignore"):  # overflow is ignored
         scaled = points * np.ldexp(1.0, -lowest)
         known = np.ldexp(bound, -points.shape[1] * lowest) < _HALF
         known &= np.abs(scaled).max(axis=(0, 1), initial=0) < _HALF
@@ -247,7 +247,7 @@ _ALONE, _FLIP = _table()
 def meet(a: Floats, b: Floats) -> Meeting:
     """Decide for rows of corners (n, 3, 3); no triangle may be without area.
 
-    Where one triangle lies wholly on one side of the other's plane, the other's `side` is not worked out, and 1.
+    If one triangle is wholly on one side of the other's plane, the other's `side` is not computed, and 1.
     """
     n = len(a)
     side_a, side_b = np.ones((2, n, 3), np.int8)
@@ -325,7 +325,7 @@ def coplanar(a: Floats, b: Floats) -> tuple[Bools, Bools]:
 
 
 def _off_sides(corners: Floats, points: Floats) -> Ints:
-    """Return 1 where a point is inward of a side, -1 where it is outward: (side, k, n).
+    """Return 1 if a point is inward of a side, -1 if it is outward: (side, k, n).
 
     Triangles are (n, 3, 2), points (n, k, 2).
     """
@@ -354,7 +354,7 @@ def segment_inside(u: Floats, v: Floats, b: Floats) -> Bools:
 def common_point(a: Floats, b: Floats) -> Floats | None:
     """Return a point of two triangles (3, 3) that meet: the middle of the point, segment or polygon that they share.
 
-    `a` is cut to the prism over `b` that is as high as rounding, so it is exact to rounding only; None where nothing is
+    `a` is cut to the prism over `b` that is as high as rounding, so it is exact to rounding only; None if nothing is
     left.
     """
     shift = b[0]

@@ -1,6 +1,6 @@
-"""Readers: a file's bytes to meshes, or to the build of a 3MF, and what the file itself breaks.
+"""Readers: a file's bytes to meshes, or to the build of a 3MF, and the rules that the file itself breaks.
 
-Which reader a file is for, by its suffix, and what its first bytes say it is.
+The reader of a file, by its suffix, and its format by its first bytes.
 
 The reader of a format is the function of its module's name in this folder: `.stl` is read by read_stl.read_stl.
 """
@@ -19,9 +19,9 @@ from unitcad.meshcheck.rules.f_file import Deadline, Limits
 from unitcad.meshcheck.rules.s_scale import UNITS_MM
 
 Reader = Callable[[memoryview, Limits, Deadline, list[Finding]], Mesh | None]
-"""A function that reads a mesh from bytes and adds what the file itself breaks to the findings.
+"""A function that reads a mesh from bytes and adds findings about the file itself.
 
-It returns None where the findings leave no mesh, and raises `Unreadable` where reading cannot go on.
+It returns None if the findings leave no mesh, and raises `Unreadable` if it cannot read on.
 """
 _READ = "read_"
 SUFFIXES = {f".{name.removeprefix(_READ)}" for _, name, _ in iter_modules(__path__) if name.startswith(_READ)}
@@ -46,7 +46,7 @@ _TEXT_MARKS = (b"<!doctype html", b"<html", b"<head", b"<body")
 
 
 def foreign(head: bytes) -> str | None:
-    """Name a format that is certainly not STL, OBJ, PLY or OFF; None where the bytes show none."""
+    """Name a format that is certainly not STL, OBJ, PLY or OFF; None if the bytes show none."""
     for magic, name in _MAGIC:
         if head.startswith(magic):
             return name
@@ -69,9 +69,9 @@ def kind_of(path: str) -> str:
 
 
 def reader_of(kind: str, unit: str | None = None) -> Reader:
-    """Return the reader of a format that holds one mesh; its module is loaded by the first file that needs it.
+    """Return the reader of a format with one mesh; its module is loaded by the first file that needs it.
 
-    The numbers of a GLB, in `unit` or metres, become mm where they are read.
+    The numbers of a GLB, in `unit` or metres, become mm on reading.
     """
     name = f"{_READ}{kind}"
     read = getattr(import_module(f"{__name__}.{name}"), name)

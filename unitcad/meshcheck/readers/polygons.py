@@ -1,6 +1,6 @@
-"""Polygons as a file has them, cut into triangles: what the readers of PLY, OBJ, OFF and GLB hand over.
+"""Polygons as a file has them, cut into triangles: input from the readers of PLY, OBJ, OFF and GLB.
 
-A polygon is cut in its own plane. A fan from a corner is taken where all its triangles turn the same way; concave
+A polygon is cut in its own plane. A fan from a corner is taken if all its triangles turn the same way; concave
 polygons, and those with corners on a line, are cut by manifold3d.
 """
 
@@ -29,7 +29,7 @@ _PROPER = 1e-12  # least area of a fan's triangle, as part of the squared length
 class Polygons:
     """Vertices (n, 3) mm, the corners of all polygons one after the other (c,), and how many each has (p,).
 
-    `source` says where they stand in the file. `counts_from` is the format's first index, for messages.
+    `source`: their places in the file. `counts_from` is the format's first index, for messages.
     """
 
     vertices: Floats
@@ -40,7 +40,7 @@ class Polygons:
 
 
 def check_promise(n: int, size: int, limits: Limits) -> None:
-    """Raise `Unreadable` where a header promises more vertices or faces than the limits (F011) or the file (F002)."""
+    """Raise `Unreadable` if a header promises more vertices or faces than the limits (F011) or the file (F002)."""
     if n > 3 * limits.max_faces:
         raise F011.unreadable(f"{n} vertices or faces promised")
     if n > size:
@@ -48,9 +48,9 @@ def check_promise(n: int, size: int, limits: Limits) -> None:
 
 
 def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
-    """Return the mesh, none where a vertex is not finite, and add what is wrong with the polygons to the findings.
+    """Return the mesh, none if a vertex is not finite, and add the faults of the polygons to the findings.
 
-    Raises `Unreadable` where there is no polygon (F001), too many (F011), or one names a missing vertex (P011).
+    Raises `Unreadable` if there is no polygon (F001), too many (F011), or one names a missing vertex (P011).
     """
     sizes, source = polygons.sizes, polygons.source
     short = np.flatnonzero(sizes < 3)
@@ -99,7 +99,7 @@ def _in_triangles(
 ) -> tuple[Ints, Ints | None, Floats | None]:
     """Return triangles (t, 3) in the polygons' order, the polygon of each (t,), how far each polygon is bent (p,) mm.
 
-    Where all are triangles, the second is None, since triangle and polygon are one, and so is the third.
+    If all are triangles, the second is None, since triangle and polygon are one, and so is the third.
     """
     if (sizes == 3).all():
         return corners.reshape(-1, 3), None, None
@@ -127,7 +127,7 @@ def _in_triangles(
 def _cut(points: Floats, deadline: Deadline) -> tuple[Ints, Floats]:
     """Return triangles (k, n - 2, 3) of polygons (k, n, 3) as places in them, and how far each is bent.
 
-    That is in mm, 0 where it is flat.
+    That is in mm, 0 if it is flat.
     """
     n = points.shape[1]
     with np.errstate(all="ignore"):
@@ -161,7 +161,7 @@ def _proper(local: Floats, normal: Floats, fans: Ints, least: Floats) -> Bools:
 
 
 def _concave(local: Floats, normal: Floats, fan: Ints) -> Ints:
-    """Return triangles of one polygon by manifold3d; the fan where its corners lie on a line or it crosses itself."""
+    """Return triangles of one polygon by manifold3d; the fan if its corners are on a line or it crosses itself."""
     drop = int(np.argmax(np.abs(normal)))
     if not abs(normal[drop]) > 0:
         return fan

@@ -37,19 +37,19 @@ class Instance:
 
     @property
     def linear(self) -> tuple[Key, bytes]:
-        """What instances have in common that differ by a shift."""
+        """The common part of instances that differ by a shift."""
         return self.key, self.matrix[:3].tobytes()
 
     @property
     def shift(self) -> Floats:
-        """Where the object's origin lies, mm."""
+        """The object's origin, mm."""
         return self.matrix[3] * self.unit_mm
 
     def mesh(self, *, placed: bool) -> Mesh:
-        """Return the object's mesh, mm: `placed` where the instance is, else where the object has it."""
+        """Return the object's mesh, mm: `placed` at the instance, otherwise in the object's own frame."""
         points, faces = self.triangles.vertices, self.triangles.rows[:, :3].astype(np.int32)
         if placed:
-            with np.errstate(all="ignore"):  # what comes out too large is found where it is used
+            with np.errstate(all="ignore"):  # numbers that become too large are found on use
                 points = points @ self.matrix[:3] + self.matrix[3]
             if np.linalg.det(self.matrix[:3]) < 0:
                 faces = faces[:, ::-1]
@@ -68,7 +68,7 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         return (use.path.lower().lstrip("/") if use.path else part, use.object)
 
     def size(key: Key, trail: tuple[Key, ...]) -> tuple[int, int, int]:
-        """Return faces, nodes and levels of an object and what is below it, within the limit of depth."""
+        """Return faces, nodes and levels of an object with its components, within the limit of depth."""
         if key not in objects:
             return 0, 0, 0
         if key in trail:
@@ -127,7 +127,7 @@ def _large(n: int) -> str:
 
 def _times(first: Floats, then: Floats) -> Floats:
     """Return the transform `first` followed by `then`, rows as 3MF writes them."""
-    with np.errstate(all="ignore"):  # what comes out too large is found where it is used
+    with np.errstate(all="ignore"):  # numbers that become too large are found on use
         return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
 
 
@@ -144,9 +144,9 @@ class Build:
 
 
 def read_build(package: Package, limits: Limits) -> Build | None:
-    """Read the model parts and place the objects of the build; what is wrong is added to the package's findings.
+    """Read the model parts and place the objects of the build; faults are added to the package's findings.
 
-    None where no start part can be read. Raises `Unreadable` where components nest without end or a limit is reached.
+    None if no start part can be read. Raises `Unreadable` if components nest without end or a limit is reached.
     """
     models = _models(package, limits)
     for model in models.values():
@@ -248,7 +248,7 @@ def _image(package: Package, part: str, rule: Rule) -> None:
 
 
 def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
-    """Return what a model part names by path exists, and is the target of a relationship of the right type."""
+    """Check that parts named by path exist, and are targets of a relationship of the right type."""
     by_kind = {kind: {r.target for r in related if r.kind == kind} for kind in opc.KNOWN}
     images = by_kind[opc.THUMBNAIL] | by_kind[opc.TEXTURE]
     for resource in model.resources.values():

@@ -79,7 +79,7 @@ class _Buffer(msgspec.Struct):
 
 
 class _Document(msgspec.Struct, rename="camel"):
-    """A glTF document: what of its schema places triangles."""
+    """A glTF document: the part of its schema that places triangles."""
 
     extensions_required: list[str] = []
     scene: int | None = None
@@ -148,7 +148,7 @@ def _chunks(data: memoryview, findings: list[Finding]) -> tuple[_Document, memor
 
 
 def _entry(held: list[_T], index: int | None, key: str, who: str) -> _T:
-    """Return the entry with that index. Raises `Unreadable` (P011) where it is not there."""
+    """Return the entry with that index. Raises `Unreadable` (P011) if it is not there."""
     if index is None or not 0 <= index < len(held):
         raise P011.unreadable(f"{who} names {key} {str(index)[:20]}, the list has {len(held)}")
     return held[index]
@@ -175,7 +175,7 @@ def _parts(document: _Document, limits: Limits, findings: list[Finding]) -> Iter
         if len(seen) > limits.max_instances:
             raise F011.unreadable(f"more nodes than the limit of {limits.max_instances} instances")
         name = (node.name or f"node {index}")[:_NAME]
-        with np.errstate(all="ignore"):  # what comes out too large is found where it is used
+        with np.errstate(all="ignore"):  # numbers that become too large are found on use
             matrix = above @ _matrix(node, name, findings)
         if node.mesh is not None:
             mesh = _entry(document.meshes, node.mesh, "meshes", f"node {index}")
@@ -188,7 +188,7 @@ def _parts(document: _Document, limits: Limits, findings: list[Finding]) -> Iter
 
 
 def _matrix(node: _Node, name: str, findings: list[Finding]) -> Floats:
-    """Return a node's own matrix (4, 4) for columns. Raises `Unreadable` (P013) where a number is too large."""
+    """Return a node's own matrix (4, 4) for columns. Raises `Unreadable` (P013) if a number is too large."""
     place = [Location(object=name)]
     for key in ("matrix", "rotation", "scale", "translation"):
         values = getattr(node, key) or ()
@@ -219,7 +219,7 @@ def _matrix(node: _Node, name: str, findings: list[Finding]) -> Floats:
 def _polygons(
     document: _Document, binary: memoryview, parts: list[_Part], unit_mm: float, limits: Limits, deadline: Deadline
 ) -> Polygons:
-    """Return all triangles of the scene in mm; what it promises is counted before anything is made."""
+    """Return all triangles of the scene in mm; promised numbers are counted before anything is made."""
     sizes = [_promised(document, part.primitive) for part in parts]
     faces, points = sum(size[0] for size in sizes), sum(size[1] for size in sizes)
     if faces > limits.max_faces or points > 3 * limits.max_faces:
@@ -289,7 +289,7 @@ def _primitive(document: _Document, binary: memoryview, part: _Part) -> tuple[Fl
 def _numbers(document: _Document, binary: memoryview, index: int, kind: str, width: int) -> Floats:
     """Return the numbers (n, width) of an accessor.
 
-    Raises `Unreadable` where they are not in the file's own binary chunk.
+    Raises `Unreadable` if they are not in the file's own binary chunk.
     """
     accessor, who = document.accessors[index], f"accessor {index}"
     if accessor.sparse is not None or accessor.buffer_view is None:

@@ -1,6 +1,6 @@
 """OBJ as Wavefront's appendix B1 defines it: the polygons, with continued lines and negative indices.
 
-What a face says of texture and normals, and all other statements, are left out; materials cost nothing.
+Texture and normals of faces, and all other statements, are skipped; materials cost nothing.
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ def _strips(sizes: Ints, corners: Ints) -> tuple[Ints, Ints]:
 
 
 def _header(raw: bytes) -> tuple[str, list[_Element], int]:
-    """Return byte order ("ascii" for text), elements, and where the header ends."""
+    """Return byte order ("ascii" for text), elements, and the end of the header."""
     order, elements, at = "", list[_Element](), 0
     while True:
         end = raw.find(b"\n", at)
@@ -171,7 +171,7 @@ def _text_element(table: Rows, which: slice, element: _Element) -> tuple[dict[st
 
 
 def _refuse(wrong: Ints, element: _Element, lines: Ints) -> None:
-    """Raise `Unreadable` (F003) where a record of the element has more or fewer numbers than its properties."""
+    """Raise `Unreadable` (F003) if a record of the element has more or fewer numbers than its properties."""
     if wrong.any():
         text = f"a {element.name} with more or fewer numbers than its properties take"
         raise F003.unreadable(text, int(wrong.sum()), [Location(line=int(lines[int(np.argmax(wrong))]))])
@@ -193,7 +193,7 @@ def _binary(
 
 
 def _layout(raw: bytes, at: int, element: _Element, order: str) -> np.dtype | None:
-    """Return the type of the record at `at`, a list as its length "#i" and its numbers; None where there is none."""
+    """Return the type of the record at `at`, a list as its length "#i" and its numbers; None if there is none."""
     fields: list[tuple] = []
     begin = at
     for i, (name, length, kind) in enumerate(element.properties):
@@ -202,7 +202,7 @@ def _layout(raw: bytes, at: int, element: _Element, order: str) -> np.dtype | No
             if at + own > len(raw):
                 return None
             (n,) = struct.unpack_from(order + length, raw, at)
-            if not 0 <= n <= len(raw):  # a NaN, where a length is a float, is neither
+            if not 0 <= n <= len(raw):  # a NaN, as a length may be a float, is neither
                 return None
             fields += [(f"#{i}", order + length), (f"{i} {name}", order + kind, (int(n),))]
             at += own + int(n) * struct.calcsize(order + kind)
@@ -226,7 +226,7 @@ def _alike(raw: bytes, at: int, element: _Element, order: str) -> bool:
 
 
 def _records(raw: bytes, at: int, element: _Element, order: str) -> tuple[dict[str, Column], int]:
-    """Return the columns of an element whose records are alike, and where they end."""
+    """Return the columns of an element whose records are alike, and their end."""
     layout = _layout(raw, at, element, order) if element.count else np.dtype([])
     size = layout.itemsize if layout is not None else 0
     if layout is None or at + size * element.count > len(raw):
@@ -243,7 +243,7 @@ def _records(raw: bytes, at: int, element: _Element, order: str) -> tuple[dict[s
 
 
 def _walked(raw: bytes, at: int, element: _Element, order: str, deadline: Deadline) -> tuple[dict[str, Column], int]:
-    """Return the columns of an element whose lists differ in length, record after record, and where they end."""
+    """Return the columns of an element whose lists differ in length, record after record, and their end."""
     steps = [(struct.Struct(order + (length or kind)), struct.calcsize(order + kind) if length else 0,
               name in _WANTED.get(element.name, ())) for name, length, kind in element.properties]  # fmt: skip
     kept = {i: (array("q"), array("q")) for i, (_, _, wanted) in enumerate(steps) if wanted}

@@ -1,4 +1,4 @@
-"""STEP by OCCT, where a B-rep extra is installed. Without one, a finding says so."""
+"""STEP by OCCT, if a B-rep extra is installed. Without one, a finding says so."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def step_bodies(path: Path, tolerance: float, seconds: float) -> list[tuple[str,
 
 
 def read_bodies(path: str, tolerance: float) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Return what `step_bodies` does, in this process."""
+    """Return the result of `step_bodies`, in this process."""
     from OCP.STEPCAFControl import STEPCAFControl_Reader
     from OCP.TCollection import TCollection_ExtendedString
     from OCP.TDF import TDF_LabelSequence
@@ -144,7 +144,7 @@ class Measured:
 
 
 def measured(path: Path, data: memoryview, seconds: float) -> Measured:
-    """Return what OCCT measures of a STEP file. Raises `Unreadable` for a damaged file, and without OCP."""
+    """Return OCCT's measures of a STEP file. Raises `Unreadable` for a damaged file, and without OCP."""
     if b"END-ISO-10303-21" not in bytes(data[-2000:]):  # OCCT must not be handed a fragment
         raise F003.unreadable("the text ends before END-ISO-10303-21")
     if lacking := missing():
@@ -156,7 +156,7 @@ def measured(path: Path, data: memoryview, seconds: float) -> Measured:
 
 
 def _from_child(path: Path, seconds: float) -> Measured | None:
-    """Return what `measure` finds, in a worker: OCCT dies of some malformed files, and it prints."""
+    """Return the result of `measure`, in a worker: OCCT dies of some malformed files, and it prints."""
     try:
         with Pool() as pool:
             return pool.submit(measure, str(path), seconds=seconds).result()

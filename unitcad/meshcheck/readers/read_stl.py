@@ -1,4 +1,4 @@
-"""STL, binary and text, as it is: what it holds and what is wrong with it, before any repair.
+"""STL, binary and text, as it is: its content and its faults, before any repair.
 
 Binary: 80 bytes of header, a little-endian uint32 count, records of 50 bytes. Text: the grammar of 3D Systems' 1989
 StereoLithography Interface Specification; keywords in either case.
@@ -65,7 +65,7 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline, findings: lis
     if count > room:
         findings.append(F002.finding(f"{promise} has room for {room}", count - room))
         if room:
-            raise Unreadable()  # a geometry of what is left would only blame the wrong thing
+            raise Unreadable()  # geometry rules on the rest would only blame the wrong thing
     elif count < room and rest == 0 and any(data[84 + 50 * count : 84 + 50 * count + 100]):
         findings.append(F002.finding(f"{promise} holds {room}", room - count))
     elif extra := size - _binary_size(data):
@@ -85,7 +85,7 @@ def _binary_size(data: memoryview) -> int:
 
 
 def _mesh(corners: Floats, normals: Floats, findings: list[Finding]) -> Mesh | None:
-    """Return the mesh of corners (m, 3, 3); none where one is no float32 number (V001)."""
+    """Return the mesh of corners (m, 3, 3); none if one is no float32 number (V001)."""
     bad = _not_single(corners)
     if len(bad):
         findings.append(faces_not_finite(len(bad), (Location(face=int(i)) for i in bad)))
@@ -154,7 +154,7 @@ def _decoded(raw: bytes, findings: list[Finding]) -> bytes:
 
 
 def _walk(raw: bytes, state: _Text, limits: Limits, deadline: Deadline) -> None:
-    """Read solid after solid. Adds findings; never raises for what the text holds but for limits."""
+    """Read solid after solid. Adds findings; raises only for limits, never for the text's content."""
     at, end = 0, len(raw)
     inside = False
     while True:
@@ -254,7 +254,7 @@ def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> Non
 
     Facets with more or fewer vertices than three (F008) and words in a number's place (F004) break it no further.
     """
-    state.corners.clear()  # a mesh of what came before would only blame the wrong thing
+    state.corners.clear()  # a mesh of the text before would only blame the wrong thing
     state.normals.clear()
     place, vertices, start = 0, 0, at
     for match in _WORD.finditer(raw, at, cut):
@@ -297,7 +297,7 @@ def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> Non
 _GRAMMAR: tuple[tuple[bytes, ...], ...] = (
     *((b"facet", b"endsolid"), (b"normal",), (), (), (), (b"outer",), (b"loop",)),
     *((b"vertex",), (), (), (), (b"endloop",), (b"endfacet",)),
-)  # what may stand where in a facet; nothing named: a number
+)  # words of a facet by place; no name: a number
 _VERTEX, _LOOP_END = 7, 11  # places in it
 _KEYWORDS = {words[0] for words in _GRAMMAR if words}
 _WORD = re.compile(rb"\S+")

@@ -156,7 +156,7 @@ class Relation:
 
 @dataclass
 class Package:
-    """The parts of a package by lower-case name, and what is wrong with it so far."""
+    """The parts of a package by lower-case name, and its faults so far."""
 
     archive: zipfile.ZipFile
     limits: Limits
@@ -227,7 +227,7 @@ class Package:
         return list(self._read_relations(root, folder, rels))
 
     def xml(self, name: str, rule: Rule) -> Element | None:
-        """Return a small XML part as a tree, or None with a finding (of `rule`, or what the XML itself breaks)."""
+        """Return a small XML part as a tree, or None with a finding (of `rule`, or of a rule on XML)."""
         try:
             return read_small(self.chunks(name), self.shown(name))
         except OutOfTime:
@@ -362,7 +362,7 @@ _LIMIT = 4_000_000
 
 
 def image_kind(chunks: Iterable[bytes]) -> tuple[str | None, str | None]:
-    """Return `png`, `jpeg` or None, and what is wrong or None. Looks at the first 4 MB; pixels are not decoded."""
+    """Return `png`, `jpeg` or None, and the fault or None. Looks at the first 4 MB; pixels are not decoded."""
     data = b""
     for chunk in chunks:
         if len(data) < _LIMIT:
@@ -375,7 +375,7 @@ def image_kind(chunks: Iterable[bytes]) -> tuple[str | None, str | None]:
 
 
 def _components(data: bytes) -> int | None:
-    """Return the number of colour components of a JPEG's frame, or None where no frame header is found."""
+    """Return the number of colour components of a JPEG's frame, or None if no frame header is found."""
     at = 2
     while at + 9 < len(data):
         if data[at] != 0xFF:

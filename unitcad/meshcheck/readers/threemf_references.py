@@ -263,7 +263,7 @@ def _lattice(model: Model, resource: Object, lattice: dict[str, str]) -> None:
     for beam in resource.beams:
         ends = int(beam["v1"]), int(beam["v2"])
         if ends[0] == ends[1]:
-            model.add(P017, f"a beam of {who} ends where it begins")
+            model.add(P017, f"a beam of {who} has the same start and end")
         _in_range(model, max(ends), count, f"a beam's end in {who}")
         if "r2" in beam and "r1" not in beam:
             model.add(P017, f"a beam of {who} has r2 without r1")

@@ -1,8 +1,8 @@
 """Small features, D002: parts of a solid that are narrower than the printer's least feature in both directions across.
 
-Two searches. Level sections half-way between the heights at which the mesh has vertices find what stands: pins, tips.
-What lies or stands out sideways has faces with material less than the floor behind them all over; a section across such
-faces shows whether it is a whisker, or a rib or a wall, which goes on into the body.
+Two searches. Level sections half-way between the heights at which the mesh has vertices find upright features: pins,
+tips. Features that lie or point sideways have faces with material less than the floor behind them all over; a section
+across such faces shows whether it is a whisker, or a rib or a wall, which goes on into the body.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, tick: 
 
 
 def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> Floats | None:
-    """Return the middle of a face of the patch where the solid, cut across its length, is narrow both ways."""
+    """Return the middle of a face of the patch at which the solid, cut across its length, is narrow both ways."""
     corners = vertices[faces]
     sides = corners[:, [1, 2, 0]] - corners
     lengths = np.sqrt(np.einsum("fkx,fkx->fk", sides, sides))

@@ -1,6 +1,6 @@
-"""Overhangs, D003: faces that lean out too far, by region; a region that is bridged everywhere is left aside.
+"""Overhangs, D003: faces that lean out too far, by region; a region that is bridged everywhere is ignored.
 
-A region's border is supported where the face beyond it goes down. A point of the region is bridged if a line through it
+A region's border is supported if the face beyond it goes down. A point of the region is bridged if a line through it
 meets supported borders on both sides within the printer's bridge; a free ledge may be as wide as one extrusion.
 """
 
@@ -79,7 +79,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 def _border(topology: Topology, beyond: Ints, bed: float) -> tuple[Floats, Floats]:
     """Return border edges in plan (n, 2, 2), and whether each is held.
 
-    It is where it lies on the bed, or where the face beyond goes down.
+    It is if it touches the bed, or if the face beyond goes down.
     """
     faces, vertices = topology.mesh.faces, topology.mesh.vertices
     face, side = beyond // 3, beyond % 3

@@ -21,18 +21,18 @@ from unitcad.meshcheck.rules.registry import Rule
 D001 = Rule("""
     D001 warning: wall below the printer's floor
     A wall, measured between two faces within 12 degrees of parallel, is thinner than the printer's least wall (its
-    least flat wall where the faces lie flat), and reaches farther than that in two directions. Bevels, tapered edges
-    and the strips between engraved strokes are no walls.
+    least flat wall if the faces are level), and reaches farther than that in two directions. Bevels, tapered edges and
+    the strips between engraved strokes are no walls.
     Example: A wall of 0.3 mm for a printer whose least wall is 0.8 mm.
     Fix: Thicken the wall.
 """)
 
 D006 = Rule("""
     D006 warning: gap that the printer closes
-    A gap between two faces within 12 degrees of parallel is narrower than the printer's play (xy_play_mm; where the
-    faces lie flat, than a layer, layer_mm), and reaches farther than that in two directions. What lies on its two sides
-    is printed as one.
-    Example: A slot of 0.05 mm lies between a lid and its frame.
+    A gap between two faces within 12 degrees of parallel is narrower than the printer's play (xy_play_mm; if the faces
+    are level, than a layer, layer_mm), and reaches farther than that in two directions. Its two sides are printed as
+    one.
+    Example: A slot of 0.05 mm is between a lid and its frame.
     Fix: Widen the gap, or close it.
 """)
 

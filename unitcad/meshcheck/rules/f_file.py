@@ -1,4 +1,4 @@
-"""Files, F001 to F013: what the readers find before there is a mesh, and what a check may spend: bytes, faces, seconds.
+"""Files, F001 to F013: the readers' findings before there is a mesh, and limits of a check: bytes, faces, seconds.
 
 Reaching a limit is finding F011, never a pass.
 """
@@ -51,7 +51,7 @@ F004 = Rule("""
 """)
 
 F005 = Rule("""
-    F005 error: content is not what the name says
+    F005 error: content and name disagree
     The bytes are a web page, a Git LFS pointer, a compressed file or another format than the suffix claims.
     Example: part.stl begins with `version https://git-lfs`, since the repository was cloned without git lfs.
     Fix: Fetch the real file (git lfs pull, gunzip, the download link behind the page), or rename it.
@@ -101,9 +101,9 @@ F010 = Rule("""
 F012 = Rule("""
     F012 error: no such file, or unreadable
     The path does not exist, is not a file, or may not be read; or it is STEP and no B-rep extra is installed (a warning
-    where a folder was named). A warning if a solid of a STEP file has no closed mesh: its overlap and print are not
+    if a folder was named). A warning if a solid of a STEP file has no closed mesh: its overlap and print are not
     judged.
-    Example: `unitcad check prat.stl` where the file is part.stl.
+    Example: `unitcad check prat.stl` for the file part.stl.
     Fix: Check the path and its permissions; for STEP, install the extra step.
 """)
 
@@ -126,7 +126,7 @@ def not_a_number(word: str | bytes, places: Iterable[Location] = ()) -> Finding:
 F011 = Rule("""
     F011 error: resource limit reached
     The file asks for more bytes, faces, time or memory than the limits allow, or has too many pairs of faces that lie
-    at each other, so it was not checked to its end. It never passes. What was found by then is reported.
+    at each other, so it was not checked to its end. It never passes. Findings up to then are reported.
     Example: A mesh has 12 million faces, and --max-faces is 10 million.
     Fix: If the file is meant to be so large, raise the limit that the message names: --timeout, --max-faces or
     --memory, of which a file may take a quarter. Limits without an option, such as 4 GB a file and 100,000 instances of
@@ -134,15 +134,15 @@ F011 = Rule("""
 """)
 
 
-_FILE_SHARE = 0.25  # of the memory: what is made of a file on the way takes several times its size
+_FILE_SHARE = 0.25  # share of the memory: intermediate data of a file take several times its size
 
 
 @dataclass(frozen=True)
 class Limits:
     """Bounds on one file.
 
-    `seconds` is wall time. `ratio` is inflated over packed size of a zip entry. `max_instances` is what a 3MF or GLB
-    may place, counted before it is expanded.
+    `seconds` is wall time. `ratio` is inflated over packed size of a zip entry. `max_instances`: the most that a 3MF or
+    GLB may place, counted before it is expanded.
     """
 
     max_faces: int = 10_000_000
@@ -214,9 +214,9 @@ def keeping(
     facts: Facts | None = None,
     change: Callable[[Iterable[Finding]], Iterable[Finding]] = iter,
 ) -> Iterator[None]:
-    """Put the findings by then, and the facts, beside what ends the check inside; `change` all of them.
+    """Add the earlier findings and the facts to the error that ends the check inside; `change` all of them.
 
-    Raises `Unreadable`, with F011 where memory runs out, pairs are too many or calls nest too deeply.
+    Raises `Unreadable`, with F011 if memory runs out, pairs are too many or calls nest too deeply.
     """
     try:
         yield

@@ -31,16 +31,16 @@ from unitcad.meshcheck.rules.registry import Rule
 G001 = Rule("""
     G001 error: self-crossing
     Two faces pass through each other. Decided exactly: touching is not crossing. A warning, unless --strict is given,
-    if they do so by no more than 0.02 mm or four float32 steps, of which the message says the depth. In a 3MF file a
-    warning, since the core specification (4.1) says what is solid.
+    if they do so by no more than 0.02 mm or four float32 steps; the message gives the depth. In a 3MF file a warning,
+    since the core specification (4.1) defines what is solid.
     Example: A bolt passes through a wall and is not united with it.
     Fix: Unite the bodies with a boolean, or move the surfaces apart.
 """)
 
 G003 = Rule("""
     G003 warning: shells touch
-    Two shells meet in a point, line or face and do not pass through each other there. What they share is a millionth of
-    the smaller one at most; if it is more, G002 says so too. Rounding decides whether they print as one.
+    Two shells meet in a point, line or face and do not pass through each other there. The shared volume is a millionth
+    of the smaller one at most; if it is more, G002 applies too. Rounding decides whether they print as one.
     Example: The tip of a cone meets the top of a box.
     Fix: Overlap them and unite, or leave a gap.
 """)
@@ -56,8 +56,8 @@ G008 = Rule("""
     G008 error: shell overlaps itself
     A shell passes through itself along edges that four or more of its faces share, or two of its faces cover each other
     in one plane and look the same way: its winding number takes another value than 0 and 1, such as 2 in the middle of
-    a pentagram or -1 in one half of a bow tie. A warning, unless --strict is given, if two faces cover each other by
-    no more than 0.02 mm. In a 3MF file a warning, since the core specification (4.1) says what is solid.
+    a pentagram or -1 in one half of a bow tie. A warning, unless --strict is given, if two faces cover each other by no
+    more than 0.02 mm. In a 3MF file a warning, since the core specification (4.1) says what is solid.
     Example: A prism stands on a pentagram that is drawn in one stroke.
     Fix: Unite the body with itself by a boolean, or correct the outline that it was made from.
 """)
@@ -65,9 +65,8 @@ G008 = Rule("""
 G009 = Rule("""
     G009 error: wall or gap without thickness
     Two faces cover each other in one plane and look opposite ways, and they do not belong to two solids that lie side
-    by side: a fin, a fold, a crack, or a cavity that reaches the surface. Also where two neighbours fold onto each
-    other to within two float32 steps. A warning, unless --strict is given, if they cover each other by no more than
-    0.02 mm.
+    by side: a fin, a fold, a crack, or a cavity that reaches the surface. Also if two neighbours fold onto each other
+    to within two float32 steps. A warning, unless --strict is given, if they cover each other by no more than 0.02 mm.
     Example: A fin is drawn as one surface and exported with both of its sides.
     Fix: Give the wall or the gap a thickness, or remove both faces.
 """)
@@ -141,7 +140,7 @@ def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterato
         return
 
     def region(at: int) -> tuple[Ints, tuple[float, float, float]]:
-        """Return the faces of a pair of shells that touch, and the middle of what their boxes share."""
+        """Return the faces of a pair of shells that touch, and the middle of the common part of their boxes."""
         key = keys[first[at]]
         begin, end = np.searchsorted(keys, [key, key + 1])
         shells = contact.shells_of(keys[begin : begin + 1])[0]
@@ -159,7 +158,7 @@ def _places(
     pairs: Ints,
     region: Callable[[int], tuple[Ints, tuple[float, float, float]]] | None = None,
 ) -> list[Location]:
-    """List where pairs meet, no point twice, with both faces; first the one that was not named before."""
+    """List the points at which pairs meet, no point twice, with both faces; first the one that was not named before."""
     by_place: dict[tuple[int, ...], Location] = {}
     named: set[int] = set()
     grid = 4 * max(float32_step(faces.vertices), 1e-300)

@@ -1,4 +1,4 @@
-"""A file against what a build's manifest says of it: M001 to M005."""
+"""A file against a build's manifest: M001 to M005."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""3MF packages, P001 to P020, and the scene of a GLB: what their readers find before there is a mesh."""
+"""3MF packages, P001 to P020, and the scene of a GLB: their readers' findings before there is a mesh."""
 
 from __future__ import annotations
 
@@ -94,9 +94,8 @@ P012 = Rule("""
     P012 error: dangling, forward or recursive object reference
     A build item or component names an object that is not there, is defined later, may not be used so (type other), or
     contains itself, as may a node of a GLB. A component of type other is a warning, unless --3mf-strict is given, since
-    slicers keep modifiers so; it is not part of what is built.
-    Example: An item has `objectid="3"`, and the only object of the model has the id 1.
-    Fix: Define each object before its use, and leave none out.
+    slicers keep modifiers so; it is not part of the build. Example: An item has `objectid="3"`, and the only object of
+    the model has the id 1. Fix: Define each object before its use, and leave none out.
 """)
 
 P013 = Rule("""
@@ -131,10 +130,10 @@ P016 = Rule("""
 P017 = Rule("""
     P017 error: against the schema
     An element or attribute is missing, unknown, repeated, out of order, of the wrong type, or forbidden (xml:space, xsi
-    attributes), or text stands between elements. Such text, an unknown attribute without a prefix, metadata of one
-    name and a missing UUID are warnings, unless --3mf-strict is given, since common programs write such files.
+    attributes), or text stands between elements. Such text, an unknown attribute without a prefix, metadata of one name
+    and a missing UUID are warnings, unless --3mf-strict is given, since common programs write such files.
     Example: A `<triangle>` has v1 and v2, and no v3.
-    Fix: Write what the 3MF schema of that element asks.
+    Fix: Write the element by its 3MF schema.
 """)
 
 P018 = Rule("""
@@ -156,7 +155,7 @@ P019 = Rule("""
 
 P020 = Rule("""
     P020 error: package singletons
-    More than one thumbnail or print ticket for one part, or one that is not what its relationship says.
+    More than one thumbnail or print ticket for one part, or one that does not fit its relationship.
     Example: _rels/.rels has two relationships of type thumbnail.
     Fix: Keep one.
 """)

@@ -17,7 +17,7 @@ from unitcad.meshcheck.findings import SEVERITIES, Finding, Location, Unreadable
 
 
 class Rule:
-    """A rule by its text: what is wrong, how bad it is, why it matters, an example, and how to fix it.
+    """A rule by its text: the fault, how bad it is, why it matters, an example, and how to fix it.
 
     The text's first line is `CODE severity: title`; the cause, `Example: ...` and `Fix: ...` follow. The code is the
     family's letter and three digits; the severity is error, warning or info. `count_is_size`: the count of a finding
@@ -76,7 +76,7 @@ def modules(families: str = "".join(FAMILIES)) -> tuple[ModuleType, ...]:
 
 @cache
 def rules() -> dict[str, Rule]:
-    """Return all rules by code, family by family. Raises ValueError where two have one code."""
+    """Return all rules by code, family by family. Raises ValueError if two have one code."""
     every: dict[str, Rule] = {}
     for rule in (value for module in modules() for value in vars(module).values() if isinstance(value, Rule)):
         if every.setdefault(rule.code, rule) is not rule:

@@ -1,4 +1,4 @@
-"""The size of what a file holds: its unit of length, S001, and S002 for a printer."""
+"""The size of a file's content: its unit of length, S001, and S002 for a printer."""
 
 from __future__ import annotations
 

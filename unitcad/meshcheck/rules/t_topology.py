@@ -53,11 +53,11 @@ T005 = Rule("""
 
 T006 = Rule("""
     T006 warning: closed only after welding
-    Edges match only once vertices are joined that are listed apart. Two are joined where they are in one place, or
-    where they are nearer than 1e-5 of their own shell's diagonal (or two float32 steps there) and than a tenth of the
-    shortest edge at either. So a gap wider than that stays a boundary (T001), no face collapses, and other shells of
-    the file have no influence. Crossings, stored normals and slivers are checked on the faces as stored. An error in a
-    3MF with --3mf-strict, since the core specification (4.1) asks for common vertices.
+    Edges match only once vertices are joined that are listed apart. Two are joined if they are in one place, or nearer
+    than 1e-5 of their own shell's diagonal (or two float32 steps there) and than a tenth of the shortest edge at
+    either. So a gap wider than that stays a boundary (T001), no face collapses, and other shells of the file have no
+    influence. Crossings, stored normals and slivers are checked on the faces as stored. An error in a 3MF with
+    --3mf-strict, since the core specification (4.1) asks for common vertices.
     Example: Two halves of a ball were exported apart, and their rims differ by 0.000001 mm.
     Fix: Weld vertices at export.
 """)
@@ -71,8 +71,8 @@ T007 = Rule("""
 
 T009 = Rule("""
     T009 error: duplicate face
-    Two faces with an area have the same three vertices. Where two closed shells stand side by side there, they touch
-    instead (G003, T003).
+    Two faces with an area have the same three vertices. If two closed shells are side by side there, they touch instead
+    (G003, T003).
     Example: The lid of a box is in the file twice.
     Fix: Remove one, or both if they face each other.
 """)
@@ -113,7 +113,7 @@ NORMAL_COS = float(np.cos(np.radians(15.0)))  # T013
 
 
 def check_mesh(part: Inspection) -> Iterator[Finding]:
-    """Apply the topology rules but for T008, which needs to know what lies in what."""
+    """Apply the topology rules but for T008, which needs to know which shell is inside which."""
     topology = part.topology
     mesh, edges, kept = topology.mesh, topology.edges, topology.kept
     if topology.unused:
@@ -169,8 +169,8 @@ def _many_faces(topology: Topology) -> Iterator[Finding]:
 def _thin(topology: Topology) -> Iterator[Finding]:
     """Report degenerate faces (T010) and slivers (T011), on the faces as stored.
 
-    A sliver harms where it is long: its height is below the float32 step, so rounding alone decides where it faces,
-    and it is longer than SLIVER of its shell. Short ones vanish in a slicer's own resolution.
+    A sliver harms if it is long: its height is below the float32 step, so only rounding decides its direction, and it
+    is longer than SLIVER of its shell. Short ones vanish in a slicer's own resolution.
     """
     mesh, faces, kept, areas = topology.mesh, topology.stored, topology.kept, topology.stored_areas
     vertices, repeated = mesh.vertices, topology.repeated

@@ -23,8 +23,8 @@ V001 = Rule("""
 V002 = Rule("""
     V002 warning: beyond float32 precision at this size
     The grid of float32 numbers at a shell's farthest coordinate is coarser than a ten-thousandth of the shell's
-    diagonal: it lies too far from the origin.
-    Example: A part of 10 mm lies 100 m from the origin, where float32 numbers are 0.008 mm apart.
+    diagonal: it is too far from the origin.
+    Example: A part of 10 mm is 100 m from the origin, at which float32 numbers are 0.008 mm apart.
     Fix: Move the part to the origin before export.
 """)
 

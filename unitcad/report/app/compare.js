@@ -66,7 +66,7 @@
       const heads = rows.map((row) => [row[0] ? el("a", { href: `#${encodeURIComponent(row[0])}` }, nameOf(row)) : nameOf(row), " ",
         el("button", { type: "button", className: "quiet", "aria-label": `Unpin ${nameOf(row)}`, onclick: () => unpin(row) }, "Unpin")]);
       const sections = variants.map((each) => (each && each.drawings["section.svg"] ? drawing(each.drawings["section.svg"], "The unit in section") : "–"));
-      const answers = variants.map((each) => ((each && each.estimate && each.estimate.answer && each.estimate.answer.lines) || ["–"])[0]);
+      const answers = variants.map((each) => (each && each.estimate && each.estimate.answer && each.estimate.answer.headline) || "–");
       const columns = table.columns.map((name, i) => [name, rows.map((row) => row[i + 1])]).filter(([name]) => !["index", "status", "reason", "name"].includes(name));
       const figures = columns.filter(([name, cells]) => !table.swept.has(name) && differing(cells)).map(([name, cells]) => [head(name), cells.map((cell) => shown(name, cell))]);
       const unlike = differences(specs);

@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const { el, number, section, table, facts, theme, curvePlot } = window.unitcad;
-  const NAMES = { bush: "Rubber bushes", paper: "Paper, as printed", consistent: "Paper's path, corrected", fitted: "Fitted divider", crossings: "Interfaces alone", null: "Null: two constants" };
+  const NAMES = { rule: "Fitted rule", published: "Paper, as published", corrected: "Paper's path, corrected", divider: "Fitted divider", crossings: "Interfaces alone", baseline: "Four class means" };
   const nameOf = (model) => (NAMES[model] ? `${NAMES[model]} (${model})` : model);
   const known = (value) => typeof value === "number" && Number.isFinite(value);
 
@@ -65,14 +65,14 @@
     return el("figure", { className: "ranges" }, el("figcaption", {}, caption), rows.map(line), scale, legend.length > 0 && el("ul", { className: "key" }, legend));
   }
 
-  const COLOURS = { paper: "series-1", consistent: "series-3", fitted: "series-2", bush: "series-5" };
+  const COLOURS = { published: "series-1", corrected: "series-3", divider: "series-2", rule: "series-5" };
 
   const ownMarks = (data) => (data.own_measured || []).map((own) => ({ name: `Measured here (${own.unit})`, value: percent(own.value) }));
 
   function levels(data) {
     const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: percents(block.edge_level || {}), reason: (block.edge_level || {}).reason, colour: COLOURS[model] || "series-4" }));
-    const { p10, p50, p90, weights } = data.answer || {};
-    if (known(p10)) rows.unshift({ name: `80 % range by ${Object.keys(weights || {}).join(", ")}`, entry: percents({ value: p50, low: p10, high: p90 }), colour: "series-6" });
+    const { p10, p50, p90, model } = data.answer || {};
+    if (known(p10)) rows.unshift({ name: `80 % range by ${model}`, entry: percents({ value: p50, low: p10, high: p90 }), colour: "series-6" });
     const found = data.measured || {};
     const measured = found.same_size ? found : {};
     const marks = [{ name: "Measured", value: percent(measured.level) }, { name: "Also printed", value: percent(measured.also_printed), dashed: true }, ...ownMarks(data)].filter(({ value }) => known(value));
@@ -80,7 +80,7 @@
     const reasons = [...new Set(rows.map(({ reason }) => reason).filter(Boolean))];
     return [
       rangeChart(rows, marks, "Level at the unit's edge, % of the motor's amplitude; a model's bar is the spread from the inputs' ranges, not its error."),
-      [...reasons, ...Object.values(data.models || {}).map((block) => block.not_of_this_drive).filter(Boolean)].map((reason) => el("p", { className: "note" }, reason)),
+      reasons.map((reason) => el("p", { className: "note" }, reason)),
       fit && predicted(data, fit),
       known(found.level) ? el("p", { className: "note" }, found.same_size ? "" : `${number(percent(found.level), 3)} %: `, found.note) : el("p", { className: "note" }, "The paper measured no such unit."),
     ];
@@ -104,12 +104,12 @@
     const cells = rows.map(([model, error]) => [nameOf(model), factor(error.left_out.geometric_mean), `${one(error.left_out.low)} to ${one(error.left_out.high)}`, factor(error.own_left_out), factor(error.own_by_stored), error.held_80 || "–"]);
     const title = `Error by the fit of ${data.fit.name}`;
     return [el("h3", {}, title),
-      table(["Model", "Left out", "5 to 95 %", "Own units", "Own, stored constants", "In 80 %"], [...cells, ["Null", factor(rows[0][1].null), "–", "–", "–", "–"]], { label: title }),
+      table(["Model", "Left out", "5 to 95 %", "Own units", "Own, stored constants", "In 80 %"], [...cells, [nameOf("baseline"), factor(rows[0][1].baseline), "–", "–", "–", "–"]], { label: title }),
       el("p", { className: "note" }, "Factors; 1 is exact. Each unit is predicted by constants fitted without it. The error against the measured table, below, is by the stored constants.")];
   }
 
   // Finite elements: a range for each drive and reading, from draws of what is not known; the dot is the median.
-  function mechanics(block) {
+  function elements(block) {
     if (!block) return null;
     const place = { skin: "skin at D/2", edge: "the unit's own edge" };
     const row = (name, one, colour) => ({ name, entry: percents({ value: one.median, low: one.low, high: one.high }), colour });
@@ -118,10 +118,10 @@
       return [row(name, one, "series-4"), ...Object.entries(one.by_contact || {}).map(([contact, group]) => row(`${name}: ${contact}`, group, "series-2"))];
     });
     const numbers = (block.levels || []).map((one) => [one.drive, place[one.reading] || one.reading, three(percent(one.median)), one.median_error === null ? "–" : three(one.median_error), three(percent(one.drawn_as))]);
-    return [el("h3", {}, "By finite elements (mechanics)"),
+    return [el("h3", {}, "By finite elements (fem)"),
       rangeChart(rows, [], `Amplitude along the drive, % of the motor's: median and ${(block.percent || [])[0]} to ${(block.percent || [])[2]} % of ${block.draws} draws, then those with bonded and with resting skin apart.`),
       numbers.length > 0 && table(["Drive", "Read on", "Median, %", "Its error, times or divided by", "Unit as drawn, %"], numbers, { label: "Medians by finite elements" }),
-      el("p", { className: "note" }, block.reason || `Not known, and drawn: ${block.not_known}.`)];
+      el("p", { className: "note" }, block.reason || `Not known, and drawn: ${block.not_known}. The level on the skin over that of the unit's own edge, as drawn: ${Object.entries(block.skin_over_edge || {}).map(([drive, ratio]) => `${three(percent(ratio))} % (${drive})`).join(", ")}.`)];
   }
 
   function ratios(data) {
@@ -163,12 +163,16 @@
   }
 
   function margins(models) {
-    const rows = (models.paper && models.paper.constraints) || [];
-    if (!rows.length) return null;
-    return [el("h3", {}, "The paper's constraints"), table(["Equation", "Says", "Control", "Left", "", "Right", "Margin", "Unit", "Holds"], rows.map((row) => ({
+    const { constraints: rows, coefficients: found, interfaces } = models.published || {};
+    if (!rows || !rows.length) return null;
+    const at = (block, key, i) => (known(block[key][i]) ? three(block[key][i]) : known((block[`${key}_low`] || [])[i]) ? `${three(block[`${key}_low`][i])} to ${three(block[`${key}_high`][i])}` : "not known");
+    const waves = Object.keys(found);
+    const passed = interfaces.map((name, i) => [name, ...waves.flatMap((wave) => ["k_t", "k_r"].map((key) => at(found[wave], key, i)))]);
+    return [el("h3", {}, "The paper's equations 4 to 6"),
+      table(["From a layer to the next", ...waves.flatMap((wave) => ["k_t", "k_r"].map((key) => `${key}, ${wave.toUpperCase()} wave`))], passed, { label: "Transmission and reflection" }), table(["Equation", "Says", "Control", "Left", "", "Right", "Margin", "Unit", "Holds"], rows.map((row) => ({
       className: row.holds === false ? "bad" : undefined,
       cells: [row.equation, row.text, row.control || "", row.left, row.relation, row.right, row.margin, row.unit || "", row.holds === true ? "holds" : row.holds === false ? "fails" : row.reason || "not known"],
-    })), { label: "The paper's constraints" })];
+    })), { label: "The paper's inequalities 5 and 6" })];
   }
 
   function errors(data) {
@@ -188,13 +192,27 @@
         entry.directions ? `${entry.directions.right} of ${entry.directions.of}` : "–"]), { label: "Error against the measured table" }),
       el("p", { className: "note" }, `Factors; 1 is exact. ${all.what || ""}`),
       all.range && el("p", { className: "note" }, `Range: ${all.range}. p: ${all.sign_flip.what}.`),
-      chosen && el("p", { className: "note" }, `Chosen among ${chosen.forms.length} forms without the unit too: ${number(chosen.geometric_mean, 3)} (${ends(chosen.range)}).`)];
+      chosen && el("p", { className: "note" }, `Rule, its form chosen among ${chosen.forms.length} without the unit too: ${number(chosen.geometric_mean, 3)} (${ends(chosen.range)}).`), classes(all)];
+  }
+
+  // What leaving out a whole class of units costs.
+  function classes({ classes_out: out, order }) {
+    if (!out) return null;
+    return [table(["Class left out", ...order.map(nameOf)], Object.entries(out.by_class).map(([name, errors]) => [name, ...order.map((model) => errors[model])]), { label: "Error on a class that the fit did not have" }),
+      el("p", { className: "note" }, `${out.what}.`)];
+  }
+
+  // A slope with its range, and how many measured pairs agree.
+  function slope(seen, name) {
+    if (!(name in seen.by)) return "not seen";
+    const tested = (seen.tested || {})[name];
+    return tested ? `${three(seen.by[name])} (${three(tested.low)} to ${three(tested.high)}; ${tested.of ? `${tested.agree} of ${tested.of} agree` : "untested"})` : three(seen.by[name]);
   }
 
   // What a percent more of each input does to each model's level, in percent; what no model reads is named below.
   function inputs(data) {
     const closed = Object.entries(data.models || {}).map(([model, block]) => [nameOf(model), block.inputs_seen || {}]);
-    const solved = ((data.mechanics || {}).inputs_seen || []).map((one) => [`Finite elements, ${one.reading}`, one]);
+    const solved = ((data.fem || {}).inputs_seen || []).map((one) => [`Finite elements, ${one.reading}`, one]);
     const reading = [...closed, ...solved].filter(([, seen]) => seen.by);
     if (!reading.length) return null;
     const names = [...Object.keys(reading[0][1].by), ...reading[0][1].not_seen];
@@ -202,8 +220,8 @@
     const [read, unread] = [names.filter((name) => most(name) > 0), names.filter((name) => most(name) === 0)];
     read.sort((a, b) => most(b) - most(a));
     return [el("h3", {}, "Inputs that a model sees"),
-      table(["1 % more of", ...reading.map(([model]) => model)], read.map((name) => [name, ...reading.map(([, seen]) => (name in seen.by ? three(seen.by[name]) : "not seen"))]), { label: "Inputs that a model sees" }),
-      el("p", { className: "note" }, `Change of the level at the edge in percent, at the middle of the inputs' ranges.${unread.length ? ` Seen by none: ${unread.join(", ")}.` : ""}`)];
+      table(["1 % more of", ...reading.map(([model]) => model)], read.map((name) => [name, ...reading.map(([, seen]) => slope(seen, name))]), { label: "Inputs that a model sees" }),
+      el("p", { className: "note" }, `Change of the level at the edge in percent, at the middle of the inputs' ranges; in brackets its range, and how many measured pairs of units agree.${unread.length ? ` Seen by none: ${unread.join(", ")}.` : ""}`)];
   }
 
   function assumptions(data) {
@@ -213,10 +231,9 @@
       own, layered.length > 0 && [el("h4", {}, "Layered skin"), el("ul", {}, layered.map((text) => el("li", {}, text)))]);
   }
 
-  // The answer in the words of the command line; a result of an earlier version has none.
-  function lead(answer) {
-    const [first, ...rest] = (answer && answer.lines) || ["How much of the motor's amplitude reaches the skin at the unit's edge, by each model, and how it decays from there."];
-    return [el("p", { className: "lead" }, first), rest.length > 0 && el("ul", { className: "lead-notes" }, rest.map((line) => el("li", {}, line)))];
+  // The answer in the words of the command line: two lines that are always there.
+  function lead({ headline, lines }) {
+    return [el("p", { className: "lead" }, headline), lines[0].length > headline.length && el("p", {}, lines[0].slice(headline.length).trim()), el("p", {}, lines[1])];
   }
 
   function estimate(variant) {
@@ -227,8 +244,9 @@
       return section("estimate", "Attenuation estimate", el("p", { className: "absent" },
         ask ? ["No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.reason}.`));
     }
-    return section("estimate", "Attenuation estimate", lead(data.answer), levels(data), mechanics(data.mechanics), el("h3", {}, "Outwards from the edge"), curves(data.layered),
-      el("details", {}, el("summary", {}, "Tables: against controls, inputs, the paper's constraints, errors"), ratios(data), inputs(data), margins(data.models || {}), errors(data)), assumptions(data),
+    return section("estimate", "Attenuation estimate", lead(data.answer), elements(data.fem),
+      el("details", {}, el("summary", {}, "How sure?"), el("ul", { className: "lead-notes" }, data.answer.details.map((line) => el("li", {}, line))), levels(data), el("h3", {}, "Outwards from the edge"), curves(data.layered)),
+      el("details", {}, el("summary", {}, "Tables: against controls, inputs, the paper's equations, errors"), ratios(data), inputs(data), margins(data.models || {}), errors(data)), assumptions(data),
       el("details", {}, el("summary", {}, "All numbers"), facts(data)));
   }
 

@@ -85,10 +85,10 @@
     function current() {
       const { unit } = state;
       const { moulds, estimate } = { moulds: state.moulds.of === unit.text ? state.moulds : {}, estimate: state.estimate.of === unit.text ? state.estimate : {} };
-      const answer = estimate.estimate && estimate.estimate.answer ? estimate.estimate.answer.lines[0] : (estimate.lines || [])[0];
+      const answer = estimate.estimate && estimate.estimate.answer ? estimate.estimate.answer.headline : (estimate.lines || [])[0];
       const failed = (moulds.checks || []).filter((check) => !check.ok).length;
-      const { model, level } = (estimate.estimate && estimate.estimate.answer) || {};
-      const levels = typeof level === "number" ? [[`edge level by ${model}`, 100 * level, "% of the motor's amplitude"]] : [];
+      const { level } = (estimate.estimate && estimate.estimate.answer) || {};
+      const levels = typeof level === "number" ? [["edge level", 100 * level, "% of the motor's amplitude"]] : [];
       const more = moulds.checks ? [["mould checks failed", failed, `of ${moulds.checks.length}`]] : [];
       return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...levels, ...(unit.figures || []), ...more], answer, text: unit.text || state.text, refused: page.dataset.stale === "true" };
     }
@@ -235,10 +235,9 @@
     // The estimate, or a patch's crosstalk, and the casting in a line above the view: they stand whole further down.
     function showGlance() {
       const { estimate, moulds } = state;
-      const percent = (level) => number(100 * level, 2);
       const answer = estimate.of === state.unit.text && estimate.estimate && estimate.estimate.answer;
       const crosstalk = estimate.of === state.unit.text && estimate.drawings && `${estimate.lines[0]} `;
-      const level = crosstalk || answer && [`Edge level ${percent(answer.level)} % of the motor's amplitude`, answer.p10 !== undefined && answer.p10 !== null ? `, 80 % range ${percent(answer.p10)} to ${percent(answer.p90)} %` : "", ". "].join("");
+      const level = crosstalk || answer && `${answer.headline} `;
       const lines = moulds.of === state.unit.text && moulds.model ? moulds.lines || [] : [];
       clear(glance, level, lines.slice(0, 1).map((line) => `${line[0].toUpperCase()}${line.slice(1)}.`));
       glance.dataset.old = "false";

@@ -1,1 +1,0 @@
-"""Finite elements of a unit on its body: model `mechanics`. Needs scikit-fem (extra `fem`)."""

@@ -1,0 +1,181 @@
+"""A digitised figure against every model, blind: the constants are those of the catalogue's nine levels."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from unitcad.attenuation.curve import layered_block
+from unitcad.attenuation.edge.estimates import rounded
+from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
+from unitcad.attenuation.edge.models import COMPARED
+from unitcad.attenuation.edge.ranges import predictive_of
+from unitcad.attenuation.edge.variant_units import nominal
+from unitcad.attenuation.inputs import EstimateInput
+from unitcad.catalogue import figures, measurements
+from unitcad.designs import shipped as designs
+from unitcad.errors import Refusal, unknown_name
+from unitcad.estimating import estimate_input
+from unitcad.files import read_text
+from unitcad.validation import from_data
+
+COLUMNS = ("unit", "distance_mm", "value", "error", "source")
+FAR_MM = 30.0
+"""As far as the estimate's curve goes, mm."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A digitised point: amplitude on the skin over the motor's, at a distance (mm) from the unit's edge."""
+
+    unit: str
+    distance_mm: float
+    value: float
+    error: float | None
+    source: str
+
+
+def load_figure(source: str) -> tuple[Point, ...]:
+    """Return the points of a CSV file, or of a figure in the catalogue. Raises Refusal for the first fault."""
+    known = figures()
+    path = known.get(source) or Path(source)
+    if source not in known and not source.endswith(".csv"):
+        raise unknown_name("FIGURE", source, known)
+    lines = [line for line in read_text(path).splitlines() if line.strip() and not line.startswith("#")]
+    rows = csv.DictReader(lines)
+    if tuple(rows.fieldnames or ()) != COLUMNS:
+        raise Refusal("header", ",".join(rows.fieldnames or ()), f"must be {','.join(COLUMNS)}")
+    points = tuple(_point(i, row) for i, row in enumerate(rows))
+    if not points:
+        raise Refusal("FIGURE", source, "has no points")
+    return points
+
+
+def _point(i: int, row: Mapping[str, str | None]) -> Point:
+    where = f"row {i + 1}"
+    if None in row.values() or None in row:
+        raise Refusal(where, "", f"must have {len(COLUMNS)} cells")
+    unit, numbers = (row["unit"] or "").strip(), {}
+    _layers(f"{where}, unit", unit)
+    for name, least, most in (("distance_mm", 0.0, FAR_MM), ("value", 1e-6, 3.0), ("error", 0.0, 3.0)):
+        text = (row[name] or "").strip()
+        if name == "error" and not text:
+            continue
+        try:
+            number = float(text)
+        except ValueError:
+            raise Refusal(f"{where}, {name}", text, "must be a number") from None
+        if not least <= number <= most:
+            hint = "; a fraction of the motor's amplitude, not per cent" if name == "value" and number > most else ""
+            raise Refusal(f"{where}, {name}", number, f"must be from {least:g} to {most:g}{hint}")
+        numbers[name] = number
+    return Point(unit, numbers["distance_mm"], numbers["value"], numbers.get("error"), (row["source"] or "").strip())
+
+
+def _layers(field: str, unit: str) -> tuple[str, list[str]]:
+    """Return design and silicones of a name like DESIGN E10/D30."""
+    design, _, pair = unit.partition(" ")
+    known = (CONTROL, *(name for name, one in designs().items() if one.passes))
+    if design not in known:
+        raise unknown_name(field, design, known)
+    short = measurements().names
+    for name in pair.split("/"):
+        if name not in short:
+            raise unknown_name(field, name, short)
+    layers = [short[name] for name in pair.split("/")]
+    if (design == CONTROL) != (len(layers) == 1):
+        raise Refusal(field, unit, f"{CONTROL} has one silicone, a design two or more")
+    return design, layers
+
+
+def variants_of(unit: str) -> list[EstimateInput]:
+    """Return a unit at the measured units' lengths, in each design that it may be of."""
+    design, layers = _layers("unit", unit)
+    shared = measurements().unit
+    wall = 2 * shared.wall_mm / len(layers)
+    chosen = [name for name, one in designs().items() if one.passes and design in (CONTROL, name)]
+    made = []
+    for name in chosen:
+        cap = {"cap_mm": wall} if designs()[name].caps else {}
+        table = [{"material": material, "wall_mm": wall, **cap} for material in layers]
+        data = {"name": unit, "design": name, "diameter_mm": shared.diameter_mm, "fpcb": {}, "layers": table}
+        made.append(estimate_input(from_data(data)))
+    return made
+
+
+def score(points: tuple[Point, ...]) -> dict[str, Any]:
+    """Return {units, scores, decay, decay_scores} as JSON-ready data.
+
+    `units`: each measured level, at 0 mm, with every model's, the 80 % range, and `blind`: whether the constants were
+    fitted without it. `scores`: each model's geometric-mean factor error over the blind units. `decay`: each point
+    farther out over its unit's own level. It has the skin's curve and range under either drive, and the paper's
+    exponential; `decay_scores` has their factor errors.
+    """
+    table = measured_table()
+    everyone = np.ones((1, len(table.names)))
+    constants = {name: model.fit(table, everyone)[0] for name, model in COMPARED.items()}
+    levels = {point.unit: point for point in points if point.distance_mm == 0.0}
+    units = [_unit(point, constants) for point in levels.values()]
+    blind = [one for one in units if one["blind"]]
+    outside = [point for point in points if point.distance_mm > 0.0 and point.unit in levels]
+    skins = {unit: layered_block(variants_of(unit)[0]) for unit in dict.fromkeys(point.unit for point in outside)}
+    decay = [_decay(point, point.value / levels[point.unit].value, skins[point.unit]) for point in outside]
+    return rounded(
+        {
+            "units": units,
+            "scores": {name: _factor([(one["levels"][name], one["measured"]) for one in blind]) for name in COMPARED},
+            "held": f"{sum(one['held'] for one in blind)} of {len(blind)}",
+            "decay": decay,
+            "decay_scores": {
+                name: _factor([(one[name]["value"], one["measured"]) for one in decay])
+                for name in ("flat", "axial", "published")
+            },
+        },
+        6,
+    )
+
+
+def _unit(point: Point, constants: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    variants = variants_of(point.unit)
+    levels = {
+        name: float(np.exp(np.mean([model.logs(nominal(one), constants[name])[0] for one in variants])))
+        for name, model in COMPARED.items()
+    }
+    low, _, high = (float(end[0]) for end in predictive_of(variants[:1]).range)
+    return {
+        "unit": point.unit,
+        "measured": point.value,
+        "error": point.error,
+        "source": point.source,
+        "blind": point.unit not in measured_table().names,
+        "levels": levels,
+        "p10": low,
+        "p90": high,
+        "held": low <= point.value <= high,
+    }
+
+
+def _decay(point: Point, measured: float, layered: Mapping[str, Any]) -> dict[str, Any]:
+    mm = layered["r_mm"]
+
+    def at(curve: Mapping[str, Any]) -> dict[str, float]:
+        return {key: float(np.interp(point.distance_mm, mm, values)) for key, values in curve.items()}
+
+    exponential = layered["paper_beside"]["exponential"]["loss_modulus"]
+    return {
+        "unit": point.unit,
+        "distance_mm": point.distance_mm,
+        "measured": measured,
+        **{drive: at(block["u"]) for drive, block in layered["drives"].items()},
+        "published": at({"value": exponential}),
+    }
+
+
+def _factor(pairs: list[tuple[float, float]]) -> float | None:
+    """Return the geometric-mean factor between predicted and measured values."""
+    return float(np.exp(np.mean([abs(np.log(one / other)) for one, other in pairs]))) if pairs else None

@@ -1,0 +1,308 @@
+"""The tables of a spec as typed in a TOML file. Lengths in mm, the unit in each name.
+
+None means that the key is missing; `unitcad.spec.resolved` has the same spec with every value there. Only types and
+ranges of single values are checked here. The design and `validation` check conditions on several values.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
+from unitcad.catalogue import entries as kinds
+
+DEFAULT_MOTOR = "LCM0720A3463F"
+"""The motor of a spec that gives neither a part nor a size."""
+LEAST_LAYER = 0.5
+"""Least wall and cap of a layer, mm: thinner ones tear on demoulding and hide a printer's play."""
+LEAST_TAIL = 0.4
+"""No circuit's tail is narrower (two traces), mm."""
+LEAST_LEDGE = 0.1
+"""No ledge in the core is narrower, mm."""
+Length = Annotated[float, Meta(ge=0.1, le=kinds.LONGEST_MM)]
+Thickness = Annotated[float, Meta(ge=LEAST_LAYER, le=kinds.LONGEST_MM)]
+CircuitThickness = Annotated[float, Meta(ge=0.01, le=5)]
+Cavities = Annotated[int, Meta(ge=1)]
+Vents = Annotated[int, Meta(ge=1, le=1000)]
+TailWidth = Annotated[float, Meta(ge=LEAST_TAIL, le=kinds.LONGEST_MM)]
+Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
+FORMATS: tuple[Format, ...] = ("step", "stl", "3mf", "svg", "png", "glb")
+Output = Literal["unit", "moulds", "estimate", "casting"]
+OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
+_LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
+_TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
+Moduli = Literal["small-strain", "quasi-static"]
+Model = Literal["rule", "published", "corrected", "divider", "fem"]
+
+
+class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_unknown_fields=True):
+    """A table of the spec: frozen, unknown keys refused."""
+
+
+class MotorTable(Table, frozen=True, kw_only=True):
+    """The motor: a `part` of the catalogue, or its size, or both: a size then overrides the part's.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> motor = unitcad.Motor(part="LCM0720A3463F", thickness_mm=2.3)
+    >>> unitcad.load("encapsulating", set={"motor": motor}).motor.thickness_mm
+    2.3
+    """
+
+    part: Annotated[
+        str | None, Meta(description="motor of the catalogue (unitcad list motors), or of the spec's own [motors.NAME]")
+    ] = None
+    diameter_mm: Annotated[kinds.MotorDiameter | None, Meta(description="diameter of the can; default: the part's")] = (
+        None
+    )
+    thickness_mm: Annotated[
+        kinds.MotorThickness | None, Meta(description="thickness of the can; default: the part's")
+    ] = None
+    drive: kinds.Drive | None = None
+    fill: Annotated[bool, Meta(description="true: Layer 1 reaches the motor, without a ring of air between them")] = (
+        False
+    )
+    lip_mm: Annotated[
+        float, Meta(ge=0, le=10, description="reach of a lip of Layer 1 over the motor's edge at the skin; 0: none")
+    ] = 0.0
+
+
+class FpcbTable(Table, frozen=True, kw_only=True):
+    """The flexible circuit: a round pad on the motor and a straight tail to one side or to both.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("encapsulating", set={"fpcb": unitcad.Fpcb(tail="both")}).fpcb.tail
+    'both'
+    """
+
+    tail: Annotated[
+        Literal["one", "both"], Meta(description="sides on which the circuit leaves: one (+x), or both")
+    ] = "one"
+    thickness_mm: Annotated[CircuitThickness, Meta(description="thickness of the circuit")] = 0.11
+    tail_width_mm: Annotated[
+        TailWidth, Meta(description="width of the tail; half of it is at most 0.7 of the core's radius")
+    ] = 3.0
+    tail_length_mm: Annotated[Length, Meta(description="length of the tail outside the body")] = 10.0
+    pad_diameter_mm: Annotated[
+        Length | None, Meta(description="diameter of the pad on the motor; default: as wide as the design allows")
+    ] = None
+    tail_end_width_mm: Annotated[
+        TailWidth | None,
+        Meta(description="width of the tail's free end, such as a connector, which must pass the slot"),
+    ] = None
+
+
+class WiresTable(Table, frozen=True, kw_only=True):
+    """Wires in place of a circuit: side by side, out along +x through one slot or notch.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("no-fpcb", set={"wires": unitcad.Wires(diameter_mm=0.4)}).wires.count
+    2
+    """
+
+    diameter_mm: Annotated[float, Meta(ge=0.05, le=20, description="diameter of one wire with its insulation")]
+    count: Annotated[int, Meta(ge=1, le=8, description="number of wires")] = 2
+    length_mm: Annotated[Length, Meta(description="length of the wires outside the body")] = 10.0
+
+
+class LayerTable(Table, frozen=True, kw_only=True):
+    """One silicone layer: a wall and, in a design that has caps, a cap.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> layers = [unitcad.Layer(material="ecoflex-00-30", wall_mm=2.5)]
+    >>> unitcad.load("single-embedded", set={"layers": layers}).layers[0].wall_mm
+    2.5
+    """
+
+    material: Annotated[
+        str,
+        Meta(description="silicone of the catalogue (unitcad list materials), or of the spec's own [materials.NAME]"),
+    ]
+    wall_mm: Annotated[Thickness, Meta(description="thickness of the layer at the skin")]
+    cap_mm: Annotated[
+        Thickness | None,
+        Meta(description="thickness of the layer above the motor, for a design that has caps"),
+    ] = None
+
+
+class MouldsTable(Table, frozen=True, kw_only=True):
+    """The moulds. Lengths of the printer override those of its catalogue entry.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("embedded", set={"moulds": unitcad.Moulds(printer="sla")}).moulds.layer_mm
+    0.05
+    """
+
+    printer: Annotated[
+        str, Meta(description="printer of the catalogue (unitcad list printers), or of the spec's own [printers.NAME]")
+    ] = "fdm-0.4"
+    cavities: Annotated[
+        tuple[Cavities, Cavities] | Literal["fill"],
+        Meta(description="columns and rows of cavities in one mould, or fill: as many as the bed takes"),
+    ] = (1, 1)
+    bed_x_mm: kinds.Bed | None = None
+    bed_y_mm: kinds.Bed | None = None
+    bed_z_mm: kinds.Bed | None = None
+    layer_mm: kinds.LayerHeight | None = None
+    xy_play_mm: kinds.Play | None = None
+    plinth_clearance_mm: kinds.PlinthClearance | None = None
+    rib_interference_mm: kinds.RibInterference | None = None
+    seat_relief_mm: kinds.SeatRelief | None = None
+    slot_height_mm: kinds.SlotHeight | None = None
+    slot_width_clearance_mm: kinds.SlotClearance | None = None
+    window_clearance_mm: kinds.WindowClearance | None = None
+    least_wall_mm: kinds.Wall | None = None
+    skirt_wall_mm: kinds.Skirt | None = None
+    land_mm: kinds.Land | None = None
+    groove_width_mm: kinds.GrooveWidth | None = None
+    groove_depth_mm: kinds.GrooveDepth | None = None
+    filament_hole_mm: kinds.FilamentHole | None = None
+    engraving_depth_mm: kinds.EngravingDepth | None = None
+    engraving_stroke_mm: kinds.EngravingStroke | None = None
+    pour: Annotated[
+        Literal["open", "injected"],
+        Meta(description="open: struck off along the rim; injected: under a lid with sprue and vents"),
+    ] = "open"
+    sprue_mm: Annotated[
+        float,
+        Meta(ge=3.0, le=50, description="diameter of the sprue of each cavity under a lid: 3 by syringe, 4 by gravity"),
+    ] = 3.0
+    vents: Annotated[
+        Vents | None,
+        Meta(description="number of vents of each cavity under a lid, in fours; default: as many as clear the air"),
+    ] = None
+    filament_mm: Annotated[float, Meta(ge=0.2, le=20, description="diameter of the filament in the core")] = 1.75
+    plinth_height_mm: Annotated[
+        Annotated[float, Meta(ge=0.6, le=100)] | None,
+        Meta(description="height of the plinth; default: 2 mm in whole printed layers"),
+    ] = None
+    plate_mm: Annotated[
+        Annotated[float, Meta(ge=0.5, le=100)] | None,
+        Meta(description="thickness of the base's plate; default: 4 mm in whole printed layers"),
+    ] = None
+    ledge_mm: Annotated[
+        float, Meta(ge=LEAST_LEDGE, le=100, description="width of the core's ledge that carries the tongue")
+    ] = 0.6
+    draft_deg: Annotated[
+        float, Meta(ge=0, le=3, description="taper of bores and core, narrower upwards: silicone comes off more easily")
+    ] = 0.0
+
+
+class CastingTable(Table, frozen=True, kw_only=True):
+    """The bench: scale, mixing, room, and the margin on a silicone's elongation.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("embedded", set={"casting": unitcad.Casting(vacuum=False)}).casting.vacuum
+    False
+    """
+
+    scale_resolution_g: Annotated[float, Meta(ge=1e-6, le=1000, description="smallest step of the scale")] = 0.01
+    minimum_mix_g: Annotated[float, Meta(ge=0.001, le=1e6, description="smallest batch to mix")] = 2.0
+    waste: Annotated[float, Meta(ge=0, le=10, description="extra mix, as a fraction of the cavities' content")] = 0.5
+    room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room, which sets pot life and cure")] = (
+        23.0
+    )
+    vacuum: Annotated[bool, Meta(description="whether a vacuum chamber is at hand")] = True
+    strain_margin: Annotated[
+        float,
+        Meta(ge=0.01, le=1, description="fraction of a silicone's elongation at break that demoulding may use"),
+    ] = 0.5
+
+
+class EstimateTable(Table, frozen=True, kw_only=True):
+    """Inputs of the estimate.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("embedded", set={"estimate": unitcad.Estimate(frequency_hz=150)}).estimate.frequency_hz
+    150.0
+    """
+
+    frequency_hz: Annotated[
+        kinds.Frequency | None, Meta(description="frequency of the drive; default: the motor's")
+    ] = None
+    amplitude_um: Annotated[
+        kinds.Amplitude | None, Meta(description="amplitude of the motor; default: the motor's own")
+    ] = None
+    tissue: Annotated[
+        str, Meta(description="body under the unit, of the catalogue or of the spec's own [tissue.NAME.LAYER]")
+    ] = "forearm"
+    models: Annotated[
+        tuple[Model, ...], Meta(min_length=1, description="models of the level; fem are the finite elements")
+    ] = ("rule", "published", "corrected", "divider")
+    moduli: Annotated[
+        Moduli,
+        Meta(description="modulus of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa"),
+    ] = "small-strain"
+    fit: Annotated[
+        str | None, Meta(description="lab-fit.toml of unitcad fit next to the spec: the lab's own constants and ranges")
+    ] = None
+    fit_source: Annotated[str | None, Meta(description="text of that file; unitcad fills it in")] = None
+
+
+class OutputTable(Table, frozen=True, kw_only=True):
+    """File formats and the tolerance of meshes.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> unitcad.load("embedded", set={"output": unitcad.Output(formats=("stl",))}).output.formats
+    ('stl',)
+    """
+
+    formats: Annotated[
+        tuple[Format, ...] | None,
+        Meta(description="file formats; default: step, stl, 3mf, without a B-rep kernel stl, 3mf"),
+    ] = None
+    tolerance_mm: Annotated[
+        float, Meta(ge=0.0005, le=0.2, description="largest distance of a mesh from the true round surface")
+    ] = 0.01
+
+
+class RawSpec(Table, frozen=True, kw_only=True):
+    """A haptic unit. Required: name, design, diameter_mm and [[layers]]."""
+
+    name: Annotated[
+        str, Meta(min_length=1, max_length=120, description="a name of the variant; the result's folder begins with it")
+    ]
+    design: Annotated[
+        str, Meta(description="a design (unitcad list designs), FILE.py:NAME, or a file of bodies (.step, .stl, .3mf)")
+    ]
+    diameter_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM, description="diameter of the unit")]
+    skin_mm: Annotated[
+        float,
+        Meta(ge=0, le=20, description="thickness of a film of the last layer's silicone over the skin side; 0: none"),
+    ] = 0.0
+    motor: MotorTable = MotorTable(part=DEFAULT_MOTOR)
+    fpcb: FpcbTable | None = None
+    wires: WiresTable | None = None
+    layers: Annotated[tuple[LayerTable, ...], Meta(min_length=1, max_length=15, description=_LAYERS)]
+    moulds: MouldsTable = MouldsTable()
+    casting: CastingTable = CastingTable()
+    estimate: EstimateTable = EstimateTable()
+    output: OutputTable = OutputTable()
+    materials: dict[str, MaterialEntry] = {}
+    motors: dict[str, MotorEntry] = {}
+    printers: dict[str, PrinterEntry] = {}
+    tissue: dict[str, Annotated[dict[str, TissueEntry], Meta(min_length=1, description=_TISSUE)]] = {}
+    parameters: Annotated[
+        dict[str, bool | int | float | str],
+        Meta(description="values that a custom design reads: numbers, texts, true or false"),
+    ] = {}
+    design_source: Annotated[
+        str | None, Meta(description="text of a custom design's file, or its bodies; unitcad fills it in")
+    ] = None

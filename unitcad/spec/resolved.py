@@ -1,0 +1,267 @@
+"""The resolved spec of a haptic unit, which validation makes of a typed spec and which every other module reads.
+
+Every value is there. `None` and "fill" remain only with a meaning: no circuit, no wires, as many vents as
+clear the air, as many cavities as the bed takes. Lengths in mm, the unit in each name.
+"""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal
+
+from msgspec import Struct, structs
+
+from unitcad import notebook
+from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
+from unitcad.catalogue.entries import Drive
+from unitcad.errors import UnitcadError
+from unitcad.spec.raw import (
+    CastingTable,
+    EstimateTable,
+    Format,
+    FpcbTable,
+    LayerTable,
+    Model,
+    Moduli,
+    MotorTable,
+    MouldsTable,
+    OutputTable,
+    RawSpec,
+    Table,
+    WiresTable,
+)
+
+Casting = CastingTable
+Wires = WiresTable
+_MOST_LAYERS = 3
+"""Layers that a spec's summary lists."""
+
+
+class MotorSize(Table, frozen=True, kw_only=True):
+    """The motor's size and drive; `part` names its catalogue entry, or None. With `fill` Layer 1 reaches it."""
+
+    part: str | None
+    diameter_mm: float
+    thickness_mm: float
+    drive: Drive
+    fill: bool
+    lip_mm: float = 0.0
+
+
+class Circuit(Table, frozen=True, kw_only=True):
+    """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
+
+    tail: Literal["one", "both"]
+    thickness_mm: float
+    tail_width_mm: float
+    tail_length_mm: float
+    pad_diameter_mm: float
+    tail_end_width_mm: float
+
+
+class CastLayer(Table, frozen=True, kw_only=True):
+    """One silicone layer: its wall, and its cap if the design has caps (0: an open ring)."""
+
+    material: str
+    wall_mm: float
+    cap_mm: float
+
+
+class Moulds(Table, frozen=True, kw_only=True):
+    """The tooling's lengths, with the printer's written out unless the spec overrides them."""
+
+    printer: str
+    cavities: tuple[int, int] | Literal["fill"]
+    bed_x_mm: float
+    bed_y_mm: float
+    bed_z_mm: float
+    layer_mm: float
+    xy_play_mm: float
+    plinth_clearance_mm: float
+    rib_interference_mm: float
+    seat_relief_mm: float
+    slot_height_mm: float
+    slot_width_clearance_mm: float
+    window_clearance_mm: float
+    least_wall_mm: float
+    skirt_wall_mm: float
+    land_mm: float
+    groove_width_mm: float
+    groove_depth_mm: float
+    filament_hole_mm: float
+    engraving_depth_mm: float
+    engraving_stroke_mm: float
+    pour: Literal["open", "injected"]
+    sprue_mm: float
+    vents: int | None
+    filament_mm: float
+    plinth_height_mm: float
+    plate_mm: float
+    ledge_mm: float
+    draft_deg: float = 0.0
+
+
+class Estimate(Table, frozen=True, kw_only=True):
+    """Inputs of the attenuation estimate: frequency in Hz, amplitude in um, the body, the models, which moduli.
+
+    `fit` names a lab's fit, `fit_source` is the text of that file.
+    """
+
+    frequency_hz: float
+    amplitude_um: float
+    tissue: str
+    models: tuple[Model, ...]
+    moduli: Moduli = "small-strain"
+    fit: str | None = None
+    fit_source: str | None = None
+
+
+class Output(Table, frozen=True, kw_only=True):
+    """Formats, and the largest distance of a mesh from the true surface in mm."""
+
+    formats: tuple[Format, ...]
+    tolerance_mm: float
+
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    _Validated = type(Struct)
+    _Keys = Mapping[str, object]
+else:
+
+    class _Validated(type(Struct)):
+        """Metaclass of Spec: a call takes the keys of a TOML file and validates them."""
+
+        def __call__(cls, /, *values: object, **keys: Any) -> Spec:
+            if values:
+                raise UnitcadError("Spec takes its keys by name, as in Spec(name=..., design=...); `load` reads a file")
+            # Validation knows the designs and is above this room: it is loaded when a spec is asked for.
+            return import_module("unitcad.validation").from_tables(keys)
+
+        @property
+        def __signature__(cls) -> inspect.Signature:
+            return inspect.signature(RawSpec)
+
+
+class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
+    """A haptic unit with every value resolved.
+
+    Parameters
+    ----------
+    name : str
+        A name; the result's folder begins with it.
+    design : str
+        A design (``unitcad list designs``), "FILE.py:NAME", or a file of bodies.
+    diameter_mm : float
+        Diameter of the unit, mm.
+    layers : sequence of Layer or dict
+        The silicone layers, from the inside out; one is a single-layer control.
+    motor : Motor or dict, optional
+        The motor. Default: the part LCM0720A3463F.
+    fpcb : Fpcb or dict, optional
+        The flexible circuit. Default: none.
+    wires : Wires or dict, optional
+        Wires in place of a circuit. Default: none.
+    moulds, casting, estimate, output : Moulds, Casting, Estimate, Output or dict, optional
+        Settings. Default: the defaults of each class.
+    materials, motors, printers, tissue : mapping, optional
+        Entries of the spec's own, by name.
+    parameters : mapping of str to bool, int, float or str, optional
+        Values that a custom design reads.
+    design_source : str, optional
+        Text of a custom design's file; unitcad fills it in.
+
+    Raises
+    ------
+    Refusal
+        For an invalid value, with the same sentence as for a file.
+
+    Examples
+    --------
+    >>> import unitcad
+    >>> layer = unitcad.Layer(material="ecoflex-00-30", wall_mm=2.5)
+    >>> unitcad.Spec(name="control", design="embedded", diameter_mm=14, layers=[layer])
+    Spec('control': embedded, 14 mm, ecoflex-00-30 2.5)
+    """
+
+    name: str
+    design: str
+    diameter_mm: float
+    skin_mm: float
+    motor: MotorSize
+    fpcb: Circuit | None
+    wires: Wires | None
+    layers: tuple[CastLayer, ...]
+    moulds: Moulds
+    casting: Casting
+    estimate: Estimate
+    output: Output
+    materials: dict[str, MaterialEntry]
+    motors: dict[str, MotorEntry]
+    printers: dict[str, PrinterEntry]
+    tissue: dict[str, dict[str, TissueEntry]]
+    parameters: dict[str, bool | int | float | str]
+    design_source: str | None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            name: str,
+            design: str,
+            diameter_mm: float,
+            layers: Sequence[LayerTable | CastLayer | _Keys],
+            skin_mm: float = 0.0,
+            motor: MotorTable | MotorSize | _Keys = ...,
+            fpcb: FpcbTable | Circuit | _Keys | None = None,
+            wires: WiresTable | _Keys | None = None,
+            moulds: MouldsTable | Moulds | _Keys = ...,
+            casting: CastingTable | _Keys = ...,
+            estimate: EstimateTable | Estimate | _Keys = ...,
+            output: OutputTable | Output | _Keys = ...,
+            materials: Mapping[str, MaterialEntry | _Keys] = ...,
+            motors: Mapping[str, MotorEntry | _Keys] = ...,
+            printers: Mapping[str, PrinterEntry | _Keys] = ...,
+            tissue: Mapping[str, Mapping[str, TissueEntry | _Keys]] = ...,
+            parameters: Mapping[str, bool | int | float | str] = ...,
+            design_source: str | None = None,
+        ) -> None: ...
+
+    @classmethod
+    def settled(cls, **values: Any) -> Spec:
+        """Return the spec of these values, all of them there, unchecked: only for validation."""
+        return type(Struct).__call__(cls, **values)
+
+    @property
+    def summary(self) -> str:
+        """Name, design, diameter and layers in at most 160 characters."""
+        layers = [f"{layer.material} {layer.wall_mm:g}" for layer in self.layers]
+        listed = " / ".join(layers) if len(layers) <= _MOST_LAYERS else f"{len(layers)} layers"
+        unit = f"{notebook.shortened(self.design, 40)}, {self.diameter_mm:g} mm"
+        return notebook.shortened(f"{notebook.shortened(self.name, 40)!r}: {unit}, {listed}", 160)
+
+    def __repr__(self) -> str:
+        return f"Spec({self.summary})"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("design", self.design),
+            ("diameter_mm", self.diameter_mm),
+            ("motor", f"{self.motor.diameter_mm:g} x {self.motor.thickness_mm:g} mm"),
+            ("circuit", self.fpcb and f"tail {self.fpcb.tail}, {self.fpcb.tail_width_mm:g} mm wide"),
+            *(
+                (f"layers.{i}", f"{layer.material}, wall {layer.wall_mm:g} mm, cap {layer.cap_mm:g} mm")
+                for i, layer in enumerate(self.layers)
+            ),
+            ("printer", self.moulds.printer),
+            ("estimate", f"{self.estimate.frequency_hz:g} Hz on {self.estimate.tissue}"),
+        ]
+        return notebook.table((), rows, self.name)
+
+
+def with_formats(spec: Spec, formats: tuple[Format, ...] = ()) -> Spec:
+    """Return the spec with other formats, or with none: for keys that do not depend on them."""
+    return structs.replace(spec, output=structs.replace(spec.output, formats=formats))
