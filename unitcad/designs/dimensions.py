@@ -56,10 +56,10 @@ class Dimensions:
     core_height     top of the core
     heights[i]      top of layer i
     pad             the circuit's pad; None without a circuit
-    exit            slot or notch of tails or wires; None where nothing leaves through the silicone
-    ledge_radius    where the tongue's tip stops in the core
-    sides           where the tail leaves: +1 along +x, -1 along -x
-    motor_low       z of the motor's face towards the skin, on the lip
+    exit            slot or notch of tails or wires; None if nothing leaves through the silicone
+    ledge_radius    radius at which the tongue's tip ends in the core
+    sides           exits of the tail: +1 along +x, -1 along -x
+    motor_low       z of the motor's face towards the skin: it rests on the lip
     mouth_radius    radius of the lip's mouth; 0 without a lip
     lip_edge        height of the lip's upright edge
     skin            thickness of the film over the skin side, from z = -skin to 0
@@ -160,7 +160,7 @@ def lip_edge(spec: Spec) -> float:
 
 
 def motor_low(spec: Spec) -> float:
-    """Return the distance from the skin to the motor, mm: its edge is on the cone of the lip."""
+    """Return the distance of the motor from the skin, mm: its edge on the cone of the lip."""
     cone = spec.motor.lip_mm / math.tan(math.radians(LIP_LEAN_DEG))
     # Up to a hundredth, clear of the grid that the cone is snapped to.
     return lip_edge(spec) + math.ceil(100 * cone + 0.2) / 100 if cone else 0.0

@@ -49,7 +49,7 @@ def stub_pieces(stubs: Sequence[Shape]) -> list[Body]:
 
 
 def tray_piece(shape: Shape) -> Body:
-    """Return the tray of a skin's film, used after the pours."""
+    """Return the tray of a skin's film; it takes part in no pour."""
     return Body("skin-tray", "tool", "tray", shape, _CUP)
 
 

@@ -45,7 +45,7 @@ def _leads(spec: Spec) -> list[str]:
 
 
 def _not_estimated(spec: Spec) -> list[str]:
-    """Name features of the unit that the estimate does not read."""
+    """Say that no measured unit has the features that the estimate does not read."""
     found = {"motor.lip_mm": ("a lip", spec.motor.lip_mm), "skin_mm": ("a closed skin side", spec.skin_mm)}
     without = "; the estimate is that of the unit without it"
     return [f"{key} = {mm:g} mm: no measured unit has {what}{without}" for key, (what, mm) in found.items() if mm]
