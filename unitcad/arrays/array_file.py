@@ -388,6 +388,9 @@ def _check_held(
         of_one = {"skin_mm": unit.skin_mm}
         if not way.own_tails:
             of_one |= {"motor.lip_mm": unit.motor.lip_mm, "moulds.draft_deg": unit.moulds.draft_deg}
+            of_one |= {
+                f"moulds.{key}": getattr(unit.moulds, key) for key in ("shrinkage_percent", "bore_compensation_mm")
+            }
         for key, value in of_one.items():
             if value:
                 raise Refusal(f"{field}.{key}", value, "only a single unit's moulds have it", 0.0)

@@ -35,6 +35,7 @@ StaticModulus = Annotated[float, Meta(ge=0.1, le=1e6, description="stress at 100
 Tensile = Annotated[float, Meta(ge=0.001, le=1000, description="tensile strength")]
 Elongation = Annotated[float, Meta(ge=1, le=5000, description="elongation at break")]
 CastingFloor = Annotated[float, Meta(ge=0.01, le=100, description="thinnest wall that pours and demoulds")]
+Shrinkage = Annotated[float, Meta(ge=0, le=5, description="linear shrinkage of the cured silicone, %")]
 Poisson = Annotated[float, Meta(ge=0, le=0.5, description="Poisson's ratio; 0.5: incompressible")]
 LossFactor = Annotated[float, Meta(ge=0, le=10, description="tan delta at the motor's frequency")]
 MixRatio = Annotated[float, Meta(ge=0.001, le=1000, description="parts A to one part B")]
@@ -66,6 +67,10 @@ RibInterference = Annotated[
 SeatRelief = Annotated[float, Meta(ge=0.01, le=20, description="gap between a cup's foot and the plate")]
 SlotHeight = Annotated[float, Meta(ge=0.05, le=20, description="height of the slot for a tail or wires")]
 SlotClearance = Annotated[float, Meta(ge=0.01, le=20, description="extra width of the slot, over tail or wires")]
+BoreCompensation = Annotated[
+    float,
+    Meta(ge=0, le=0.5, description="by how much bores are printed too narrow, per side; files make up for it"),
+]
 WindowClearance = Annotated[
     float, Meta(ge=0.01, le=5, description="gap between the tongue and a cup's window, per side")
 ]
@@ -134,6 +139,7 @@ class Material(Struct, frozen=True, kw_only=True):
     poisson_ratio: Value[Poisson]
     loss_factor: Value[LossFactor]
     mix_ratio: Value[MixRatio]
+    shrinkage_percent: Value[Shrinkage] | None = None
     youngs_modulus_kpa: Value[Young] | None = None
     quasistatic_modulus_kpa: Value[QuasistaticYoung] | None = None
     fractional_mu0_kpa: Value[FractionalModulus] | None = None
@@ -185,6 +191,7 @@ class Printer(Struct, frozen=True, kw_only=True):
     overhang_deg: Value[Overhang]
     bridge_mm: Value[Bridge]
     rib_interference_mm: Value[RibInterference] | None = None
+    bore_compensation_mm: Value[BoreCompensation] | None = None
     support: Value[Support] | None = None
 
 
@@ -258,6 +265,7 @@ if TYPE_CHECKING:
         tensile_mpa: _Number = None
         elongation_pct: _Number = None
         casting_floor_mm: _Number = None
+        shrinkage_percent: _Number = None
         poisson_ratio: _Number = None
         loss_factor: _Number = None
         mix_ratio: _Number = None

@@ -11,16 +11,25 @@ from collections.abc import Iterator
 from unitcad.checks.check import MouldCheck
 from unitcad.checks.each_cavity import each_cavity
 from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.designs.dimensions import growth
 from unitcad.kernels.mesh import realise, thick_pieces
 from unitcad.moulds.cavities import BALANCE, Cavity
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.skin_tray import films
 from unitcad.shape import cylinder, moved
 
+SHRUNK = 2e-4
+"""Share of a length by which cast and cured layer may differ after shrinking: the grid moves either by 1/2048 mm."""
+
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Compare the space that silicone can reach with the layer, in every cavity, and with the film in a skin's tray."""
     yield from each_cavity(moulds, lambda cavity: _of_cavity(cavity, moulds.facets))
+    if moulds.spec.moulds.shrinkage_percent:
+        for step in moulds.plan.steps:
+            cast, cured = moulds.mesh_of(step.layer[0]).volume(), moulds.solids[step.name].volume()
+            off = abs((cast / cured) ** (1 / 3) / growth(moulds.spec) - 1)
+            yield at_most("C100", f"pour {step.index}: as it shrinks", off, SHRUNK, "share of its length")
     for tray in moulds.plan.of_kind("tray"):
         solid, dims = moulds.mesh(tray), moulds.plan.dimensions
         rim, reach = dims.heights[-1], dims.outer_radius + moulds.spec.moulds.land_mm / 2

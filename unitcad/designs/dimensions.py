@@ -82,6 +82,26 @@ class Dimensions:
     skin: float = 0.0
     tapers: tuple[float, float] = (0.0, 0.0)
 
+    def scaled(self, factor: float) -> Dimensions:
+        """Return the dimensions of a unit that is larger by a factor in all directions."""
+        lengths = ("cavity_radius", "core_height", "motor_radius", "motor_height", "ledge_radius")
+        lengths += ("motor_low", "mouth_radius", "lip_edge", "skin")
+        pad, exit = self.pad, self.exit
+        return replace(
+            self,
+            **{name: factor * getattr(self, name) for name in lengths},
+            radii=tuple(factor * each for each in self.radii),
+            heights=tuple(factor * each for each in self.heights),
+            pad=pad and Pad(factor * pad.radius, factor * pad.low, factor * pad.high),
+            exit=exit
+            and Exit(
+                factor * exit.low,
+                factor * exit.high,
+                factor * exit.width,
+                tuple(factor * each for each in exit.wires_y),
+            ),
+        )
+
     @property
     def core_outline(self) -> Outline:
         """The core's side, from the skin to its top."""
@@ -208,3 +228,13 @@ def wire_exit(spec: Spec, top: float, core: float | None = None) -> Exit | None:
     snapped = whole_layers(spec, low)
     snapped -= spec.moulds.layer_mm if snapped > low + EPS else 0.0
     return Exit(snapped if snapped >= _least_floor(spec) else low, top, width, across)
+
+
+def growth(spec: Spec) -> float:
+    """Return the size of what is poured over that of the cured unit."""
+    return 1 / (1 - spec.moulds.shrinkage_percent / 100)
+
+
+def poured(spec: Spec, dims: Dimensions) -> Dimensions:
+    """Return the dimensions that tools are drawn to: silicone shrinks from them to the unit's."""
+    return dims.scaled(growth(spec)) if spec.moulds.shrinkage_percent else dims

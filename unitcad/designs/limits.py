@@ -132,6 +132,12 @@ def check_printer(spec: Spec) -> None:
         at_least(f"moulds.{field}", getattr(moulds, field), wall, "the printer's least wall is")
     for field in ("engraving_stroke_mm", "groove_width_mm", "slot_height_mm"):
         at_least(f"moulds.{field}", getattr(moulds, field), feature, "the printer's least feature is")
+    at_most(
+        "moulds.bore_compensation_mm",
+        moulds.bore_compensation_mm,
+        max(moulds.land_mm - wall, 0.0),
+        "the least wall stays between a wider bore and its groove, so at most",
+    )
 
 
 def check_engraving(spec: Spec, dims: Dimensions) -> None:

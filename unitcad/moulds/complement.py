@@ -55,6 +55,12 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     """
     if spec.moulds.pour == "injected":
         raise Refusal("moulds.pour", "injected", "moulds by complement have no lids; they are poured open", "open")
+    if spec.moulds.shrinkage_percent:
+        value, limit = (
+            spec.moulds.shrinkage_percent,
+            "moulds by complement make up for no shrinkage: draw the unit larger",
+        )
+        raise Refusal("moulds.shrinkage_percent", value, limit, 0.0)
     given, clearance = dimensions(spec), spec.moulds.window_clearance_mm
     segments = segment_count(given.outer_radius, spec.output.tolerance_mm)
     laid, laid_in = [body.shape for body in inserts(spec)], design_of(spec).laid_in

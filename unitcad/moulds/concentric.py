@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from unitcad.designs import design_of
+from unitcad.designs.dimensions import poured
 from unitcad.designs.tooling import Tooling
 from unitcad.moulds import dents, filament, lid
 from unitcad.moulds.base import base, plate_bottom
@@ -25,13 +26,15 @@ def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     Raises Refusal beyond the bed, for a tail that reaches no edge, and for a tongue or vents that can't clear the air.
     """
     design = design_of(spec)
-    dims = design.dimensions(spec)
+    dims = poured(spec, design.dimensions(spec))
     lay, pours = layout(spec, dims), range(len(cast))
     dents.check_tongue(spec, dims)
     injected = spec.moulds.pour == "injected"
     tools = [base_piece(base(spec, dims, lay))]
     for i in pours:
-        tools.append(cup_piece(i + 1, cup(spec, dims, lay, i)))
+        wider = spec.moulds.bore_compensation_mm
+        file = cup(spec, dims, lay, i, wider) if wider else None
+        tools.append(cup_piece(i + 1, cup(spec, dims, lay, i), file))
         if injected:
             tools.append(lid_piece(i + 1, lid.lid(spec, dims, lay, i)))
     brittle = printer_of(spec).technology.value == "sla"

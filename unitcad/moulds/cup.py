@@ -15,18 +15,18 @@ from unitcad.shape import Extrude, Shape, box, cut, moved, ring, union
 from unitcad.spec import Spec, printer_of
 
 
-def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
+def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int, wider: float = 0.0) -> Shape:
     """Draw the one-piece cup of a layer (from 0): recess over the plinth, seat at z = 0, bores, windows, grooves."""
     rim = dims.heights[layer]
-    tools: list[Shape] = [recess(spec, lay), *bores(dims, lay, layer)]
+    tools: list[Shape] = [recess(spec, lay), *bores(dims, lay, layer, wider)]
     tools += grooves(spec, dims, lay, layer)
     tools += windows(spec, dims, lay, rim)
     return cut(cup_blank(spec, lay, rim), tools)
 
 
-def bores(dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
-    """Draw the bores of a cup (from 0), longer than it at both ends."""
-    bore = solid_within(dims.outside(layer), -BEYOND, dims.heights[layer] + BEYOND)
+def bores(dims: Dimensions, lay: Layout, layer: int, wider: float = 0.0) -> list[Shape]:
+    """Draw the bores of a cup (from 0), longer than it at both ends and `wider` all round, mm."""
+    bore = solid_within(tuple((r + wider, z) for r, z in dims.outside(layer)), -BEYOND, dims.heights[layer] + BEYOND)
     return [moved(bore, cell.x, cell.y) for cell in lay.cells]
 
 

@@ -17,10 +17,10 @@ def base_piece(shape: Shape) -> Body:
     return Body("base", "tool", "base", shape, _BASE)
 
 
-def cup_piece(pour: int, shape: Shape) -> Body:
-    """Return the cup of a pour (from 1), printed upside down and lifted off upwards."""
+def cup_piece(pour: int, shape: Shape, file: Shape | None = None) -> Body:
+    """Return the cup of a pour (from 1), printed upside down and lifted off upwards; `file`: its shape in files."""
     colour = _CUP if pour % 2 else _CUP2
-    return Body(f"cup{pour}", "tool", "cup", shape, colour, step=pour, upside_down=True, removal=_UP)
+    return Body(f"cup{pour}", "tool", "cup", shape, colour, step=pour, upside_down=True, removal=_UP, file=file)
 
 
 def lid_piece(pour: int, shape: Shape) -> Body:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
+from unitcad.designs.dimensions import poured
 from unitcad.designs.tooling import Cell, Layout, Tooling
 from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
 from unitcad.moulds import lid
@@ -142,7 +143,7 @@ def plan(spec: Spec) -> Plan:
     made = _tooling(spec, layers)
     dims, lay = made.dimensions, made.layout
     # Material variants share pieces: the label depends only on geometry.
-    label = set_label((*(tool.shape for tool in made.tools), *layers))
+    label = set_label((*(tool.in_file.shape for tool in made.tools), *layers))
     tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in made.tools)
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
     laid_in, laid = design_of(spec).laid_in, inserts(spec)
@@ -203,6 +204,10 @@ def cast_layers(spec: Spec) -> tuple[Shape, ...]:
 
     Raises Refusal if the design draws others than the spec has layers for.
     """
+    if spec.moulds.shrinkage_percent:
+        design = design_of(spec)
+        drawn = design.layers(spec, poured(spec, design.dimensions(spec)))
+        return tuple(drawn[f"layer{i + 1}"] for i in range(len(spec.layers)))
     bodies = sorted((body for body in unit_bodies(spec) if body.kind == "layer"), key=lambda body: body.step or 0)
     if len(bodies) != len(spec.layers):
         drawn = ", ".join(body.name for body in bodies) or "none"
@@ -230,4 +235,5 @@ def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str)
         letters = corner_labels(spec, lay, dims.heights[-1], ("F", *corners))
     else:
         return tool
-    return replace(tool, shape=engraved(tool.shape, letters))
+    file = engraved(tool.file, letters) if tool.file else None
+    return replace(tool, shape=engraved(tool.shape, letters), file=file)

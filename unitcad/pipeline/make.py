@@ -261,6 +261,7 @@ def _dicts(findings: Sequence[Any]) -> list[Any]:
 
 def record(moulds: MouldSet, body: Body) -> PartRecord:
     """Return a body's entry in the manifest, material and files left open."""
+    body = body.in_file
     solid = moulds.mesh(body)
     return PartRecord(
         name=body.name,

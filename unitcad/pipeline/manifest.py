@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from importlib.util import find_spec
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 from unitcad import __version__, catalogue
 from unitcad.attenuation.edge.estimate_summary import summary
@@ -123,6 +123,7 @@ class Manifest(TypedDict):
     label: str | None
     warnings: list[str]
     air_ring_mm: float
+    compensation: NotRequired[dict[str, float]]
     mesh: dict[str, Any]
     parts: list[PartRecord]
     steps: list[PourRecord]
@@ -179,6 +180,10 @@ def of_unit(
         label=shape["label"],
         warnings=[*warnings(spec), *(shallow_grooves(moulds) if "moulds" in only else [])],
         air_ring_mm=shape["air_ring_mm"],
+        compensation={
+            "shrinkage_percent": spec.moulds.shrinkage_percent,
+            "bore_compensation_mm": spec.moulds.bore_compensation_mm,
+        },
         mesh={
             "kernel": "manifold3d",
             "tolerance_mm": spec.output.tolerance_mm,

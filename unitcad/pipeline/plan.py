@@ -85,7 +85,7 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
     bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
     for group in groups(moulds, only):
         every, together, names = group.bodies, group.together, tuple(body.name for body in group.bodies)
-        printed = [body for body in every if is_printed(body)]
+        printed = [body.in_file for body in every if is_printed(body)]
         for body in printed:
             path, key = f"{group.name}/{file_stem(body)}.stl", partial(body_key, moulds, body, "stl")
             yield Planned(path, partial(stl_content, moulds, body), key, form="stl", bodies=(body.name,))
@@ -94,7 +94,7 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
             yield Planned(path, make, key, form="3mf", bodies=tuple(body.name for body in plate))
         make, key = partial(glb_content, moulds, every), partial(joint_key, moulds, every, "glb")
         yield Planned(f"{together}.glb", make, key, form="glb", bodies=names)
-        yield step_file(f"{together}.step", moulds, every, group.name)
+        yield step_file(f"{together}.step", moulds, [body.in_file for body in every], group.name)
     if "unit" in only:
         yield _drawn(moulds, "section.svg", partial(unit_section, moulds), "section")
     if "casting" in only:
@@ -151,8 +151,8 @@ def geometry_key(moulds: MouldSet, *more: object) -> str:
 def body_key(moulds: MouldSet, body: Body, form: str) -> str:
     """Return the key of a body's file: tree, name, colour, attitude, resolution, format, code and kernels."""
     return content_hash(
-        body.shape, body.name, body.role, body.step, body.made, body.colour, body.upside_down, moulds.segments, form,
-        code_version(), sorted(kernel_versions(()).items()),
+        body.shape, body.file, body.name, body.role, body.step, body.made, body.colour, body.upside_down,
+        moulds.segments, form, code_version(), sorted(kernel_versions(()).items()),
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from unitcad.shape.tree import UNTURNED, Place, Shape
@@ -37,7 +37,8 @@ class Body:
     `name` comes only from role and layer number ("layer1", "cup2", "base"), never from a material or a variant, since
     files of equal bodies are shared. `made` is "cast", "printed", "cut" (from film or filament) or "bought".
     `step` is the pour that it belongs to. `upside_down`: it is printed turned by 180 degrees about x. `removal` is the
-    direction in which a piece of tooling is taken away, None for one that stays; the plan has the order.
+    direction in which a piece of tooling is taken away, None for one that stays; the plan has the order. `file` is the
+    shape in its files if a printer's error is made up for there.
     """
 
     name: str
@@ -49,6 +50,12 @@ class Body:
     step: int | None = None
     upside_down: bool = False
     removal: tuple[float, float, float] | None = None
+    file: Shape | None = None
+
+    @property
+    def in_file(self) -> Body:
+        """The body as its files have it."""
+        return replace(self, shape=self.file, file=None) if self.file else self
 
     def __repr__(self) -> str:
         return f"Body({self.name!r}: {self.kind}, {self.made}, {type(self.shape).__name__})"

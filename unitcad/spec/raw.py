@@ -158,6 +158,7 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     xy_play_mm: kinds.Play | None = None
     plinth_clearance_mm: kinds.PlinthClearance | None = None
     rib_interference_mm: kinds.RibInterference | None = None
+    bore_compensation_mm: kinds.BoreCompensation | None = None
     seat_relief_mm: kinds.SeatRelief | None = None
     slot_height_mm: kinds.SlotHeight | None = None
     slot_width_clearance_mm: kinds.SlotClearance | None = None
@@ -194,6 +195,10 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     ledge_mm: Annotated[
         float, Meta(ge=LEAST_LEDGE, le=100, description="width of the core's ledge that carries the tongue")
     ] = 0.6
+    shrinkage_percent: Annotated[
+        kinds.Shrinkage | None,
+        Meta(description="linear shrinkage that the tools make up for, %; default: the largest of the silicones"),
+    ] = None
     draft_deg: Annotated[
         float, Meta(ge=0, le=3, description="taper of bores and core, narrower upwards: silicone comes off more easily")
     ] = 0.0

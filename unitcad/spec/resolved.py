@@ -80,6 +80,7 @@ class Moulds(Table, frozen=True, kw_only=True):
     xy_play_mm: float
     plinth_clearance_mm: float
     rib_interference_mm: float
+    bore_compensation_mm: float
     seat_relief_mm: float
     slot_height_mm: float
     slot_width_clearance_mm: float
@@ -99,6 +100,7 @@ class Moulds(Table, frozen=True, kw_only=True):
     plinth_height_mm: float
     plate_mm: float
     ledge_mm: float
+    shrinkage_percent: float
     draft_deg: float = 0.0
 
 

@@ -115,6 +115,9 @@ def _moulds(raw: RawSpec, design: Design) -> Moulds:
     lengths |= {name: least for name, least in _BASE.items() if given[name] is None}
     if "plinth_height_mm" in lengths:
         lengths["plinth_height_mm"] = max(lengths["plinth_height_mm"], _for_leaves(printer, {**given, **lengths}))
+    if given["shrinkage_percent"] is None:
+        known = catalogue.materials(raw.materials)
+        lengths["shrinkage_percent"] = max(float(known[one.material].shrinkage_percent or 0.0) for one in raw.layers)
     for name in {"slot_height_mm", *_BASE} & lengths.keys():
         lengths[name] = round(math.ceil(lengths[name] / layer - 1e-6) * layer, 9)
     return Moulds(**{**given, **lengths})

@@ -33,7 +33,7 @@ _LENGTHS = tuple(set(Moulds.__struct_fields__) & set(Printer.__struct_fields__))
 _DERIVED = {
     "motor": ("diameter_mm", "thickness_mm", "drive"),
     "fpcb": ("pad_diameter_mm", "tail_end_width_mm"),
-    "moulds": (*_LENGTHS, "plinth_height_mm", "plate_mm"),
+    "moulds": (*_LENGTHS, "plinth_height_mm", "plate_mm", "shrinkage_percent"),
     "estimate": ("frequency_hz", "amplitude_um"),
 }
 """What validation works out from other values where a spec leaves it out."""

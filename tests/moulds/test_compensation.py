@@ -1,0 +1,106 @@
+"""Shrinkage and the printer's narrow bores: made up for in the tools alone, and C100 compares what is meant."""
+
+import numpy as np
+import pytest
+from faulty_sets import set_of, with_fault
+
+from unitcad.arrays.array_file import load_array
+from unitcad.catalogue import materials
+from unitcad.checks import check_moulds
+from unitcad.checks.balance import findings as balance
+from unitcad.designs.dimensions import growth
+from unitcad.errors import Refusal
+from unitcad.kernels.mesh import bounds
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.write import build
+from unitcad.validation import load
+
+SHRUNK = ("encapsulating", "moulds.shrinkage_percent=2")
+WIDER = ("encapsulating", "moulds.bore_compensation_mm=0.1")
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        (*SHRUNK, "motor.lip_mm=0.5", "skin_mm=0.5"),
+        ("embedded", "moulds.shrinkage_percent=0.3", "moulds.cavities=[2,2]"),
+        (*WIDER, "moulds.draft_deg=1"),
+        ("chain", "moulds.bore_compensation_mm=0.2", "moulds.printer=sla", "moulds.pour=injected"),
+    ],
+    ids=" ".join,
+)
+def test_every_mould_check_holds(source):
+    assert [finding for finding in check_moulds(set_of(*source)) if not finding.ok] == []
+
+
+def test_tools_are_larger_by_the_shrinkage_and_the_unit_is_not():
+    shrunk, plain = set_of(*SHRUNK), set_of("encapsulating")
+    assert growth(shrunk.spec) == pytest.approx(1 / 0.98)
+    for name in ("layer1", "layer2"):
+        assert shrunk.solids[name].volume() == plain.solids[name].volume()
+        step = shrunk.plan.steps[int(name[-1]) - 1]
+        assert shrunk.mesh_of(step.layer[0]).volume() * 0.98**3 == pytest.approx(plain.solids[name].volume(), rel=5e-4)
+    assert shrunk.plan.dimensions.outer_radius == pytest.approx(7 / 0.98)
+    # Clearances are the printer's: they do not grow.
+    assert shrunk.spec.moulds.plinth_clearance_mm == plain.spec.moulds.plinth_clearance_mm
+
+
+def test_the_silicones_value_is_the_default_and_the_bulletins_say_nil():
+    assert {float(silicone.shrinkage_percent) for silicone in materials().values()} == {0.0}
+    own = {"house": {"like": "ecoflex-00-30", "shrinkage_percent": 1.5}}
+    spec = load("encapsulating", {"materials": own, "layers.0.material": "house"})
+    assert spec.moulds.shrinkage_percent == 1.5
+    assert load(spec, {"layers.0.material": "ecoflex-00-30"}).moulds.shrinkage_percent == 0.0
+    assert load("encapsulating").moulds.shrinkage_percent == 0.0
+
+
+def test_tools_that_do_not_follow_the_shrinkage_break_balance():
+    """Planted: cup 2 and the base of the set without shrinkage, and layers that are not larger."""
+    plain = set_of("encapsulating").plan
+    for tool in ("cup2", "base"):
+        faulty = with_fault(set_of(*SHRUNK), tool, lambda _, tool=tool: plain.tool(tool).shape)
+        assert any(not finding.ok for finding in balance(faulty))
+    unscaled = MouldSet(load("encapsulating", ["moulds.shrinkage_percent=1"]), plain)
+    broken = [finding.where for finding in balance(unscaled) if not finding.ok]
+    assert broken == ["pour 1: as it shrinks", "pour 2: as it shrinks"]
+
+
+def test_bores_are_wider_in_the_files_alone(tmp_path):
+    """A cup's file has a bore of 7.1 mm, its wall as before; the checked piece has one of 7."""
+    moulds = set_of(*WIDER)
+    tool = moulds.plan.tool("cup2")
+    cup, wide = moulds.mesh_of(tool.shape), moulds.mesh_of(tool.in_file.shape)
+    assert bounds(cup) == bounds(wide)
+    taken = np.pi * (7.1**2 - 7**2) * 4.61
+    assert cup.volume() - wide.volume() == pytest.approx(taken, rel=0.05)  # less the window
+    built = build(load(WIDER[0], [*WIDER[1:], "output.formats=['stl']"]), tmp_path, only=("moulds",))
+    (part,) = [part for part in built.manifest["parts"] if part["name"] == "cup2"]
+    assert part["volume_mm3"] == pytest.approx(wide.volume(), rel=1e-9)
+    assert built.manifest["compensation"] == {"shrinkage_percent": 0.0, "bore_compensation_mm": 0.1}
+    assert built.manifest["check"]["errors"] == 0
+    assert set_of(*WIDER).plan.label != set_of("encapsulating").plan.label
+
+
+@pytest.mark.parametrize(
+    ("source", "changes", "field", "nearest"),
+    [
+        ("encapsulating", ["moulds.shrinkage_percent=6"], "moulds.shrinkage_percent", 5),
+        ("encapsulating", ["moulds.bore_compensation_mm=0.4"], "moulds.bore_compensation_mm", 0.2),
+    ],
+)
+def test_refused_with_a_value_that_is_accepted(source, changes, field, nearest):
+    with pytest.raises(Refusal) as refused:
+        load(source, changes)
+    assert (refused.value.field, refused.value.nearest) == (field, pytest.approx(nearest))
+    load(source, [f"{field}={refused.value.nearest}"])
+
+
+def test_moulds_of_other_kinds_refuse_what_they_do_not_draw():
+    with pytest.raises(Refusal, match="complement"):
+        _ = set_of("custom/strap-lugs", "moulds.shrinkage_percent=1").plan
+    asked = load_array("forearm-patch").asked
+    for key in ("shrinkage_percent", "bore_compensation_mm"):
+        unit = {**asked["unit"], "moulds": {**asked["unit"].get("moulds", {}), key: 0.1}}
+        with pytest.raises(Refusal) as refused:
+            load_array({**asked, "unit": unit})
+        assert refused.value.field == f"unit.moulds.{key}"
