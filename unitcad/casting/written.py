@@ -160,7 +160,7 @@ def _listed_items(items: Iterable[Item]) -> Iterator[str]:
             plain.append(counted)
     for silicone, each in parts.items():
         equal = len(each) == 2 and each[0][:-1] == each[1][:-1]
-        yield f"- {silicone}: {f'{each[0]} and as much of B' if equal else listed(each)}"
+        yield f"- silicone {silicone}: {f'{each[0]} and as much of B' if equal else listed(each)}"
     if plain:
         yield f"- {listed(plain)}"
 
