@@ -274,7 +274,9 @@ def test_what_makes_lost_content_again_is_named(tmp_path, monkeypatch):
         if path.is_file():
             path.unlink()
     record_packs.store_at.cache_clear()
-    with pytest.raises(UnitcadError, match=r"variant 0: .*; the sweep with --shard 1/2 and --verify makes missing contents again"):
+    with pytest.raises(
+        UnitcadError, match=r"variant 0: .*; the sweep with --shard 1/2 and --verify makes missing contents again"
+    ):
         merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=True))
     merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=False))
     folder = rows(out)[0]["folder"]
