@@ -29,7 +29,7 @@ def _nine_digits(text: str) -> float:
 
 
 _NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=_nine_digits)
-UNPRINTED = "Nothing of this tooling has been printed yet."
+UNPRINTED = "Nobody has printed this tooling yet."
 
 
 def files(procedure: Procedure) -> dict[str, str]:
