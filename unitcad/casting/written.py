@@ -29,7 +29,7 @@ def _nine_digits(text: str) -> float:
 
 
 _NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=_nine_digits)
-UNPRINTED = "Nothing of this tooling has been printed yet."
+UNPRINTED = "Nobody has printed this tooling yet."
 
 
 def files(procedure: Procedure) -> dict[str, str]:
@@ -160,7 +160,7 @@ def _listed_items(items: Iterable[Item]) -> Iterator[str]:
             plain.append(counted)
     for silicone, each in parts.items():
         equal = len(each) == 2 and each[0][:-1] == each[1][:-1]
-        yield f"- {silicone}: {f'{each[0]} and as much of B' if equal else listed(each)}"
+        yield f"- silicone {silicone}: {f'{each[0]} and as much of B' if equal else listed(each)}"
     if plain:
         yield f"- {listed(plain)}"
 
