@@ -231,7 +231,7 @@ def wire_exit(spec: Spec, top: float, core: float | None = None) -> Exit | None:
 
 
 def growth(spec: Spec) -> float:
-    """Return the size of what is poured over that of the cured unit."""
+    """Return the size of the poured silicone over that of the cured unit."""
     return 1 / (1 - spec.moulds.shrinkage_percent / 100)
 
 
