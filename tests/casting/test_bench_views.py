@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 
 import numpy as np
@@ -200,6 +201,8 @@ def test_a_build_writes_the_pictures_and_names_them(tmp_path: Path) -> None:
     listed = {path for path in done.manifest["files"] if path.startswith("steps/")}
     assert listed
     assert all(f"]({path})" in text and (done.folder / path).is_file() for path in listed)
+    # The tools are counted in the print's time and volume, though no file of them is asked for.
+    assert json.loads((done.folder / "casting.json").read_bytes())["printing"]["cm3"] > 9
 
 
 def test_a_view_is_data() -> None:

@@ -29,7 +29,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
 from unitcad.serve.messages import Answer, Field, Group, Trusted
 from unitcad.serve.unit_answers import has_code as unit_holds_code
-from unitcad.serve.unit_answers import printed_mm3, unit_procedure
+from unitcad.serve.unit_answers import unit_procedure
 from unitcad.spec.custom_code import files_named
 from unitcad.spec.toml import from_json, read_toml, to_json
 from unitcad.spec.toml_lines import line_of
@@ -173,7 +173,7 @@ def _tools(array: Array, answer: Answer) -> None:
     apart = unit_folders(array) if moulds.construction.own_tails else {}
     volumes = [sum(solid.volume() for solid in moulds.meshes(step.layer)) for step in moulds.plan.steps]
     of_units = {name: _cast(to_json(unit)) for name, unit in apart.items()}
-    made = array_procedure(moulds, volumes, printed_mm3(moulds), of_units)
+    made = array_procedure(moulds, volumes, 0.0, of_units)
     tools = ", ".join(tool.name for tool in moulds.plan.tools)
     answer.lines = [*in_short(asdict(made)), f"Tools of the sheet: {tools}"]
 

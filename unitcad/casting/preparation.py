@@ -71,7 +71,7 @@ class Printing:
 
 
 def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Printing:
-    """Return the plates to print, and how. `solid_mm3`: volume of all printed pieces, solid.
+    """Return the plates to print, and how. `solid_mm3`: volume of all printed pieces, solid; 0: their meshes'.
 
     `tallest_mm`: height of a piece that may be higher than core and blade.
     """
@@ -85,6 +85,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
             if t.upside_down
         )
     )
+    solid_mm3 = solid_mm3 or sum(moulds.mesh(tool).volume() for tool in printed)
     files = mould_plates(moulds)
     standing = plan.dimensions.core_height - moulds.plate[0]
     tallest = max(standing, BLADE_HEIGHT if plan.of_kind("blade") else 0.0, tallest_mm)

@@ -127,8 +127,8 @@ def pour_of(batch: Batch, steps: Iterable[BenchStep], agent: Sequence[Face] = ()
     )
 
 
-def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
-    """Return the procedure of a mould set: nothing is meshed or drawn.
+def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3: float = 0.0) -> Procedure:
+    """Return the procedure of a mould set: nothing is drawn, and nothing meshed if the volumes are given.
 
     `layer_volumes_mm3`: of each layer of one unit, from the inside out. `printed_mm3`: of all printed pieces.
     """

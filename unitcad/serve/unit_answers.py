@@ -16,7 +16,7 @@ from unitcad.errors import Refusal
 from unitcad.estimating import closed_forms, estimate_spec, motor_mass
 from unitcad.export.svg import unit_section
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.plan import glb_content, is_printed
+from unitcad.pipeline.plan import glb_content
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
 from unitcad.report.viewer_models import cells
 from unitcad.serve.form import groups
@@ -146,13 +146,7 @@ def _moulds(spec: Spec, answer: Answer) -> None:
 def unit_procedure(moulds: MouldSet) -> Procedure:
     """Return the casting procedure of a unit from its meshes."""
 
-    return procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps], printed_mm3(moulds))
-
-
-def printed_mm3(moulds: MouldSet) -> float:
-    """Return the volume of all printed tools."""
-
-    return sum(moulds.mesh(tool).volume() for tool in moulds.plan.tools if is_printed(tool))
+    return procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps])
 
 
 def _estimate(spec: Spec, answer: Answer) -> None:
