@@ -97,7 +97,7 @@ def test_copies_share_a_mesh_and_each_has_an_item(tmp_path):
     moulds = MouldSet(load("encapsulating", ("moulds.cavities=[2,3]",)))
     bodies = [body for body in moulds.plan.pieces if is_printed(body)]
     path = tmp_path / "moulds.3mf"
-    path.write_bytes(threemf_content(moulds, bodies))
+    path.write_bytes(threemf_content(moulds, bodies, {}))
     root = model(path.read_bytes())
     tongues = [body.name for body in bodies if body.kind == "tongue"]
     assert len(tongues) == 6

@@ -41,7 +41,7 @@ def test_all_pieces_lie_apart_on_the_bed(name: str) -> None:
     assert sorted(body.name for plate in plates.values() for body in plate) == sorted(printed)
     bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
     for plate in plates.values():
-        boxes = _boxes(threemf_content(moulds, plate))
+        boxes = _boxes(threemf_content(moulds, plate, {}))
         assert len(boxes) == len(plate)
         for low, high in boxes:
             assert (low >= -1e-3).all()

@@ -26,7 +26,7 @@ def pieces(name: str) -> dict[str, Manifold]:
     return {body.name: realise(body.shape, SEGMENTS) for body in coupon.Coupon(printers()[name]).bodies()}
 
 
-@pytest.mark.parametrize("name", sorted(printers()))
+@pytest.mark.parametrize("name", ["fdm-0.4", "fdm-0.25", "sla"])
 def test_stations_have_the_clearances_they_say(name: str) -> None:
     printer = printers()[name]
     plate = pieces(name)["coupon-plate"]
@@ -69,7 +69,7 @@ def test_stations_have_the_clearances_they_say(name: str) -> None:
         assert min(wall[2] - wall[0], wall[3] - wall[1]) == pytest.approx(values["wall"][i], abs=GRID)
 
 
-@pytest.mark.parametrize("name", sorted(printers()))
+@pytest.mark.parametrize("name", ["fdm-0.4", "fdm-0.25", "sla"])
 def test_its_toml_is_taken_by_a_spec(name: str) -> None:
     printer = printers()[name]
     block = coupon.Coupon(printer).markdown().split("```toml\n")[1].split("```")[0]
@@ -100,7 +100,7 @@ def test_resin_coupon_prints_no_tongue(tmp_path: Path) -> None:
     assert not (write(printers()["sla"], tmp_path) / "coupon-tongue.stl").exists()
 
 
-@pytest.mark.parametrize("name", sorted(printers()))
+@pytest.mark.parametrize("name", ["fdm-0.4", "fdm-0.25", "sla"])
 def test_windows_end_whole_layers_and_keep_the_clearance(name: str) -> None:
     printer = printers()[name]
     layer, thick = float(printer.layer_mm), float(printer.slot_height_mm)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections import Counter
 
 import pytest
 from faulty_sets import set_of
 
 from unitcad.casting import coupon, figures
+from unitcad.casting.bill import mould_plates
+from unitcad.casting.preparation import slicer_settings
 from unitcad.catalogue import printers
 from unitcad.errors import UnitcadError
 from unitcad.export import slicer, stl
@@ -17,6 +20,7 @@ from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.ribs import SLOPE, ribs
 from unitcad.pipeline import slicing
+from unitcad.pipeline.plan import threemf_content
 from unitcad.pipeline.write import build, subject
 from unitcad.validation import load, templates
 
@@ -113,7 +117,7 @@ def test_the_slicer_draws_a_cup_s_ribs(name, tmp_path):
     cup = moulds.plan.tool("cup1")
     file, code = tmp_path / "cup.stl", tmp_path / "cup.gcode"
     file.write_bytes(stl.content(*print_ready(*arrays(moulds.solids["cup1"]), cup.upside_down), "cup"))
-    nozzle = slicer.NOZZLES_MM.get(name, 0.4)
+    nozzle = float(printers()[name].nozzle_mm)
     heights = ("--layer-height", f"{layer:g}", "--first-layer-height", f"{layer:g}")
     slicer._run("--export-gcode", "--output", str(code), "--nozzle-diameter", f"{nozzle:g}", *heights, str(file))
     middle = (rib.bottom + rib.top) / 2
@@ -172,3 +176,29 @@ def test_print_times_are_written_once_a_piece(tmp_path):
         blade.write_bytes(content)
         assert run().startswith(expected)
     assert said[3:] == ["slicing blade.stl"] * 2
+
+
+def test_the_plate_s_settings_replace_those_of_the_user(tmp_path):
+    """Sliced with other settings of the user, the plate has the layers and filament of the sheet's settings."""
+    moulds = set_of("encapsulating")
+    (plate,) = mould_plates(moulds).values()
+    ours, theirs = slicer_settings(moulds), "--perimeters 1 --fill-density 5% --layer-height 0.15 --support-material"
+    asked = [part for key, value in ours.items() for part in (f"--{key.replace('_', '-')}", value)][:-2]
+    codes = []
+    for settings, options in ((ours, theirs.split()), ({}, asked), ({}, theirs.split())):
+        file, code = tmp_path / "plate.3mf", tmp_path / "plate.gcode"
+        file.write_bytes(threemf_content(moulds, plate, settings))
+        slicer._run(
+            "--export-gcode", "--gcode-label-objects", "--skirts", "0", *options, "--output", str(code), str(file)
+        )
+        codes.append(code.read_text())
+    mine, same, other = (float(slicer._value(code, "filament used [mm]")) for code in codes)
+    assert mine == pytest.approx(same, rel=2e-3)
+    assert abs(other / same - 1) > 0.1
+    begun = Counter(re.findall(r"^; printing object (\w+) id", codes[0], re.M))
+    for body in plate:
+        z0, z1 = (moulds.mesh_of(body.shape).bounding_box()[i] for i in (2, 5))
+        copies = 2 if body.kind == "tongue" else 1
+        assert begun[body.kind if copies > 1 else body.name] / copies == math.ceil(round((z1 - z0) / 0.2, 2))
+    assert ";TYPE:Support material" not in codes[0]
+    assert ";TYPE:Support material" in codes[2]

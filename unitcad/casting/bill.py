@@ -18,6 +18,8 @@ from unitcad.shape.column import extent
 from unitcad.spec import Spec, assumed_lengths, motor_of
 from unitcad.text import cell, number
 
+SPARE_TONGUE = "spare-tongue"
+
 
 @dataclass(frozen=True)
 class Item:
@@ -163,11 +165,14 @@ def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchSt
 def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tuple[Body, ...]]:
     """Return the bodies of each of the printer's plates by its 3MF: `stem`.3mf, or numbered if there are several.
 
-    In their order, each on the first plate with room for it.
+    In their order, each on the first plate with room for it. A spare tongue, the piece that bends first, is added if
+    there is room.
     """
     bed_x, bed_y = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
     filled: list[dict[Body, tuple[float, float]]] = []
-    for body in bodies:
+    tongue = next((body for body in bodies if body.kind == "tongue"), None)
+    spare = (replace(tongue, name=SPARE_TONGUE),) if tongue else ()
+    for body in (*bodies, *spare):
         x0, y0, _, x1, y1, _ = extent(body.shape)
         for plate in filled:
             sizes = [*plate.values(), (x1 - x0, y1 - y0)]
@@ -175,6 +180,8 @@ def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tup
             if all(x <= bed_x and y <= bed_y for x, y in ends):
                 break
         else:
+            if body in spare:
+                break
             filled.append(plate := {})
         plate[body] = x1 - x0, y1 - y0
     names = [f"{stem}-{i + 1}.3mf" for i in range(len(filled))] if len(filled) > 1 else [f"{stem}.3mf"]

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from unitcad.moulds.dovetails import Split
 
 PERIMETERS = 3
+INFILL_PERCENT = 20
 SPARE = 2.0
 """Extra length of a piece of filament over its way through base and core, mm."""
 FOOT_MM = 0.2
@@ -42,6 +43,24 @@ MEASURED_MM = 0.05
 """Difference of a measured length from the drawn one from which it is worth to build again (assumed)."""
 GOOD_DEG = {"a phone": 0.2, "a spirit level of 0.5 mm/m": 0.03}
 """Tilt that is left if a level shows none (assumed): two steps of a phone; a builder's level, turned end for end."""
+
+
+def slicer_settings(moulds: MouldSet) -> dict[str, str]:
+    """Return the settings of the sheet for each piece, by PrusaSlicer's names; none for a printer of resin."""
+    if in_resin(moulds):
+        return {}
+    return {
+        "elefant_foot_compensation": f"{FOOT_MM if _has_foot(moulds) else 0:g}",
+        "fill_density": f"{INFILL_PERCENT}%",
+        "layer_height": f"{moulds.spec.moulds.layer_mm:g}",
+        "perimeters": str(PERIMETERS),
+        "support_material": "0",
+    }
+
+
+def _has_foot(moulds: MouldSet) -> bool:
+    """Tell whether the first layers of a piece would be in the way if they are wider."""
+    return bool(moulds.plan.of_kind("cup") or moulds.plan.splits)
 
 
 @dataclass(frozen=True)
@@ -105,17 +124,17 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
             "tolerance): it narrows a bore."
         )
     else:
-        foot = f", elephant foot compensation {number(FOOT_MM, 3)} mm" if plan.of_kind("cup") or plan.splits else ""
+        foot = f", elephant foot compensation {number(FOOT_MM, 3)} mm" if _has_foot(moulds) else ""
         low, high = (number(error, 2) for error in FDM_ERROR)
         sliced = f"{low} to {high} times that by unitcad build {moulds.source} --slice -o sliced"
         how.append(f"{takes} filament ({sliced}).")
-        how.append(f"{layers}, {PERIMETERS} perimeters, 20 % infill{foot}.")
+        how.append(f"{layers}, {PERIMETERS} perimeters, {INFILL_PERCENT} % infill{foot} (in the 3MF for PrusaSlicer).")
     if lengths.shrinkage_percent or lengths.bore_compensation_mm:
         larger = f"the tools are larger by {number(lengths.shrinkage_percent, 2)} %, for the silicone's shrinkage"
         wider = f"bores are wider by {number(lengths.bore_compensation_mm, 2)} mm a side, which the printer takes away"
         how.append(f"In the files {larger}, and {wider}.")
     if plan.of_kind("cup"):
-        how.append(f"First time on this printer: print the fit coupon first (unitcad coupon {lengths.printer}).")
+        how.append(f"First time on this printer: print the fit coupon (unitcad coupon {lengths.printer}).")
     return Printing(
         sizes(moulds),
         moulds.source,

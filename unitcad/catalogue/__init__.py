@@ -247,18 +247,23 @@ def _entries(kind: type[_Entry], own: Mapping[str, Struct] | None) -> dict[str, 
     entries = dict(_shipped(kind))
     for name, table in (own or {}).items():
         given = _plain(table)
-        base = given.pop("like", None)
+        base = given.get("like")
         if base is not None and base not in _raw(file):
             raise unknown_name(f"{field}.{name}.like", base, _raw(file))
-        start = _sourced(kind, _raw(file)[base]) if base else {}
-        entries[name] = _entry(kind, name, {**start, **_sourced(kind, given)}, f"{field}.{name}")
+        entries[name] = _entry(kind, name, _after(kind, given), f"{field}.{name}")
     return entries
+
+
+def _after(kind: type[_Entry], table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of a table, those of the shipped entry that it is `like`, if any, before its own."""
+    base = table.get("like")
+    return {**(_after(kind, _raw(_KINDS[kind][0])[base]) if base else {}), **_sourced(kind, table)}
 
 
 @cache
 def _shipped(kind: type[_Entry]) -> dict[str, _Entry]:
     file, field = _KINDS[kind]
-    return {name: _entry(kind, name, table, f"{field}.{name}") for name, table in _raw(file).items()}
+    return {name: _entry(kind, name, _after(kind, table), f"{field}.{name}") for name, table in _raw(file).items()}
 
 
 @cache
@@ -276,7 +281,7 @@ def _sourced(kind: type[Struct], table: Mapping[str, Any]) -> dict[str, Any]:
     return {
         key: {**default, **(raw if isinstance(raw, dict) else {"value": raw})}
         for key, raw in table.items()
-        if key not in ("status", "source")
+        if key not in ("like", "status", "source")
     }
 
 

@@ -67,6 +67,7 @@ RibInterference = Annotated[
 SeatRelief = Annotated[float, Meta(ge=0.01, le=20, description="gap between a cup's foot and the plate")]
 SlotHeight = Annotated[float, Meta(ge=0.05, le=20, description="height of the slot for a tail or wires")]
 SlotClearance = Annotated[float, Meta(ge=0.01, le=20, description="extra width of the slot, over tail or wires")]
+Nozzle = Annotated[float, Meta(ge=0.1, le=2, description="bore of the nozzle, of a printer of filament")]
 BoreCompensation = Annotated[
     float,
     Meta(ge=0, le=0.5, description="by how much bores are printed too narrow, per side; files make up for it"),
@@ -190,6 +191,7 @@ class Printer(Struct, frozen=True, kw_only=True):
     engraving_stroke_mm: Value[EngravingStroke]
     overhang_deg: Value[Overhang]
     bridge_mm: Value[Bridge]
+    nozzle_mm: Value[Nozzle] | None = None
     rib_interference_mm: Value[RibInterference] | None = None
     bore_compensation_mm: Value[BoreCompensation] | None = None
     support: Value[Support] | None = None

@@ -28,7 +28,6 @@ PLACES = {
     "win32": (r"C:\Program Files\Prusa3D\PrusaSlicer\prusa-slicer-console.exe",),
 }
 """Its folders by `sys.platform`, if its installer does not add it to the path."""
-NOZZLES_MM = {"fdm-0.25": 0.25}
 TIMEOUT_S = 300
 FILAMENT_MM = 1.75
 _REPAIRS = re.compile(r"^(?:degenerate_facets|edges_fixed|facets_removed|facets_reversed|backwards_edges)\s*=", re.M)
@@ -65,7 +64,7 @@ def slice_file(path: Path, printer: Printer) -> Sliced:
     """Slice one STL with the slicer's own defaults and this printer's layers. Raises UnitcadError if that fails."""
     with tempfile.TemporaryDirectory(prefix="unitcad-slice-") as scratch:
         code = Path(scratch) / "out.gcode"
-        layer, nozzle = float(printer.layer_mm), NOZZLES_MM.get(printer.name, 0.4)
+        layer, nozzle = float(printer.layer_mm), float(printer.nozzle_mm or 0.4)
         output = _run(
             "--export-gcode",
             *("--output", str(code)),

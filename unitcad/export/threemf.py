@@ -7,19 +7,24 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
-from unitcad.text import xml_attribute
+from unitcad.text import xml_attribute, xml_text
 
 GAP_MM = 5.0
+_CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+_SLIC3R = "http://schemas.slic3r.org/3mf/2017/06"
+_SETTINGS = "Metadata/Slic3r_PE_model.config"
 
 _CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
  <Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
  <Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
+ <Default Extension="config" ContentType="application/xml"/>
 </Types>
 """
 _RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
@@ -46,16 +51,25 @@ class MeshPart:
     copies: tuple[str, ...] = ()
 
 
-def content(parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> bytes:
+def content(
+    parts: Sequence[MeshPart],
+    bed_mm: tuple[float, float] = (220.0, 220.0),
+    settings: Mapping[str, str] = MappingProxyType({}),
+    description: str = "",
+) -> bytes:
     """Return the bytes of a package with `parts` in their order, in rows along x within the bed's width, GAP_MM apart.
 
-    Dates, order and compression are fixed.
+    `settings` of each part, by PrusaSlicer's names, are in its own file of object settings: the user's printer and
+    filament stay as they are. `description` has them in words for other programs. Dates, order and compression are
+    fixed.
     """
     entries = {
         "[Content_Types].xml": _CONTENT_TYPES,
         "_rels/.rels": _RELATIONSHIPS,
-        "3D/3dmodel.model": _model(parts, bed_mm),
+        "3D/3dmodel.model": _model(parts, bed_mm, settings, description),
     }
+    if settings:
+        entries[_SETTINGS] = _object_settings(parts, settings)
     package = io.BytesIO()
     with zipfile.ZipFile(package, "w") as archive:
         for name, text in entries.items():
@@ -89,15 +103,33 @@ def colour_hex(colour: tuple[float, float, float]) -> str:
     return "#" + "".join(f"{round(channel * 255):02X}" for channel in colour)
 
 
-def _model(parts: Sequence[MeshPart], bed_mm: tuple[float, float]) -> str:
+def _object_settings(parts: Sequence[MeshPart], settings: Mapping[str, str]) -> str:
+    """Write PrusaSlicer's settings of each object. It wants the range of facets of the one volume in each."""
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<config>"]
+    for index, part in enumerate(parts):
+        lines.append(f'<object id="{index + 2}" instances_count="{len(part.copies) or 1}">')
+        for key, value in {"name": part.name, **settings}.items():
+            lines.append(f'<metadata type="object" key="{key}" value={xml_attribute(value)}/>')
+        lines.append(f'<volume firstid="0" lastid="{len(part.faces) - 1}">')
+        lines += [f'<metadata type="volume" key="name" value={xml_attribute(part.name)}/>', "</volume>", "</object>"]
+    return "\n".join([*lines, "</config>", ""])
+
+
+def _model(
+    parts: Sequence[MeshPart], bed_mm: tuple[float, float], settings: Mapping[str, str], description: str
+) -> str:
     low = [part.vertices.min(axis=0).astype(float) for part in parts]
     size = [part.vertices.max(axis=0).astype(float) - least for part, least in zip(parts, low, strict=True)]
     built = [(index, copy) for index, part in enumerate(parts) for copy in part.copies or ("",)]
     places = layout([(float(size[index][0]), float(size[index][1])) for index, _ in built], bed_mm)
+    vendor = f' xmlns:slic3rpe="{_SLIC3R}"' if settings else ""
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
-        '<model unit="millimeter" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">',
+        f'<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE}"{vendor}>',
         '<metadata name="Application">unitcad</metadata>',
+        # Without it PrusaSlicer makes an object of each copy, and gives only the first one its settings.
+        *(['<metadata name="slic3rpe:Version3mf">1</metadata>'] if settings else []),
+        *([f'<metadata name="Description">{xml_text(description)}</metadata>'] if description else []),
         "<resources>",
         '<basematerials id="1">',
         *(

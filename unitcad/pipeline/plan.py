@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from importlib.metadata import PackageNotFoundError, version
@@ -20,6 +20,7 @@ from unitcad import __version__
 from unitcad.cache import digest
 from unitcad.casting.bill import plates
 from unitcad.casting.pictures import BenchPictures
+from unitcad.casting.preparation import slicer_settings
 from unitcad.casting.views import picture_path
 from unitcad.casting.written import step_section
 from unitcad.designs import design_of, no_estimate
@@ -90,8 +91,10 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
             path, key = f"{group.name}/{file_stem(body)}.stl", partial(body_key, moulds, body, "stl")
             yield Planned(path, partial(stl_content, moulds, body), key, form="stl", bodies=(body.name,))
         for path, plate in plates(moulds, printed, together).items():
-            make, key = partial(threemf_content, moulds, plate), partial(joint_key, moulds, plate, "3mf", *bed)
-            yield Planned(path, make, key, form="3mf", bodies=tuple(body.name for body in plate))
+            settings = slicer_settings(moulds) if group.name == "moulds" else {}
+            make = partial(threemf_content, moulds, plate, settings)
+            key = partial(joint_key, moulds, plate, "3mf", *bed, settings)
+            yield Planned(path, make, key, form="3mf", bodies=tuple(body.name for body in plate if body in printed))
         make, key = partial(glb_content, moulds, every), partial(joint_key, moulds, every, "glb")
         yield Planned(f"{together}.glb", make, key, form="glb", bodies=names)
         yield step_file(f"{together}.step", moulds, [body.in_file for body in every], group.name)
@@ -240,15 +243,16 @@ def stl_content(moulds: MouldSet, body: Body) -> bytes:
     return stl.content(*ready(moulds, body), body.name)
 
 
-def threemf_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
-    """Return the 3MF of several bodies, side by side on the spec's bed; copies share one mesh."""
+def threemf_content(moulds: MouldSet, bodies: Sequence[Body], settings: Mapping[str, str]) -> bytes:
+    """Return the 3MF of several bodies, side by side on the bed, with settings for the slicer; copies share a mesh."""
     bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
     alike = copies(bodies)
     parts = []
     for name, places in zip(part_names(bodies, alike), alike, strict=True):
         first, several = bodies[places[0]], tuple(bodies[i].name for i in places) if len(places) > 1 else ()
         parts.append(threemf.MeshPart(name, first.colour, *ready(moulds, first), copies=several))
-    return threemf.content(parts, bed)
+    said = "; ".join(f"{key.replace('_', ' ')} {value}" for key, value in settings.items())
+    return threemf.content(parts, bed, settings, f"Print in this attitude: {said}" if said else "")
 
 
 def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:

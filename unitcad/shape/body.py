@@ -71,13 +71,14 @@ def copies(bodies: Sequence[Body]) -> list[list[int]]:
 
 
 def part_names(bodies: Sequence[Body], parts: Sequence[Sequence[int]]) -> list[str]:
-    """Return a name for each part: its body's, or for several copies that of their kind, which no body has."""
+    """Return a name for each part: its body's, or for several copies that of their kind, which no other body has."""
     taken, names = {body.name for body in bodies}, []
     for part in parts:
         first = bodies[part[0]]
         kind = f"{first.kind}{first.step or ''}"
         several = (f"{kind}-{i}" if i else kind for i in itertools.count())
-        names.append(first.name if len(part) == 1 else next(name for name in several if name not in taken))
+        others = taken - {bodies[i].name for i in part}
+        names.append(first.name if len(part) == 1 else next(name for name in several if name not in others))
         taken.add(names[-1])
     return names
 
