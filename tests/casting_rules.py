@@ -237,7 +237,7 @@ def _fixed(procedure: Procedure) -> Iterator[str]:
             (said,) = layers_named([step.text])
             asked = hours[silicones[min(said, len(silicones) - 1)]]
         waits = [each.wait_min for each in procedure.assembly if each.title.startswith("Let the")]
-        if asked and abs(waits[0] - 60 * asked) > 1e-6:
+        if asked and waits and abs(waits[0] - 60 * asked) > 1e-6:
             yield "what holds the motor cures for another's time"
 
 
