@@ -104,7 +104,7 @@ def run(quick: bool, say: Say) -> Result:
         "times as much.",
     )
     say("scores on shuffled and simulated tables")
-    scores, of_scores = score_tables(200 if quick else 1000)
+    scores, of_scores = score_tables(1000)
     say("bare skin")
     bare, worst = bare_skin(finenesses, repeats=1 if quick else 3)
     return Result(

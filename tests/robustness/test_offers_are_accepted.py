@@ -74,7 +74,7 @@ def test_a_bad_length_is_refused_with_one_that_is_accepted(name):
 def test_a_bad_length_of_a_custom_design_is_refused_with_one_that_is_accepted(name):
     allow(ANY)
     try:
-        assert sum(check_offer(data, from_data) for data in bad_specs(name, 40)) > 3
+        assert sum(check_offer(data, from_data) for data in bad_specs(name, 100)) > 3
     finally:
         allow_nothing()
 
