@@ -113,7 +113,7 @@ def build(
     out : path, default "out"
         Folder in which the result's folder is made.
     formats : str or sequence of str, optional
-        Any of "stl", "3mf", "step", "svg", "png", "glb". Default: those of the spec.
+        Any of "stl", "3mf", "step", "svg", "png", "glb", "pdf". Default: those of the spec.
     only : str or sequence of str, optional
         Outputs: any of "unit", "moulds", "estimate", "casting". Default: all.
     check : bool, default True

@@ -56,7 +56,7 @@ from unitcad.checks.gap import play_missing
 from unitcad.errors import Refusal
 from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.make import Product, Progress, Subject, finished, geometry, mould_findings, record
+from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finished, geometry, mould_findings, record
 from unitcad.pipeline.manifest import (
     CASTING,
     NO_KERNEL,
@@ -83,6 +83,7 @@ from unitcad.pipeline.plan import (
     step_file,
     stl_content,
 )
+from unitcad.pipeline.scenes import drawing
 from unitcad.pipeline.subjects import Compound
 from unitcad.spec import Spec, read_toml
 from unitcad.spec.raw import Format
@@ -167,6 +168,8 @@ class Arrayed(Compound):
             shared |= {f"{folder}/{path}": sha256 for path, sha256 in product.shared.items()}
         parts: list[PartRecord] = []
         shape: Geometry | None = None
+        if "pdf" in self.formats and "moulds" in only:
+            own[DRAWING] = drawing(moulds, ("moulds",))
         if {"moulds", "casting"} & set(only):
             shape = geometry(moulds, ["moulds"], check and "moulds" in only, store, progress)
             if "moulds" in only:

@@ -18,7 +18,7 @@ Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", h
 Fit = Annotated[
     Path | None, typer.Option(help="A lab-fit.toml of unitcad fit: the lab's constants and ranges in the estimate.")
 ]
-Formats = Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb; else the spec's.")]
+Formats = Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb,pdf; else the spec's.")]
 Only = Annotated[
     str | None, typer.Option(help="unit,moulds,estimate,casting; else all. In a batch estimate alone makes a table.")
 ]

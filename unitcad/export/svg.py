@@ -101,19 +101,25 @@ def section(
     notes: Sequence[Note] = (),
     title: str = "",
     ground: str = "skin",
+    px_per_mm: float = 0.0,
+    named: bool = True,
+    level: float = 0.0,
 ) -> str:
-    """Draw `regions`, every one named, with its measures.
+    """Draw `regions`, every one with its name if `named`, and the measures.
 
-    `ground`: the name of the line z = 0, "" for none. The same arguments give the same text.
+    `ground`: the name of the line at z = `level` (mm), "" for none. `px_per_mm`: 0 for a fixed width. The same
+    arguments give the same text.
     """
-    anchors = _anchors(regions, [text_width(region.name) for region in regions])
-    named = [*notes, *(Note(region.name, at) for region, at in zip(regions, anchors, strict=True))]
-    page = _Page(regions, measures, named)
+    labels = [*notes]
+    if named:
+        anchors = _anchors(regions, [text_width(region.name) for region in regions])
+        labels += (Note(region.name, at) for region, at in zip(regions, anchors, strict=True))
+    page = _Page(regions, measures, labels, px_per_mm)
     marks = [page.region(region) for region in regions]
-    marks += page.frame(ground)
+    marks += page.frame(ground, level)
     for side in ("below", "left", "right"):
         marks += page.measures([m for m in measures if m.side == side])
-    marks += page.labels(named)
+    marks += page.labels(labels) if labels else []
     if title:
         marks.append(_text(title, (page.width / 2, TEXT_PX)))
     width, height = number(page.width), number(page.height)
@@ -130,24 +136,27 @@ def unit_section(
     dims: Dimensions,
     segments: int,
     concentric: bool = True,
+    px_per_mm: float = 0.0,
 ) -> str:
     """Draw the unit cut along its tail, in the plane y = 0: main dimensions, layers and air named.
 
     `concentric`: the layers are drawn to `dims`. Others get only the dimensions that are measured on their sections.
+    `px_per_mm` as in `section`.
     """
     if not concentric:
         measures = _measured(bodies, dims, segments)
         reach = max(
             (abs(x) for m in measures if m.side == "below" for x in (m.start, m.end)), default=dims.outer_radius
         )
-        return section(cut(bodies, segments, reach=reach + TAIL_MM), measures)
+        return section(cut(bodies, segments, reach=reach + TAIL_MM), measures, px_per_mm=px_per_mm)
     regions = cut(bodies, segments, reach=dims.outer_radius + TAIL_MM)
     notes = []
     if dims.air_ring > 0:
         low = dims.core_outline[-2][1]
         at = (dims.motor_radius + dims.cavity_radius) / 2, low + (dims.motor_height - low) / 3
         notes.append(Note("air", at))
-    return section(regions, _unit_measures(dims), notes, ground="" if dims.skin else "skin")
+    ground = "" if dims.skin else "skin"
+    return section(regions, _unit_measures(dims), notes, ground=ground, px_per_mm=px_per_mm)
 
 
 def _measured(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[Measure]:
@@ -203,16 +212,20 @@ def _unit_measures(dims: Dimensions) -> list[Measure]:
 class _Page:
     """The sheet: from mm in the plane to px, and the drawing round the regions."""
 
-    def __init__(self, regions: Sequence[Region], measures: Sequence[Measure], notes: Sequence[Note]) -> None:
+    def __init__(
+        self, regions: Sequence[Region], measures: Sequence[Measure], notes: Sequence[Note], px_per_mm: float
+    ) -> None:
         points = np.array([p for region in regions for loop in region.loops for p in loop])
         self.low, self.high = points.min(axis=0), points.max(axis=0)
-        self.scale = WIDTH_PX / max(self.high[0] - self.low[0], 1e-9)
+        wide = max(self.high[0] - self.low[0], 1e-9)
+        self.scale = px_per_mm or WIDTH_PX / wide
+        self.across = self.scale * wide
         rows = {s: 1 + max((m.row for m in measures if m.side == s), default=-1) for s in ("below", "left", "right")}
         right = max((text_width(m.text) for m in measures if m.side == "right"), default=0.0)
         self.left = 24 + COLUMN_PX * rows["left"]
-        self.top = 84.0
+        self.top = 84.0 if notes else 30.0
         row = sum(text_width(note.text) + LABEL_GAP_PX for note in notes) - LABEL_GAP_PX + 2 * EDGE_PX
-        self.width = max(self.left + WIDTH_PX + 24 + (ROW_PX + right if rows["right"] else 0.0), row)
+        self.width = max(self.left + self.across + 24 + (ROW_PX + right if rows["right"] else 0.0), row)
         self.height = self.top + (self.high[1] - self.low[1]) * self.scale + 30 + ROW_PX * rows["below"]
 
     def at(self, point: Point) -> Point:
@@ -227,15 +240,17 @@ class _Page:
         fill = xml_attribute(colour_hex(region.colour))
         return f'<path d="{path}" fill={fill} fill-rule="evenodd"><title>{xml_text(region.name)}</title></path>'
 
-    def frame(self, ground: str) -> list[str]:
-        """Draw the line z = 0 and the axis."""
-        skin = self.at((self.low[0], 0.0)), self.at((self.high[0], 0.0))
+    def frame(self, ground: str, level: float) -> list[str]:
+        """Draw the line z = `level` and the axis, if they pass through the drawing."""
+        skin = self.at((self.low[0], level)), self.at((self.high[0], level))
         top, bottom = self.at((0.0, self.high[1])), self.at((0.0, self.low[1]))
-        return [
-            _line(*skin, "skin"),
-            *([_text(ground, (skin[1][0], skin[1][1] + TEXT_PX * 0.8), "end")] if ground else []),
-            _line((top[0], top[1] - 12), (bottom[0], bottom[1] + 12), "axis"),
-        ]
+        marks = []
+        if self.low[1] <= level <= self.high[1]:
+            marks.append(_line(*skin, "skin"))
+            marks += [_text(ground, (skin[1][0], skin[1][1] + TEXT_PX * 0.8), "end")] if ground else []
+        if self.low[0] <= 0 <= self.high[0]:
+            marks.append(_line((top[0], top[1] - 12), (bottom[0], bottom[1] + 12), "axis"))
+        return marks
 
     def measures(self, measures: Sequence[Measure]) -> list[str]:
         """Draw the dimension lines of one side, their extension lines and their texts."""
@@ -250,7 +265,9 @@ class _Page:
                     feet = [self.at((end, measure.reach)) for end in ends]
                     tips = [(x, y) for x, _ in feet]
                 else:
-                    x = self.left + (-14 - COLUMN_PX * row if measure.side == "left" else WIDTH_PX + 14 + ROW_PX * row)
+                    x = self.left + (
+                        -14 - COLUMN_PX * row if measure.side == "left" else self.across + 14 + ROW_PX * row
+                    )
                     feet = [self.at((measure.reach, end)) for end in ends]
                     tips = [(x, y) for _, y in feet]
                 marks += [_line(foot, tip, "extension") for foot, tip in zip(feet, tips, strict=True)]

@@ -54,12 +54,14 @@ from unitcad.pipeline.plan import (
     ready,
 )
 from unitcad.pipeline.plan import forget as forget_geometry
+from unitcad.pipeline.scenes import drawing
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, printer_of, spec_hash, to_json, to_toml, with_formats
 from unitcad.spec.raw import Format
 from unitcad.validation import from_data
 
 MESH_FORMATS = ("stl", "3mf")
+DRAWING = "drawing.pdf"
 """The formats whose files the mesh rules look at."""
 
 
@@ -153,6 +155,9 @@ class Subject:
         if {"moulds", "casting"} & set(outputs):
             moulds.plan  # noqa: B018  # refuses before the long work begins
         own: dict[str, bytes] = {"spec.toml": to_toml(spec).encode()}
+        if "pdf" in spec.output.formats and {"unit", "moulds"} & set(outputs):  # its names are the spec's own
+            progress("drawing")
+            own[DRAWING] = drawing(moulds, outputs)
         estimate = None
         if "estimate" in outputs:  # first: the helper for STEP loads its kernel in the meantime
             progress("estimate")

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
-from manifold3d import Manifold
+import numpy as np
+from manifold3d import CrossSection, FillRule, Manifold, OpType
 
+from unitcad.casting.preparation import in_resin
+from unitcad.export import drawing as sheet
+from unitcad.export import svg
+from unitcad.export.chart import number
 from unitcad.export.raster import Colour, Surface, draw
-from unitcad.kernels.mesh import arrays, bounds
+from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
 from unitcad.text import spaced
@@ -18,6 +24,9 @@ GAP = 7.0
 """Between two pieces taken apart, mm."""
 ASIDE = 12.0
 """How far a tongue is drawn out when taken apart, mm."""
+
+LEAST_SIDE_MM = 1.5
+"""A side of an outline from above that is shorter than this gets no dimension: a facet of a circle is."""
 
 Offset = tuple[float, float, float]
 
@@ -179,3 +188,73 @@ def _far_half(solid: Manifold, y: float = 0.0) -> Manifold:
 
 def _solid(solid: Manifold, colour: Colour, label: str = "") -> Surface:
     return Surface(*arrays(solid), colour, label)
+
+
+def drawing(moulds: MouldSet, only: Sequence[str]) -> bytes:
+    """Return the dimensioned drawing of the unit and of every tool that is printed, a sheet each, as PDF.
+
+    Raises Missing without reportlab.
+    """
+    spec, sheets = moulds.spec, list[sheet.Sheet]()
+    of_set = (("mould set", moulds.plan.label),) if "moulds" in only else ()
+    if "unit" in only:
+        solid = Manifold.batch_boolean([realise(one.shape, moulds.segments, 1.0) for one in moulds.unit], OpType.Add)
+        round_layers = moulds.design.tooling == "concentric"
+        section = partial(svg.unit_section, moulds.unit, moulds.dimensions, moulds.segments, round_layers)
+        silicones = ", ".join(f"layer {i} {layer.material}" for i, layer in enumerate(spec.layers, 1))
+        facts = ("piece", "unit"), ("variant", spec.name), *of_set, ("material", silicones)
+        sheets.append(sheet.Sheet((section, _plan_view(solid, 0.0)), facts))
+    for body in moulds.plan.pieces if of_set else ():
+        if body.made == "printed":
+            made = f"{'resin' if in_resin(moulds) else 'filament'}, printer {spec.moulds.printer}"
+            facts = ("piece", moulds.plan.called(body.name)), ("variant", spec.name), *of_set, ("material", made)
+            sheets.append(sheet.Sheet(_views(moulds, body), facts))
+    return sheet.content(sheets)
+
+
+def _views(moulds: MouldSet, body: Body) -> tuple[Callable[[float], str], ...]:
+    """Draw a tool cut through the first cell, with widths, heights and windows, and from above."""
+    # A polygon's corners on the circle: a round face is then as wide as it is drawn.
+    cell, solid = moulds.plan.layout.cells[0], realise(body.shape, moulds.segments, 1.0)
+
+    def slices(z: float) -> Iterator[np.ndarray]:
+        return (np.asarray(loop) - (0.0, cell.y) for loop in solid.slice(z).to_polygons())
+
+    def round_at(half: float, centre: float, z: float) -> bool:
+        for loop in slices(z):
+            x, y = loop[:, 0] - centre, loop[:, 1]
+            angles = np.sort(np.arctan2(y, x)[abs(np.hypot(x, y) - half) < 0.03])
+            if len(angles) >= 12 and max(np.diff(angles).max(), angles[0] - angles[-1] + 2 * np.pi) < 2:
+                return True
+        return False
+
+    def width_at(x: float, z: float) -> float:
+        inward = x - math.copysign(sheet.LEAST_EDGE_MM / 4, x)
+        ends = [
+            a[1] + (b[1] - a[1]) * (inward - a[0]) / (b[0] - a[0])
+            for loop in slices(z)
+            for a, b in zip(loop, np.roll(loop, -1, axis=0), strict=True)
+            if (a[0] > inward) != (b[0] > inward)
+        ]
+        return min(y for y in ends if y > 0) - max(y for y in ends if y <= 0)
+
+    regions = svg.cut([body], moulds.segments, y=cell.y, swell=1.0)
+    whole = CrossSection([np.array(loop) for region in regions for loop in region.loops], FillRule.EvenOdd)
+    loops = whole.simplify(sheet.SAME_MM / 4).to_polygons()
+    measures = [*sheet.across(loops, (cell.x, 0.0), round_at), *sheet.upright(loops), *sheet.windows(loops, width_at)]
+    title = f"A - A, cut at y = {cell.y:g}"
+    section = partial(svg.section, regions, measures, title=title, ground="seat", named=False)
+    return lambda scale: section(px_per_mm=scale), _plan_view(solid, cell.y)
+
+
+def _plan_view(solid: Manifold, y: float) -> Callable[[float], str]:
+    """Draw a solid from above, with its widths and the line of the section."""
+    seen, (x0, y0, _, x1, y1, _) = sheet.from_above(solid), bounds(solid)
+    outline = seen[0].loops
+    size = [svg.Measure(number(x1 - x0, 2), x0, x1, "below", 0, y0)]
+    upright = [[(b, a) for a, b in loop] for loop in outline]
+    deep = sheet.across(upright, ((y0 + y1) / 2,), lambda *_: False, least=LEAST_SIDE_MM)
+    deep = [one for one in deep if one.end - one.start < y1 - y0 - sheet.SAME_MM]
+    for one in (*deep, svg.Measure(number(y1 - y0, 2), y0, y1, "left", len(deep), x0)):
+        size.append(replace(one, side="left", reach=max(one.reach, x0)))
+    return lambda scale: svg.section(seen, size, title="from above", ground="A", px_per_mm=scale, named=False, level=y)

@@ -27,8 +27,8 @@ CircuitThickness = Annotated[float, Meta(ge=0.01, le=5)]
 Cavities = Annotated[int, Meta(ge=1)]
 Vents = Annotated[int, Meta(ge=1, le=1000)]
 TailWidth = Annotated[float, Meta(ge=LEAST_TAIL, le=kinds.LONGEST_MM)]
-Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
-FORMATS: tuple[Format, ...] = ("step", "stl", "3mf", "svg", "png", "glb")
+Format = Literal["stl", "3mf", "step", "svg", "png", "glb", "pdf"]
+FORMATS: tuple[Format, ...] = ("step", "stl", "3mf", "svg", "png", "glb", "pdf")
 Output = Literal["unit", "moulds", "estimate", "casting"]
 OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
 _LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
