@@ -237,6 +237,6 @@ def test_a_layer_without_a_silicone_is_no_printed_part(tmp_path: Path) -> None:
 
 def test_step_without_the_extra_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     name = step_design(tmp_path)
-    monkeypatch.setattr("unitcad.meshcheck.readers.read_step.installed", lambda: False)
+    monkeypatch.setattr("unitcad.meshcheck.readers.read_step.find_spec", lambda name: None)
     with pytest.raises(Refusal, match=r"F012: STEP needs the extra"):
         load(spec_of(tmp_path, name))

@@ -151,7 +151,8 @@ def test_names_in_the_pictures_of_all_templates(
     starts = np.cumsum([1, *(len(one.patches) for one in layers)])
     owner = np.searchsorted(starts, shown, "right") - 1
     written = {labels.index(label.text): label for label in placed[0]}
-    assert sorted(label.text for label in placed[0]) == sorted(text for text in labels if text)
+    cut_away = {"wire 1"} if draw is unit_cut_open else set()  # wires side by side: one is in the half that is gone
+    assert sorted(label.text for label in placed[0]) == sorted(text for text in labels if text and text not in cut_away)
     boxes = {i: (one.left, one.left + one.width, one.top, one.top + one.height) for i, one in written.items()}
     assert faults(owner, boxes, {i: one.start for i, one in written.items()}) == []
     assert all(one.end for one in written.values())

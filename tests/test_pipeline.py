@@ -277,3 +277,8 @@ def test_few_files_and_frames_lie_between_the_command_and_the_mesh_of_a_cup(monk
     assert left.value.code == 0
     assert len(paths[0]) <= 12
     assert len({frame.filename for frame in paths[0]}) <= 8
+
+
+def test_the_sheet_of_encapsulating_can_be_read_before_the_pot_life_ends(tmp_path):
+    built = build(load("encapsulating"), tmp_path, only=("unit", "moulds", "casting"))
+    assert len((built.folder / "casting.md").read_text("utf-8").split()) <= 1800

@@ -166,7 +166,7 @@ def test_a_key_is_named_whatever_it_looks_like(key: str) -> None:
 
 def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are() -> None:
     with pytest.raises(
-        Refusal, match=r"known here: diameter_mm, (\w+, ){3}\w+ and 12 more \(`unitcad schema` lists all\)"
+        Refusal, match=r"known here: diameter_mm, (\w+, ){3}\w+ and 13 more \(`unitcad schema` lists all\)"
     ):
         load("encapsulating", ["diametre_mm=1"])
     with pytest.raises(Refusal, match=r"known here: wall_mm, cap_mm, material; nearest"):

@@ -61,7 +61,7 @@ def test_a_hexagon_has_six_neighbours_at_the_pitch(rings: int, count: int) -> No
 
 
 def test_a_ring_goes_once_round_the_limb() -> None:
-    array = _array({"kind": "ring", "count": 4, "bands": 3, "band_pitch_mm": 50}, body={"radius_mm": 40})
+    array = _array({"kind": "ring", "count": 4, "bands": 3, "band_pitch_mm": 50}, limb={"radius_mm": 40})
     assert len(array.places) == 12
     assert array.radius_mm == 40
     # Round the middle of the sheet, which is bent and keeps its length there: from 2.61 to 4.61 over the skin.

@@ -169,7 +169,7 @@ def test_the_procedure_says_how_a_grid_is_joined_and_what_the_bed_is_too_small_f
     blade = next(item for item in procedure.bill if item.item == "blade")
     assert blade.made == "tool"
     assert "bar of metal, 157 mm long" in blade.note
-    assert not any("blade" in line for line in procedure.printing)
+    assert not any("blade" in line for line in procedure.printing.how)
 
 
 def test_a_single_tooth_at_a_corner_may_be_missing_but_no_piece_is_loose() -> None:

@@ -196,7 +196,7 @@ def test_a_long_tray_is_split_too() -> None:
 
 def test_the_procedure_joins_and_seals_before_the_first_pour() -> None:
     made = back_sheet_procedure(band(), [1590.0, 7356.0], 100e3)
-    assert any("cup 1 and blade upside down" in line for line in made.printing)
+    assert any("cup 1 and blade upside down" in line for line in made.printing.how)
     titles = [step.title for step in made.preparation]
     assert titles.index("Join the pieces") < titles.index("Try every cup, dry")
     (step,) = [step for step in made.preparation if step.title == "Join the pieces"]

@@ -87,7 +87,7 @@ def test_units_in_pockets_keep_circuits_of_their_own() -> None:
 def test_a_narrow_limb_bends_the_circuit_between_two_pads_too_much() -> None:
     thick = {"like": "encapsulating", "fpcb": {"tail_length_mm": 2.0, "thickness_mm": 0.6}}
     close = {"kind": "grid", "columns": 3, "rows": 3, "pitch_mm": [18.0, 18.0]}
-    array = nine(unit=thick, layout=close, body={"radius_mm": 10.0})
+    array = nine(unit=thick, layout=close, limb={"radius_mm": 10.0})
     with pytest.raises(Refusal, match="bent") as refused:
         wiring(array)
     assert refused.value.field == "limb.radius_mm"

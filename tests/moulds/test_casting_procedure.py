@@ -571,3 +571,15 @@ def test_windows_that_resin_closes_are_cleared() -> None:
 def test_tools_in_resin_have_no_warning(name: str, tmp_path: Path) -> None:
     done = build(load(name, ["moulds.printer=sla", "output.formats=['stl']"]), tmp_path, only=("moulds",))
     assert done.manifest["check"] == {"errors": 0, "warnings": 0, "findings": []}
+
+
+def test_areas_that_hold_are_information_with_their_ratio():
+    """Core, its top and the seat over the bore, in closed form; draft makes the bore's side longer by its cosine."""
+    core, top, seat = 2 * math.pi * 4.5 * 2.11, math.pi * 4.5**2, math.pi * (5.75**2 - 4.5**2)
+    values = {f.name: f.value for f in procedure("encapsulating").pours[0].figures}
+    expected = (core + top + seat) / (2 * math.pi * 5.75 * 3.36)
+    assert values["area on the base over area in the cup"] == pytest.approx(expected)
+    ring = (2 * math.pi * 4.5 * 2.0 + seat) / (2 * math.pi * 5.75 * 2.0)
+    values = {f.name: f.value for f in procedure("embedded").pours[0].figures}
+    assert values["area on the base over area in the cup"] == pytest.approx(ring)
+    assert not any("area on the base" in f.name for p in procedure("custom/strap-lugs").pours for f in p.figures)

@@ -180,7 +180,7 @@ def _with_cavity(moulds: MouldSet, cavity: Cavity) -> MouldSet:
         ("cut(cylinder(7, 0, 4), [cylinder(5, 1, 3)])", 1, "pour 1 .* closed in by silicone below and above"),
         ("cut(cylinder(7, 0, 4), [ring(6, 8, 1, 3)])", 1, "closed in by silicone below and above"),
         ("cylinder(7, -1, 4)", 1, "pour 1 .* 1 mm below the skin"),
-        ("{'layer1': cylinder(7, 2, 4), 'layer2': cylinder(5, 0, 2)}", 2, "layer 2 lies under layer 1"),
+        ("{'layer1': cylinder(7, 2, 4), 'layer2': cylinder(5, 0, 2)}", 2, "layer 2 is under layer 1"),
         ("{'layer1': ring(4, 7, 0, 2), 'layer2': cylinder(4, 0, 2)}", 2, "a later layer takes its place"),
         ("{'frame': cylinder(7, 0, 4)}", 1, r"needs? each of the spec's 1 \[\[layers\]\] drawn"),
     ],
@@ -257,7 +257,7 @@ def test_motor_and_circuit_of_a_function_are_put_in() -> None:
     solder, push, rest = assembly_of(of_spec(load(CUSTOM / "strap-lugs.toml")))
     assert solder.startswith("Solder the motor to the circuit's pad")
     assert push == "Push the motor, the pad ahead, into the cavity from the skin, and lay the tail in the notch."
-    assert "The design's file says nothing more of the assembly" in rest
+    assert "The design's file says no more of the assembly" in rest
 
 
 @pytest.mark.parametrize(

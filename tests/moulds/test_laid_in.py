@@ -72,7 +72,7 @@ def test_it_is_laid_in_between_the_pours(tmp_path: Path) -> None:
     done = build(load(FILM, {"output.formats": ["stl"]}), tmp_path, only=("unit", "moulds", "casting"))
     assert done.ok
     text = (done.folder / "casting.md").read_text("utf-8")
-    order = [text.index(words) for words in ("## Pour 2", "Wipe Layer 1", "Lay the circuit on it", "Put cup 2 on")]
+    order = [text.index(words) for words in ("## Pour 2", "Wipe Layer 1", "Lay the circuit on it", "**Cup 2 on.**")]
     assert order == sorted(order)
     assert "## Motor in" not in text
     assert "core" not in text

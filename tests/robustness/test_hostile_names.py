@@ -152,13 +152,15 @@ def _judge(name, folder):
     assert manifest["name"] == name
     assert re.fullmatch(r"[a-z0-9-]+-[0-9a-f]{12}", folder.name)
     tokens = MarkdownIt("commonmark", {"html": True}).enable("table").parse((folder / "casting.md").read_text("utf-8"))
+    fold = {"<details>\n<summary>Figures and sources</summary>\n", "</details>\n"}
+    tokens = [token for token in tokens if token.type != "html_block" or token.content not in fold]
     spans = [child for token in tokens for child in token.children or [token]]
     assert not {"html_block", "html_inline", "link_open", "code_inline", "em_open"} & {token.type for token in spans}
     steps = {path for path in manifest["files"] if path.startswith("steps/")}
     assert {str(token.attrs["src"]) for token in spans if token.type == "image"} == {"step1-section.svg", *steps}
     heads = [_shown(after) for token, after in itertools.pairwise(tokens) if token.tag == "h1" and token.nesting == 1]
     assert heads == [_once_spaced(f"Casting {name}")]
-    part = _once_spaced(f"{name} part A")
+    part = _once_spaced(f"silicone {name}:")  # no line begins with a name: "# name" would be a heading
     assert any(_shown(token).startswith(part) for token in tokens if token.type == "inline")
     for row in csv.reader(io.StringIO((folder / "bom.csv").read_text("utf-8"))):
         assert len(row) == 5

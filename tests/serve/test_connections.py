@@ -131,5 +131,5 @@ def test_a_folder_of_specs_opens_its_only_one_or_names_them(tmp_path):
         assert b"one.toml" in own.send("/")[1]
         assert own.ask(text)["layers"] == 2
     (tmp_path / "two.toml").write_text(text)
-    with pytest.raises(UnitcadError, match=r"one.toml and two.toml: give one of them"):
+    with pytest.raises(UnitcadError, match=r"one.toml, two.toml: give one of them"):
         serve(str(tmp_path))

@@ -147,7 +147,7 @@ def test_a_patch_is_shown_and_changed(running, pockets):
     # The line above the view has the crosstalk and the pours; the view has the tools too.
     glance = live.page.inner_text("#glance")
     assert glance.startswith(live.page.locator("#estimate p.lead").inner_text())
-    assert glance.endswith("at the bench.")
+    assert glance.endswith("of filament.")
     radios = live.page.locator(".stage .choice label")
     assert radios.all_inner_texts() == ["Patch", "Moulds"]
     assert "along x" in live.page.inner_text('.stage select[name="axis"]')

@@ -146,5 +146,5 @@ def test_other_options_are_another_batch(tmp_path):
     for words in (["--no-check"], ["--formats", "3mf"], ["--only", "unit,moulds"]):
         done = unitcad("batch", sweep, "-o", out, "-j", 0, *words)
         assert done.returncode == 2
-        assert "holds another batch" in done.stderr
+        assert "has another batch" in done.stderr
     assert unitcad("batch", sweep, "-o", out, "-j", 0, "--keep-going", "--timeout", 9).returncode == 2

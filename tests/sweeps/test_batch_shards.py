@@ -113,7 +113,7 @@ def test_shards_that_do_not_fit_together(tmp_path):
         merge(out, [out], BatchOptions())
     with pytest.raises(UnitcadError, match="nowhere: there is no such folder"):
         merge(out, [tmp_path / "nowhere"], BatchOptions())
-    with pytest.raises(UnitcadError, match="holds shards, which unitcad batch merge joins"):
+    with pytest.raises(UnitcadError, match="has shards, which unitcad batch merge joins"):
         made(sweep, out)
     first = out / "shard-1-of-2"
     with pytest.raises(UnitcadError, match="is shard 1/2, as is"):
@@ -137,7 +137,7 @@ def test_shards_that_do_not_fit_together(tmp_path):
 def test_a_shard_is_refused_where_no_merge_could_take_it(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
     made(sweep, out, shard=Shard(1, 2))
-    with pytest.raises(UnitcadError, match=r"holds shards of 2 \(shard-1-of-2\).* go on with --shard K/2"):
+    with pytest.raises(UnitcadError, match=r"has shards of 2 \(shard-1-of-2\).* go on with --shard K/2"):
         made(sweep, out, shard=Shard(3, 3))
     assert [path.name for path in shard_folders(out)] == ["shard-1-of-2"]
     made(ring_sweep(tmp_path / "t", heights=[5.0]), tmp_path / "other")
@@ -205,7 +205,7 @@ def test_a_merge_of_what_the_store_has_lost_leaves_nothing(lost, tmp_path, monke
     before = sorted(out.iterdir())
     for folders in (True, False) if lost != "content" else (True,):
         record_packs.store_at.cache_clear()
-        with pytest.raises(UnitcadError, match=r"--verify makes again|there is no store"):
+        with pytest.raises(UnitcadError, match=r"--verify makes missing contents again|there is no store"):
             merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=folders))
         assert sorted(out.iterdir()) == before
 
@@ -274,11 +274,13 @@ def test_what_makes_lost_content_again_is_named(tmp_path, monkeypatch):
         if path.is_file():
             path.unlink()
     record_packs.store_at.cache_clear()
-    with pytest.raises(UnitcadError, match=r"variant 0: .*; the sweep with --shard 1/2 and --verify makes again"):
+    with pytest.raises(
+        UnitcadError, match=r"variant 0: .*; the sweep with --shard 1/2 and --verify makes missing contents again"
+    ):
         merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=True))
     merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh", folders=False))
     folder = rows(out)[0]["folder"]
-    with pytest.raises(UnitcadError, match="the same batch with --verify makes again what is missing"):
+    with pytest.raises(UnitcadError, match="the same batch with --verify makes missing contents again"):
         export_variant(out, folder, tmp_path / "one", DiskStore(tmp_path / "fresh"))
 
 

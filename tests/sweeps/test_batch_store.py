@@ -192,7 +192,7 @@ def test_damaged_content_is_found_and_made_again(tmp_path):
     content = digest((next((tmp_path / "plain").glob("ring-*/unit/*.stl"))).read_bytes())
     file = store / "content" / content[:2] / content
     file.write_bytes(file.read_bytes()[:-1] + b"!")
-    with pytest.raises(UnitcadError, match=r"content/../\w+ is not in .* with --verify makes again"):
+    with pytest.raises(UnitcadError, match=r"content/../\w+ is not in .* with --verify makes missing contents again"):
         made(sweep, tmp_path / "out", store=str(store), folders=True, cache=tmp_path / "fresh")
     record_packs.store_at.cache_clear()
     summary = made(sweep, tmp_path / "out", store=str(store), folders=True, verify=True, cache=tmp_path / "fresh")
@@ -278,7 +278,7 @@ def test_a_cluster_without_a_store_makes_folders_and_no_wish_for_none_is_ignored
     options = BatchOptions(("unit",), folders=False)
     with pytest.raises(UnitcadError, match="results of a cluster go to folders here"):  # before anybody is asked
         make(load_sweep(ring_sweep(tmp_path)), tmp_path / "out", options, Workers(scheduler="tcp://127.0.0.1:9"))
-    with pytest.raises(UnitcadError, match="estimates alone are one table"):
+    with pytest.raises(UnitcadError, match="estimates only are one table"):
         make(load_sweep("thickness"), tmp_path / "out", BatchOptions(("estimate",), folders=True), Workers(jobs=0))
     assert not (tmp_path / "out").exists()
 
@@ -294,7 +294,7 @@ def test_a_page_needs_no_folders(tmp_path):
     refused = run_unitcad("batch", "thickness", "--only", "estimate", "--folders", "-o", tmp_path / "none")
     assert (refused.returncode, refused.stderr) == (
         2,
-        "error: --folders: estimates alone are one table: leave it out\n",
+        "error: --folders: estimates only are one table: leave it out\n",
     )
 
 

@@ -95,7 +95,7 @@ def test_the_paper_sweep_has_every_measured_unit():
         ({"layers.0.wal_mm": [1.0]}, ["sweep.layers.0.wal_mm", "nearest accepted: 'layers.0.wall_mm'"]),
         ({"estimate.freq": [1.0]}, ["nearest accepted: 'estimate.frequency_hz'"]),
         ({"diameter": [1.0]}, ["nearest accepted: 'diameter_mm'"]),
-        ({"layers.2.wall_mm": [1.0]}, ["layers.2.wall_mm = '2'", "no such entry of layers: they are 0 and 1"]),
+        ({"layers.2.wall_mm": [1.0]}, ["layers.2.wall_mm = '2'", "no such entry of layers: they are 0 to 1"]),
         ({"diameter_mm.x": [1.0]}, ["no such path"]),
         ({}, ["the sweep is empty"]),
         ({"diameter_mm": []}, ["sweep.diameter_mm", "the sweep is empty"]),

@@ -385,6 +385,12 @@ def _check_held(
     """Raise Refusal for a unit that does not fit the sheet, with the name of a template that does."""
     fields = {n: f"place.{i}.unit" for n, i in places.items() if asked.place[i].unit is not None}
     for field, unit in {fields.get(n, "unit"): unit for n, unit in enumerate(units)}.items():
+        of_one = {"skin_mm": unit.skin_mm}
+        if not way.own_tails:
+            of_one |= {"motor.lip_mm": unit.motor.lip_mm, "moulds.draft_deg": unit.moulds.draft_deg}
+        for key, value in of_one.items():
+            if value:
+                raise Refusal(f"{field}.{key}", value, "only a single unit's moulds have it", 0.0)
         if why := way.unfit(unit, sheet):
             known = sorted(templates(), key=lambda name: name != default_template())
             raise Refusal(field, unit.name, why, next((name for name in known if _accepted(data, field, name)), None))

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
 from unitcad.catalogue import Material, Value
+from unitcad.designs.dimensions import Outline
 from unitcad.designs.limits import filament_groove
 from unitcad.designs.rib_leaves import leaf_mm
 from unitcad.moulds.base import plate_bottom, pry_floor
@@ -169,6 +170,25 @@ def window_length(moulds: MouldSet, step: Step) -> float:
     return lay.cup[0] - max(abs(cell.x) for cell in lay.cells) - moulds.plan.dimensions.radii[step.index - 1]
 
 
+def holding_ratio(moulds: MouldSet, step: Step) -> float:
+    """Return the area that silicone touches on the base over that in the bore of a pour's cup; 0 if no core is drawn.
+
+    Both are counted as the layer's outline drawn by `Dimensions`: the core's side and top under a cap, and the seat.
+    """
+    dims, plan = moulds.plan.dimensions, moulds.plan
+    if not plan.concentric:
+        return 0.0
+
+    def side(outline: Outline) -> float:
+        pairs = pairwise(outline)
+        return sum(math.pi * (r0 + r1) * math.hypot(r1 - r0, z1 - z0) for (r0, z0), (r1, z1) in pairs)
+
+    core, bore = dims.core_outline, dims.outside(step.index - 1)
+    top = core[-1][0] ** 2 if dims.core_height < step.rim else 0.0
+    held = side(core) + math.pi * (top + bore[0][0] ** 2 - core[0][0] ** 2)
+    return held / side(bore)
+
+
 def wall_range(spec: Spec, layer: int, off_axis_mm: float) -> tuple[float, float]:
     """Return the thinnest and thickest wall of a layer (from 0) whose cups are up to `off_axis_mm` off the axis, mm.
 
@@ -298,6 +318,7 @@ class Batch:
         kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
         weep = 100 * weep_mm3(self.moulds, step, silicone) / self.volume_mm3
         pressure = "; the syringe's pressure comes on top" if step.lid else ""
+        held = holding_ratio(self.moulds, step)
         flow = f"computed: flow in the clearance under the pour's own weight{pressure}"
         rows = (
             (what, self.volume_mm3, "mm3", "computed: the drawn layer's mesh"),
@@ -321,6 +342,7 @@ class Batch:
             self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),
             ("cure in this room", self.cure_h, "h", by_temperature + sourced(silicone.cure_h)),
             weep and ("weep by the windows, no grease", weep, "% of a layer", flow),
+            held and ("area on the base over area in the cup", held, "", "computed: adhesion is not measured"),
         )
         return tuple(Figure(*row) for row in rows if isinstance(row, tuple))
 

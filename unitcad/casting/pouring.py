@@ -525,17 +525,48 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     )
 
 
+def skin_on(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
+    """Describe how a film closes the skin side, the motor already in."""
+    skin, spec, cells = moulds.dimensions.skin, moulds.spec, len(moulds.plan.layout.cells)
+    if not skin:
+        return
+    material, blade = silicones[-1], "the blade" if moulds.plan.of_kind("blade") else "a straight edge"
+    hours = at_room(float(material.cure_h), spec.casting.room_c)
+    yield BenchStep(
+        "Skin on",
+        f"Mix {material.name} as for a pour. Level the skin tray, fill it and draw {blade} along its rim. Lower the "
+        "unit onto the wet film, skin side down, one edge first so that no air stays, and press it down lightly. No "
+        "release agent on its skin side.",
+        picture_path("skin-on"),
+        minutes=MIXING_MIN + WEIGH_MIN + LAY_IN_MIN * cells,
+        needs=("level",),
+    )
+    yield BenchStep(
+        "Let the skin cure",
+        f"{number(hours, 2)} h, level. Loosen the film's edge with a blunt spatula, lift the unit out, and trim the "
+        "film with small scissors.",
+        picture_path("skin-on"),
+        kind="cure",
+        minutes=PEEL_MIN * cells,
+        wait_min=60 * hours,
+        needs=("small scissors", "blunt spatula"),
+    )
+
+
 def after_pours(moulds: MouldSet, silicones: Sequence[Material]) -> list[AfterPours]:
-    """Return the silicones that are mixed after the pours to hold the motors, one batch each."""
-    cells, casting = len(moulds.plan.layout.cells), moulds.spec.casting
-    found: dict[Material, AfterPours] = {}
-    for fitting in () if moulds.design.laid_in else assembly(moulds):
-        if fitting.mixed:
-            (material,) = _by_layer(silicones, [fitting.silicone])
-            net = cells * fitting.volume_mm3 * float(material.density_g_cm3) / 1000
-            grams = max(net * (1 + casting.waste), casting.minimum_mix_g)
-            found.setdefault(material, AfterPours(material, fitting.mixed, grams))
-    return list(found.values())
+    """Return the silicones that are mixed after the pours, for rings round motors and for skins, one batch each."""
+    cells, casting, dims = len(moulds.plan.layout.cells), moulds.spec.casting, moulds.dimensions
+    fittings = () if moulds.design.laid_in else assembly(moulds)
+    wanted = [
+        (each.mixed, _by_layer(silicones, [each.silicone])[0], each.volume_mm3) for each in fittings if each.mixed
+    ]
+    if dims.skin:
+        wanted.append(("skin", silicones[-1], math.pi * dims.outer_radius**2 * dims.skin))
+    found = []
+    for use, material, volume in wanted:
+        net = cells * volume * float(material.density_g_cm3) / 1000
+        found.append(AfterPours(material, use, max(net * (1 + casting.waste), casting.minimum_mix_g)))
+    return found
 
 
 def _by_layer(silicones: Sequence[Material], layers: Iterable[int]) -> list[Material]:
@@ -574,7 +605,8 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
     if it is the drawn one.
     """
     spec, dims, off, exit = moulds.spec, moulds.plan.dimensions, eccentricity(moulds), moulds.plan.dimensions.exit
-    yield f"Height over all: {shown(dims.heights[-1], 2)} mm."
+    over = f", with the skin {shown(dims.heights[-1] + dims.skin, 2)} mm" if dims.skin else ""
+    yield f"Height over all: {shown(dims.heights[-1], 2)} mm{over}."
     if moulds.plan.concentric:
         yield f"Diameter at the skin: {shown(2 * dims.outer_radius, 2)} mm, in two directions."
         pushed = "" if off.ribs else " unless both cups were pushed the same way"

@@ -147,6 +147,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     cups, cells, label = len(plan.steps), len(plan.layout.cells), seen(plan.label)
     own = [f"C{step.index:X} on {spaced(step.cup)}" for step in plan.steps]
     own += [f"L{step.index:X} on {spaced(step.lid)}" for step in plan.steps if step.lid]
+    own += [f"F on the {plan.called(tray.name)}" for tray in plan.of_kind("tray")]
     pieces = " Beside it each piece of a tool that is printed in several has its number." if plan.splits else ""
     marks = f"{label[:2]} and {label[2:]} on {'cups and lids' if plan.of_kind('lid') else 'cups'}, {listed(own)}"
     if any(len(plan.pieces_of(cup.name)) > 1 for cup in plan.of_kind("cup")):

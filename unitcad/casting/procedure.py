@@ -30,6 +30,7 @@ from unitcad.casting.pouring import (
     motor_in,
     pour_steps,
     release,
+    skin_on,
 )
 from unitcad.casting.preparation import Printing, preparation, printing, tunnels
 from unitcad.casting.steps import BenchStep, Phase, phases
@@ -141,7 +142,8 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
     silicones = [batch.silicone for batch in batches]
     grams = [batch.volume_mm3 * float(batch.silicone.density_g_cm3) / 1000 for batch in batches]
     prepared = tuple(preparation(moulds, list(dict.fromkeys(silicones))))
-    out, motor = tuple(release(moulds, silicones[0])), tuple(motor_in(moulds, silicones))
+    out = tuple(release(moulds, silicones[0]))
+    motor = *motor_in(moulds, silicones), *skin_on(moulds, silicones)
     edges = tuple(off_grid(moulds))
     printed = any(tool.made == "printed" for tool in plan.of_kind("tongue"))
     slot = next((edge.nearest_mm for edge in edges if edge.piece == "tongue" and printed), None)

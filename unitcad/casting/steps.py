@@ -77,7 +77,7 @@ NEEDS = {
     "narrow pliers": ("piece", "tool", "for filament in its pocket"),
     "soldering iron and solder": ("set", "tool", ""),
     "silicone adhesive": ("tube", "bought", "neutral-curing; or a primer and a smear of silicone"),
-    "release agent": ("dab", "bought", "may be left out"),
+    "release agent": ("dab", "bought", "optional"),
     "wide adhesive tape": ("roll", "bought", "under the seams of split tools"),
     "petroleum jelly": ("dab", "bought", ""),
     "isopropanol and lint-free wipes": ("set", "bought", ""),

@@ -44,6 +44,7 @@ from unitcad.moulds.layout import MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.removal import CAST, Way
+from unitcad.moulds.skin_tray import films
 from unitcad.moulds.tongue import GRIP_WIDTH
 from unitcad.shape import Common, Revolve, Shape, box, cut, cylinder, moved, polygon, ring, union
 from unitcad.shape.body import Body
@@ -171,6 +172,7 @@ def _views(moulds: MouldSet) -> Views:
             yield f"pour{step.index}-{name}", view
     yield from _way_out(moulds)
     yield from _motor_in(moulds)
+    yield from _skin_on(moulds)
 
 
 def _level(
@@ -363,11 +365,20 @@ def _motor_in(moulds: MouldSet) -> Views:
         return
     below = moulds.design.opens == "below"
     away = (-1.0 if below else 1.0) * (moulds.dimensions.heights[-1] + CLEAR)
-    cast = placed((body for body in moulds.unit if body.made == "cast"), half=not moulds.laid_later)
+    cast = placed((body for body in moulds.unit if body.kind == "layer"), half=not moulds.laid_later)
     eye = UNDER if below else LOW
     if not fed_through(moulds):
         yield "motor-in", View((*cast, *placed(inside, z=away)), (), eye, "unit", turned=below)
     yield "motor-home", View((*cast, *placed(inside)), eye=eye, group="unit", turned=below)
+
+
+def _skin_on(moulds: MouldSet) -> Views:
+    """Yield the view of the unit above the film that closes its skin side."""
+    if trays := moulds.plan.of_kind("tray"):
+        rim, colour = moulds.dimensions.heights[-1], layer_colour(len(moulds.plan.steps) - 1)
+        film = Extra(union(films(moulds.dimensions, moulds.plan.layout)), colour)
+        names = (Name("film", (moulds.plan.layout.cells[0].x, moulds.plan.layout.cells[0].y, rim), on=True),)
+        yield "skin-on", View((*placed(trays), *placed(moulds.plan.steps, z=rim + 2 * CLEAR)), (film,), names=names)
 
 
 def fed_through(moulds: MouldSet) -> bool:

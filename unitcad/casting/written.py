@@ -29,7 +29,7 @@ def _nine_digits(text: str) -> float:
 
 
 _NINE_DIGITS: msgspec.json.Decoder[Any] = msgspec.json.Decoder(float_hook=_nine_digits)
-UNPRINTED = "Nothing of this tooling has been printed yet."
+UNPRINTED = "Nobody has printed this tooling yet."
 
 
 def files(procedure: Procedure) -> dict[str, str]:
@@ -104,7 +104,7 @@ def to_markdown(procedure: Procedure) -> str:
     total, bench = duration(procedure.earliest_finish_min), duration(procedure.bench_min)
     out = "units and sheet are out of their moulds" if made == "sheet" else f"{made} is out of the mould"
     lines.append(f"The {out} **{total}** after the print, with {bench} at the bench (assumed).")
-    lines.append(f"What went wrong? {TROUBLES}.\n")
+    lines.append(f"Faults: {TROUBLES}.\n")
     if procedure.assembly:
         more = procedure.time_line[-1].end_min - procedure.earliest_finish_min
         lines[-1:-1] = [f"{procedure.last}: {duration(more)} more."]
@@ -160,7 +160,7 @@ def _listed_items(items: Iterable[Item]) -> Iterator[str]:
             plain.append(counted)
     for silicone, each in parts.items():
         equal = len(each) == 2 and each[0][:-1] == each[1][:-1]
-        yield f"- {silicone}: {f'{each[0]} and as much of B' if equal else listed(each)}"
+        yield f"- silicone {silicone}: {f'{each[0]} and as much of B' if equal else listed(each)}"
     if plain:
         yield f"- {listed(plain)}"
 
@@ -199,7 +199,10 @@ def _appendix(procedure: Procedure) -> Iterator[str]:
     sections = (f"![pour {pour.index} in section]({pour.drawing})" for pour in procedure.pours)
     yield from (" ".join(sections), "")
     for source, named in sources.items():
-        figures = (f"{markdown(name)} {listed(dict.fromkeys(each))} {unit}" for (name, unit), each in named.items())
+        figures = (
+            f"{markdown(name)} {listed(dict.fromkeys(each))}{unit and f' {unit}'}"
+            for (name, unit), each in named.items()
+        )
         yield f"- {'; '.join(figures)} ({markdown(source)})"
     for o in procedure.off_grid:
         height, by = number(o.height_mm, 3), number(o.moved_mm, 2)

@@ -11,14 +11,27 @@ from collections.abc import Iterator
 from unitcad.checks.check import MouldCheck
 from unitcad.checks.each_cavity import each_cavity
 from unitcad.checks.finding import MouldFinding, at_most
-from unitcad.kernels.mesh import thick_pieces
+from unitcad.kernels.mesh import realise, thick_pieces
 from unitcad.moulds.cavities import BALANCE, Cavity
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.skin_tray import films
+from unitcad.shape import cylinder, moved
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
-    """Compare the space that silicone can reach with the layer, in every cavity."""
-    return each_cavity(moulds, lambda cavity: _of_cavity(cavity, moulds.facets))
+    """Compare the space that silicone can reach with the layer, in every cavity, and with the film in a skin's tray."""
+    yield from each_cavity(moulds, lambda cavity: _of_cavity(cavity, moulds.facets))
+    for tray in moulds.plan.of_kind("tray"):
+        solid, dims = moulds.mesh(tray), moulds.plan.dimensions
+        rim, reach = dims.heights[-1], dims.outer_radius + moulds.spec.moulds.land_mm / 2
+        for i, (cell, drawn) in enumerate(
+            zip(moulds.plan.layout.cells, films(dims, moulds.plan.layout), strict=True), 1
+        ):
+            film = moulds.mesh_of(drawn)
+            column = realise(moved(cylinder(reach, rim - 2 * dims.skin, rim), cell.x, cell.y), moulds.segments)
+            hollow = column - solid
+            differ = hollow.volume() + film.volume() - 2 * (hollow ^ film).volume()
+            yield at_most("C100", f"{tray.name} cell {i}", differ / film.volume(), BALANCE, "share of the film")
 
 
 def _of_cavity(cavity: Cavity, facets: float) -> Iterator[MouldFinding]:

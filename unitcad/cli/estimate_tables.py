@@ -21,7 +21,7 @@ def print_estimate(data: dict[str, Any], details: bool = False) -> None:
     variant = data["variant"]
     layers = " / ".join(layer["material"] for layer in variant["layers"])
     rest = f": {variant['design']}, {layers}, {level(variant['frequency_hz'], digits=4)} Hz"
-    screen.print(Text.assemble((variant["name"], "bold"), rest))
+    screen.print(Text.assemble((variant["name"], "bold"), rest), soft_wrap=True)
     for line in [*data["answer"]["lines"], *(data["answer"]["details"] if details else [])]:
         screen.print(f"  {line}", soft_wrap=True)
     if "fem" in data:

@@ -15,6 +15,7 @@ from unitcad.designs.design import Design
 from unitcad.designs.dimensions import Dimensions
 from unitcad.designs.tooling import Tooling
 from unitcad.errors import Refusal, UnitcadError, unknown_name
+from unitcad.shape import cylinder
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
 from unitcad.spec.custom_code import is_custom
@@ -92,8 +93,8 @@ def layer_colour(index: int) -> tuple[float, float, float]:
 def unit_bodies(spec: Spec) -> tuple[Body, ...]:
     """Return the bodies of the unit as assembled on the skin z = 0: layers inside out, motor, circuit or wires.
 
-    "layer1" ... are cast. Motor ("motor"), circuit ("fpcb") and wires ("wire1" ...) are bought, and added if the design
-    draws none. Bodies of other names are printed.
+    "layer1" ... and "skin" are cast. Motor ("motor"), circuit ("fpcb") and wires ("wire1" ...) are bought, and added
+    if the design draws none. Bodies of other names are printed.
 
     Raises Refusal for a layer, circuit or wire that the spec lacks.
     """
@@ -118,6 +119,9 @@ def unit_bodies(spec: Spec) -> tuple[Body, ...]:
         step = names.index(name) + 1 if name in names else None
         kind, made = ("layer", "cast") if step else ("printed", "printed")
         bodies.append(Body(name, "unit", kind, shape, layer_colour(i), made=made, step=step))
+    if dims.skin:
+        film = cylinder(dims.outer_radius, -dims.skin, 0.0)
+        bodies.append(Body("skin", "unit", "film", film, layer_colour(len(names) - 1), made="cast"))
     return (*bodies, *(body for body in inside.values() if body.name not in drawn))
 
 

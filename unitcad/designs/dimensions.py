@@ -62,6 +62,7 @@ class Dimensions:
     motor_low       z of the motor's face towards the skin: it rests on the lip
     mouth_radius    radius of the lip's mouth; 0 without a lip
     lip_edge        height of the lip's upright edge
+    skin            thickness of the film over the skin side, from z = -skin to 0
     tapers          narrowing of core, and of the layers' outsides, for each mm upwards
     """
 
@@ -78,6 +79,7 @@ class Dimensions:
     motor_low: float = 0.0
     mouth_radius: float = 0.0
     lip_edge: float = 0.0
+    skin: float = 0.0
     tapers: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -145,6 +147,7 @@ def concentric(spec: Spec, core_height: float, exit: Exit | None) -> Dimensions:
         motor_low=low,
         mouth_radius=motor.diameter_mm / 2 - motor.lip_mm if motor.lip_mm else 0.0,
         lip_edge=edge,
+        skin=spec.skin_mm,
         # A filled cavity is as wide as the motor all the way up.
         tapers=(0.0 if motor.fill else taper, taper),
     )

@@ -22,11 +22,13 @@ LEDGE_SHARE = 0.95
 """Half the notch's width over the ledge's radius, at most: beyond it the tongue's round tip has prongs."""
 SLOT_CLEARANCE = 0.2
 """Least height of the slot over the circuit's thickness, or a wire's on each side of it, mm."""
+LEAST_SKIN = 0.3
+"""No film over the skin side is thinner, mm: it tears as it is peeled out of its tray (assumed)."""
 EPS = 1e-9
 
 
 def check_motor(spec: Spec, dims: Dimensions) -> None:
-    """Raise Refusal if motor, clearance and walls do not fit the diameter, and for a lip that can't be cast."""
+    """Raise Refusal if motor, clearance and walls do not fit, and for a lip or a skin that can't be cast."""
     clearance = 0.0 if spec.motor.fill else MOTOR_CLEARANCE + dims.tapers[0] * dims.motor_height
     walls = sum(layer.wall_mm for layer in spec.layers)
     at_least(
@@ -35,6 +37,8 @@ def check_motor(spec: Spec, dims: Dimensions) -> None:
         2 * (dims.motor_radius + clearance + walls),
         f"the motor ({2 * dims.motor_radius:g}), {clearance:.3g} of clearance and walls of {walls:g} a side need",
     )
+    if spec.skin_mm:
+        at_least("skin_mm", spec.skin_mm, LEAST_SKIN, "a film over the skin side, if any, has at least")
     if dims.mouth_radius or spec.motor.lip_mm:
         _check_lip(spec, dims)
 

@@ -147,7 +147,7 @@ def unit_section(
         low = dims.core_outline[-2][1]
         at = (dims.motor_radius + dims.cavity_radius) / 2, low + (dims.motor_height - low) / 3
         notes.append(Note("air", at))
-    return section(regions, _unit_measures(dims), notes)
+    return section(regions, _unit_measures(dims), notes, ground="" if dims.skin else "skin")
 
 
 def _measured(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[Measure]:
@@ -185,13 +185,13 @@ def _unit_measures(dims: Dimensions) -> list[Measure]:
         else Measure(f"R{_mm(dims.cavity_radius)}", 0, dims.cavity_radius, "below", 1, 0),
         Measure(f"Ø{_mm(2 * dims.outer_radius)}", -dims.outer_radius, dims.outer_radius, "below", 2, 0),
     ]
-    levels = sorted({0.0, dims.motor_height, dims.core_height, *dims.heights})
+    levels = sorted({-dims.skin, 0.0, dims.motor_height, dims.core_height, *dims.heights})
     reach = -dims.outer_radius
     inside = [level for level in levels if level != dims.motor_height or level == dims.core_height]
     for low, high in pairwise(inside):
         measures.append(Measure(_mm(high - low), low, high, "left", 0, reach))
     if len(inside) > 2:
-        measures.append(Measure(_mm(levels[-1]), 0, levels[-1], "left", 1, reach))
+        measures.append(Measure(_mm(levels[-1] - levels[0]), levels[0], levels[-1], "left", 1, reach))
     if dims.exit:
         low, high = dims.exit.low, dims.exit.high
         measures.append(

@@ -113,8 +113,8 @@ def score(points: tuple[Point, ...]) -> dict[str, Any]:
 
     `units`: each measured level, at 0 mm, with every model's, the 80 % range, and `blind`: whether the constants were
     fitted without it. `scores`: each model's geometric-mean factor error over the blind units. `decay`: each point
-    farther out over its unit's own level, with the skin's curve and its range under either drive and the paper's
-    exponential; `decay_scores` their factor errors.
+    farther out over its unit's own level. It has the skin's curve and range under either drive, and the paper's
+    exponential; `decay_scores` has their factor errors.
     """
     table = measured_table()
     everyone = np.ones((1, len(table.names)))

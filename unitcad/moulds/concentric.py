@@ -11,8 +11,9 @@ from unitcad.moulds.base import base, plate_bottom
 from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import cup
 from unitcad.moulds.layout import layout
-from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, lid_piece, stub_pieces, tongue_pieces
+from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, lid_piece, stub_pieces, tongue_pieces, tray_piece
 from unitcad.moulds.seals import seals
+from unitcad.moulds.skin_tray import skin_tray
 from unitcad.moulds.tongue import tongues
 from unitcad.shape import Shape
 from unitcad.spec import Spec, printer_of
@@ -37,6 +38,8 @@ def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     tools += tongue_pieces(tongues(dims, lay, cut=brittle), brittle)
     if design.suction:
         tools += stub_pieces([filament.stub(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells])
+    if dims.skin:
+        tools.append(tray_piece(skin_tray(spec, dims, lay)))
     if not injected:
         tools.append(blade_piece(blade(lay, dims.heights[-1])))
     return Tooling(

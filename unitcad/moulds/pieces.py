@@ -48,6 +48,11 @@ def stub_pieces(stubs: Sequence[Shape]) -> list[Body]:
     ]
 
 
+def tray_piece(shape: Shape) -> Body:
+    """Return the tray of a skin's film; it takes part in no pour."""
+    return Body("skin-tray", "tool", "tray", shape, _CUP)
+
+
 def blade_piece(shape: Shape, *, too_long: bool = False) -> Body:
     """Return the blade, printed upside down; it is part of no pour.
 

@@ -113,7 +113,7 @@ class Plan:
             return "tray"
         numbered = ((split.tool, i, piece.name) for split in self.splits for i, piece in enumerate(split.pieces, 1))
         tool, number = next(((tool, f", piece {i}") for tool, i, piece in numbered if piece == name), ("", ""))
-        return f"{self.called(tool)}{number}" if tool else spaced(name)
+        return f"{self.called(tool)}{number}" if tool else spaced(name).replace("-", " ")
 
     def walled(self, step: Step) -> str:
         """Return the name of the piece that has a pour's wall and rim: its cup, else the piece that stays."""
@@ -149,7 +149,9 @@ def plan(spec: Spec) -> Plan:
     laid = tuple(replace(b, shape=union(placed(b.shape, dims, cell) for cell in lay.cells)) for b in laid)
     tails = sum(len(cell.sides) for cell in lay.cells) if dims.exit else 0
     pours = range(1, len(layers) + 1)
-    standing = [[tool for tool in tools if tool.kind != "blade" and tool.step in (None, pour)] for pour in pours]
+    standing = [
+        [tool for tool in tools if tool.kind not in ("blade", "tray") and tool.step in (None, pour)] for pour in pours
+    ]
     steps = tuple(
         Step(
             index=i + 1,
@@ -201,7 +203,7 @@ def cast_layers(spec: Spec) -> tuple[Shape, ...]:
 
     Raises Refusal if the design draws others than the spec has layers for.
     """
-    bodies = sorted((body for body in unit_bodies(spec) if body.made == "cast"), key=lambda body: body.step or 0)
+    bodies = sorted((body for body in unit_bodies(spec) if body.kind == "layer"), key=lambda body: body.step or 0)
     if len(bodies) != len(spec.layers):
         drawn = ", ".join(body.name for body in bodies) or "none"
         limit = f"moulds need each of the spec's {len(spec.layers)} [[layers]] drawn as layer1 ...; it draws {drawn}"
@@ -224,6 +226,8 @@ def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str)
         letters = corner_labels(spec, lay, rim, (f"C{tool.step:X}", *corners)) + cell_numbers(spec, lay, rim)
     elif tool.kind == "lid" and tool.step:
         letters = corner_labels(spec, lay, lid.lid_top(dims, tool.step - 1), (f"L{tool.step:X}", *corners))
+    elif tool.kind == "tray":
+        letters = corner_labels(spec, lay, dims.heights[-1], ("F", *corners))
     else:
         return tool
     return replace(tool, shape=engraved(tool.shape, letters))

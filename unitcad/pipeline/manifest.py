@@ -188,7 +188,7 @@ def of_unit(
         parts=[
             {
                 **part,
-                "material": spec.layers[part["step"] - 1].material if part["made"] == "cast" and part["step"] else None,
+                "material": spec.layers[(part["step"] or 0) - 1].material if part["made"] == "cast" else None,
             }
             for part in shape["parts"]
         ],
@@ -258,8 +258,8 @@ def row(unit: Spec, manifest: Manifest) -> dict[str, Any]:
         if own and part["role"] == "unit" and part["material"] is not None:
             # g/cm3 times mm3 is mg.
             mass = part["volume_mm3"] * float(densities[part["material"]].density_g_cm3) / 1000
-            columns[f"layer{part['step']}_volume_mm3"] = float(f"{part['volume_mm3']:.9g}")
-            columns[f"layer{part['step']}_mass_g"] = float(f"{mass:.6g}")
+            columns[f"{part['name']}_volume_mm3"] = float(f"{part['volume_mm3']:.9g}")
+            columns[f"{part['name']}_mass_g"] = float(f"{mass:.6g}")
             total += mass
     if total:
         columns["silicone_mass_g"] = float(f"{total:.6g}")

@@ -95,8 +95,8 @@ def unit_apart(moulds: MouldSet) -> dict[str, Offset]:
     if moulds.design.opens == "above" and not moulds.design.laid_in:
         order = [*reversed(layers), *inside]
     offsets: dict[str, Offset] = {}
-    top = 0.0
-    for body in order:
+    top = -moulds.dimensions.skin
+    for body in sorted(order, key=lambda body: body.kind != "film"):
         _, _, low, _, _, high = bounds(moulds.mesh(body))
         lift = max(0.0, top - low)
         offsets[body.name] = (0.0, 0.0, lift)

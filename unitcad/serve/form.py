@@ -132,7 +132,7 @@ def _field(path: str, label: str, kind: Any, value: Any, given: bool, choices: l
     members = [one for one in alternatives(kind) if one is not type(None)]
     words = _words(kind)
     # One number for all entries of a list has their range.
-    limits = list(notes(kind)) or list(notes(entry_in(kind)))
+    limits = [*notes(kind), *notes(entry_in(kind))]
     low = next((float(note.ge) for note in limits if note.ge is not None), None)
     high = next((float(note.le) for note in limits if note.le is not None), None)
     how: Literal["number", "integer", "word", "words", "text", "switch", "toml"]

@@ -11,6 +11,7 @@ from unitcad.shape.tree import UNTURNED, Place, Shape
 
 Kind = Literal[
     "layer",
+    "film",
     "printed",
     "motor",
     "circuit",
@@ -21,6 +22,7 @@ Kind = Literal[
     "tongue",
     "stub",
     "blade",
+    "tray",
     "coupon",
     "frame",
     "holder",

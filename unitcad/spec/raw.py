@@ -283,6 +283,10 @@ class RawSpec(Table, frozen=True, kw_only=True):
         str, Meta(description="a design (unitcad list designs), FILE.py:NAME, or a file of bodies (.step, .stl, .3mf)")
     ]
     diameter_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM, description="diameter of the unit")]
+    skin_mm: Annotated[
+        float,
+        Meta(ge=0, le=20, description="thickness of a film of the last layer's silicone over the skin side; 0: none"),
+    ] = 0.0
     motor: MotorTable = MotorTable(part=DEFAULT_MOTOR)
     fpcb: FpcbTable | None = None
     wires: WiresTable | None = None

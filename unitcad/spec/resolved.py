@@ -189,6 +189,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
     name: str
     design: str
     diameter_mm: float
+    skin_mm: float
     motor: MotorSize
     fpcb: Circuit | None
     wires: Wires | None
@@ -213,6 +214,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
             design: str,
             diameter_mm: float,
             layers: Sequence[LayerTable | CastLayer | _Keys],
+            skin_mm: float = 0.0,
             motor: MotorTable | MotorSize | _Keys = ...,
             fpcb: FpcbTable | Circuit | _Keys | None = None,
             wires: WiresTable | _Keys | None = None,

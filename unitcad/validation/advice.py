@@ -46,9 +46,9 @@ def _leads(spec: Spec) -> list[str]:
 
 def _not_estimated(spec: Spec) -> list[str]:
     """Say that no measured unit has the features that the estimate does not read."""
-    if not spec.motor.lip_mm:
-        return []
-    return ["motor.lip_mm: no measured unit has a lip; the estimate is that of the unit without it"]
+    found = {"motor.lip_mm": ("a lip", spec.motor.lip_mm), "skin_mm": ("a closed skin side", spec.skin_mm)}
+    without = "; the estimate is that of the unit without it"
+    return [f"{key} = {mm:g} mm: no measured unit has {what}{without}" for key, (what, mm) in found.items() if mm]
 
 
 def _roof(spec: Spec) -> list[str]:

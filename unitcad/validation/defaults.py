@@ -36,6 +36,8 @@ def resolve(raw: RawSpec) -> Spec:
             raise Refusal("design_source", None, f"is required with design = {raw.design!r}")
         if is_body_file(raw.design) and raw.parameters:
             raise Refusal("parameters", "...", f"nothing reads them: {raw.design} is a file of bodies")
+        if raw.skin_mm:
+            raise Refusal("skin_mm", raw.skin_mm, "a custom design draws its own skin side", 0.0)
     else:
         for field in ("parameters", "design_source"):
             if getattr(raw, field):
@@ -61,6 +63,7 @@ def _with_defaults(raw: RawSpec, design: Design) -> Spec:
         name=raw.name,
         design=raw.design,
         diameter_mm=raw.diameter_mm,
+        skin_mm=raw.skin_mm,
         motor=motor,
         fpcb=fpcb,
         wires=raw.wires,

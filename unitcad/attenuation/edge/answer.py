@@ -37,7 +37,7 @@ def answer(
 ) -> dict[str, Any]:
     """Return the answer of an estimate (`estimates.estimate`) as data.
 
-    `lines`: the two that lead, `headline` the first without its source; `details`: their confidence.
+    `lines`: the two that lead, `headline` the first without its source; `details`: how sure they are.
     `level`: the headline's, measured or else `p50` (null if a modulus is known as a range only). `p10`, `p50` and
     `p90`: the leading model's median and 80 % range, fractions of the motor's amplitude. `levels`: each model's edge
     level; `analytic`: those of the paper's model. Errors are factors with the unit left out. `held`: how many of the
@@ -104,7 +104,7 @@ def _measured(estimated: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _headline(data: dict[str, Any], levels: dict[str, Any]) -> str:
-    """Say the measured level, or the expected one, and the range."""
+    """Return the measured or expected level, and the range, in words."""
     if data["p50"] is None:
         return f"Not known: {levels[RULE]['reason']}."
     where = "of the motor's amplitude at the edge"

@@ -22,7 +22,7 @@
     const names = (parts) => [...new Set(parts.map((part) => part.name))];
     const ofUnit = [{ title: `The ${model.makes || "unit"}`, parts: alone, names: names(alone) }];
     if (!tools) return { unit: ofUnit, moulds: [] };
-    const layers = unit.filter((mesh) => mesh.extras.made === "cast");
+    const layers = unit.filter((mesh) => mesh.extras.made === "cast" && mesh.extras.step);
     const inMoulds = [
       ...tools.map((mesh) => ({ name: mesh.name, mesh, place: mesh.places[0], offset: model.moulds_apart[mesh.name] })),
       ...layers.flatMap((mesh) => model.cells.map((place) => ({ name: mesh.name, mesh, place, offset: model.moulds_apart[mesh.name] }))),

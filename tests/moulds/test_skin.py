@@ -1,0 +1,100 @@
+"""A film that closes the skin side: drawn below z = 0, cast in a tray, its silicone bought, its steps at the end."""
+
+import math
+from pathlib import Path
+
+import pytest
+from casting_rules import broken_rules
+from faulty_sets import mesh_findings, set_of, with_fault
+
+from unitcad.arrays.array_file import load_array
+from unitcad.casting.procedure import procedure
+from unitcad.casting.views import picture_path, views
+from unitcad.checks import check_moulds, overlap
+from unitcad.checks.balance import findings as balance
+from unitcad.errors import Refusal
+from unitcad.pipeline.write import build
+from unitcad.shape import cut, cylinder, moved, union
+from unitcad.validation import load, templates, warnings
+
+SETS = [
+    ("encapsulating", "skin_mm=0.5"),
+    ("embedded", "skin_mm=0.3", "moulds.cavities=[2,2]"),
+    ("no-fpcb", "skin_mm=1.0", "motor.lip_mm=0.3", "moulds.draft_deg=2"),
+    ("three-layer", "skin_mm=0.6", "moulds.printer=sla", "moulds.pour=injected"),
+]
+
+
+@pytest.mark.parametrize("source", SETS, ids=" ".join)
+def test_every_mould_check_holds_and_the_tray_prints(source):
+    moulds = set_of(*source)
+    found = check_moulds(moulds)
+    assert [finding for finding in found if not finding.ok] == []
+    assert [finding for finding in overlap.of_unit(moulds) if not finding.ok] == []
+    assert sum(f.where.startswith("skin-tray cell") for f in found) == len(moulds.plan.layout.cells)
+    assert mesh_findings(moulds) == []
+
+
+def test_the_film_is_a_disc_below_the_skin_plane_and_adds_its_mass(tmp_path):
+    built = build(load("encapsulating", ["skin_mm=0.5", "output.formats=['stl']"]), tmp_path, only=("unit", "moulds"))
+    (film,) = [part for part in built.manifest["parts"] if part["name"] == "skin"]
+    assert film["volume_mm3"] == pytest.approx(math.pi * 7**2 * 0.5, rel=1e-3)
+    assert film["bbox_mm"][2::3] == pytest.approx([-0.5, 0.0])
+    assert film["material"] == "dragon-skin-30"
+    assert (built.folder / "moulds" / "skin-tray.stl").is_file()
+    assert (built.folder / "unit" / "skin.stl").is_file()
+
+
+@pytest.mark.parametrize("source", SETS, ids=" ".join)
+def test_the_procedure_ends_with_the_skin(source):
+    moulds = set_of(*source)
+    made = procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
+    assert broken_rules(made) == []
+    on, cure = made.assembly[-2:]
+    assert (on.title, cure.title) == ("Skin on", "Let the skin cure")
+    assert on.picture == picture_path("skin-on")
+    assert "skin-on" in views(moulds)
+    last, cells = moulds.spec.layers[-1].material, len(moulds.plan.layout.cells)
+    assert cure.wait_min == pytest.approx(60 * made.pours[-1].cure_h)
+    bought = sum(i.quantity for i in made.bill if i.item.startswith(f"{last} part"))
+    poured = sum(p.part_a_g + p.part_b_g for p in made.pours if p.material == last)
+    film = cells * math.pi * (moulds.spec.diameter_mm / 2) ** 2 * moulds.spec.skin_mm / 1000
+    assert bought - poured >= max(2.0, 1.5 * film)
+    assert "skin tray" in {item.item for item in made.bill}
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        lambda tray: union((tray, moved(cylinder(1, 0, 0.3), 0, 0, 4.1))),  # a bump on the floor
+        lambda tray: cut(tray, [cylinder(1, 0, 4.2)]),  # a hole through it
+        lambda tray: moved(tray, 0.05),  # off its place
+    ],
+    ids=["bump", "hole", "aside"],
+)
+def test_a_fault_in_the_tray_breaks_balance(fault):
+    faulty = with_fault(set_of("encapsulating", "skin_mm=0.5"), "skin-tray", fault)
+    assert [f.where for f in balance(faulty) if not f.ok] == ["skin-tray cell 1"]
+
+
+def test_without_a_skin_there_is_no_tray():
+    for name in templates():
+        assert "skin-tray" not in {tool.name for tool in set_of(name).plan.tools}
+
+
+def test_refused_with_a_value_that_is_accepted():
+    with pytest.raises(Refusal) as refused:
+        load("encapsulating", ["skin_mm=0.1"])
+    assert (refused.value.field, refused.value.nearest) == ("skin_mm", 0.3)
+    with pytest.raises(Refusal, match="draws its own skin side"):
+        load(str(Path(__file__).parents[2] / "templates/custom/strap-lugs.toml"), ["skin_mm=0.5"])
+    asked = load_array("forearm-pockets").asked
+    with pytest.raises(Refusal) as refused:
+        load_array({**asked, "unit": {**asked["unit"], "skin_mm": 0.5}})
+    assert refused.value.field == "unit.skin_mm"
+
+
+def test_the_estimate_is_said_to_be_that_of_the_open_unit():
+    assert any(
+        "no measured unit has a closed skin side" in line for line in warnings(load("embedded", ["skin_mm=0.5"]))
+    )
