@@ -53,7 +53,7 @@ def test_a_lost_link_fails_the_site(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "mkdocs.yml", tmp_path)
     with (tmp_path / "docs/index.md").open("a") as page:
-        page.write("\n[x](nowhere.md) [y](spec.md#nothing)\n")
+        page.write("\n[x](nowhere.md) [y](reference/spec.md#nothing)\n")
     done = build(tmp_path, tmp_path / "site")
     assert done.returncode != 0
     assert "nowhere.md" in done.stdout + done.stderr

@@ -104,7 +104,7 @@ def test_the_command_ends_as_the_outcome_says(seed, ranges, tmp_path):
 
 
 def test_the_docs_have_the_documented_ranges():
-    page = (Path(__file__).parents[2] / "docs" / "spec.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "spec.md").read_text("utf-8")
     for name, low, high in DOCUMENTED.rows():
         assert f"| `{name}` | {low:g} | {high:g} |" in page, name
 

@@ -25,7 +25,7 @@ from unitcad.validation import load
 
 SLOW = ["layers.0.wall_mm=1.3", "estimate.moduli=quasi-static"]
 PAPER = {"rule": 1.29, "divider": 1.76, "published": 2.02, "baseline": 1.33}
-"""The scores by quasi-static moduli that docs/fitting.md prints."""
+"""The scores by quasi-static moduli that docs/how-to/fit.md prints."""
 
 
 def left_out(table: MeasuredTable) -> float:

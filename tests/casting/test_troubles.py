@@ -11,7 +11,7 @@ from unitcad.spec.fields import entry_in, fields_of, table_in
 from unitcad.spec.raw import RawSpec
 from unitcad.validation import load
 
-PAGE = Path(__file__).parents[2] / "docs" / "troubleshooting.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "troubleshooting.md"
 
 
 def signs(*source: str) -> set[str]:

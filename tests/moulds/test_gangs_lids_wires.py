@@ -239,7 +239,7 @@ def test_a_connector_that_would_tear_the_slot() -> None:
 def test_docs_list_every_code() -> None:
     from unitcad.checks import mould_checks
 
-    page = (Path(__file__).parents[2] / "docs" / "moulds.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "explanation" / "moulds.md").read_text("utf-8")
     assert all(f"| {code} |" in page for code in mould_checks())
 
 

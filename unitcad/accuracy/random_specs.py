@@ -76,7 +76,7 @@ DOCUMENTED = Ranges(
     tolerance_mm=(0.002, 0.1),
     cavities=(1, 2),
 )
-"""The ranges that docs/spec.md calls tried: at least 60 % of the specs drawn here build."""
+"""The ranges that docs/reference/spec.md calls tried: at least 60 % of the specs drawn here build."""
 
 EXTREME = Ranges(
     diameter_mm=(10.0, 200.0),
