@@ -267,10 +267,10 @@ if TYPE_CHECKING:
         tensile_mpa: _Number = None
         elongation_pct: _Number = None
         casting_floor_mm: _Number = None
-        shrinkage_percent: _Number = None
         poisson_ratio: _Number = None
         loss_factor: _Number = None
         mix_ratio: _Number = None
+        shrinkage_percent: _Number = None
         youngs_modulus_kpa: _Number = None
         quasistatic_modulus_kpa: _Number = None
         fractional_mu0_kpa: _Number = None

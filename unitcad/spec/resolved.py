@@ -158,6 +158,8 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
         A design (``unitcad list designs``), "FILE.py:NAME", or a file of bodies.
     diameter_mm : float
         Diameter of the unit, mm.
+    skin_mm : float, optional
+        Thickness of the film that closes the skin side, mm. Default: 0, no film.
     layers : sequence of Layer or dict
         The silicone layers, from the inside out; one is a single-layer control.
     motor : Motor or dict, optional
