@@ -54,8 +54,7 @@ from unitcad.casting.written import step_section
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
 from unitcad.errors import Refusal
-from unitcad.moulds.groove_depths import shallow_grooves
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finished, geometry, mould_findings, record
 from unitcad.pipeline.manifest import (
     CASTING,
