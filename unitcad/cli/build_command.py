@@ -67,6 +67,7 @@ def build(
     as_json: AsJson = False,
 ) -> None:
     """Make a unit and its casting moulds, or an array of units. The last line printed is the folder."""
+    specs = [confirm_known(spec) for spec in specs]
     once = partial(_built, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
     if not watch:
         if not once():
@@ -107,8 +108,6 @@ def _built(
     changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
     allow_code(code)
     # Every spec is validated before the first one is built.
-    for spec in specs:
-        confirm_known(spec)
     wanted = [load_subject(spec, changes) for spec in specs]
     for spec in wanted if slicing else ():
         check_slicing(spec.unit, chosen)
