@@ -82,7 +82,8 @@ def test_a_file_of_another_kind_is_named_with_its_command_and_a_bare_name_finds_
         done = _run(*words.split(), cwd=tmp_path)
         assert (done.returncode, done.stderr) == (2, f"error: {told}\n"), words
     done = _run("build", "mine", "--only", "unit", "--formats", "stl", cwd=tmp_path)
-    assert done.returncode == 0 and done.stdout.startswith(str(Path("out", "single-embedded-")))
+    assert done.returncode == 0
+    assert done.stdout.startswith(str(Path("out", "single-embedded-")))
 
 
 def test_an_output_that_is_a_file_is_refused(tmp_path: Path) -> None:

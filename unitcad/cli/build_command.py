@@ -153,6 +153,8 @@ def _print_faults(manifest: Manifest) -> None:
             warn(f"note: STEP left out: {entry['reason']}; {install_command('step')}")
     checks = manifest["mould_checks"]
     for check in checks:
+        if check["ok"] and check["advice"]:
+            warn(f"note: {check['code']} {check['where']}: {check['advice']}")
         if not check["ok"]:
             measured = f"{check['value']:.3g} {check['unit']}, limit {check['limit']:.3g}"
             advice = f"; {check['advice']}" if check["advice"] else ""

@@ -227,7 +227,7 @@ def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> N
     ]
     typer.echo("; ".join(parts))
     there = (folder / PAGE).is_file()
-    warn(f"open {folder / PAGE}" if there else f"unitcad report {shlex.quote(str(folder))} writes its page")
+    typer.echo(f"open {folder / PAGE}" if there else f"unitcad report {shlex.quote(str(folder))} writes its page")
     typer.echo(str(folder))
 
 

@@ -53,7 +53,7 @@ _UNIT = re.compile(r"_(mm|deg|percent|hz|um|c|g|pct|kpa|kg_m3)$")
 def label(values: Mapping[str, Any]) -> str:
     """Return the swept values as a variant's name has them, such as wall1.2-cap1: keys without units.
 
-    A word of a spec, such as a silicone's, stands alone. Keys that end alike have their entry's number: wall1-1.2.
+    A word, such as the name of a silicone, has no key. Keys that end alike have their entry's number: wall1-1.2.
     """
     short = {path: _UNIT.sub("", path.rpartition(".")[2]).replace("_", "-") for path in values}
     often = Counter(short.values())

@@ -245,8 +245,9 @@ def all_faults(first: Refusal, data: Mapping[str, Any], text: str) -> list[Refus
 
 def _file(source: Source) -> Path | None:
     """Return the file that a text names by its path."""
-    text = spelled(os.fspath(source), every_template()) if isinstance(source, str | os.PathLike) else ""
-    return Path(text) if is_path(text) else None
+    known = every_template()
+    text = spelled(os.fspath(source), known) if isinstance(source, str | os.PathLike) else ""
+    return Path(text) if is_path(text) and text not in known else None
 
 
 def _parsed(raw: str) -> Any:
