@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import unitcad
+from benchmarks.size import ROOMS
 from unitcad.designs import shipped
 from unitcad.rooms import commands, file_kinds
 from unitcad.validation import default_template, templates
@@ -42,8 +43,6 @@ FLOORS = [
     {"text", "json_text", "notebook", "geometry"},
     {"rooms"},
 ]
-ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
-"""Each can be deleted; none stands on another."""
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 LIVE = {Path(importlib.util.find_spec(kind.page).origin or "") for kind in file_kinds() if kind.page}
 CAD = ("OCP", "build123d", "cadquery")

@@ -27,7 +27,6 @@ from unitcad import attenuation
 from unitcad.catalogue import entries
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec.raw import RawSpec
-from unitcad.sweeps import batch
 
 PACKAGE = Path(unitcad.__file__).parent
 LAYERS: list[dict[str, Any]] = [
@@ -136,7 +135,6 @@ def test_signatures_are_those_of_a_file() -> None:
     required = [name for name, key in keys.items() if key.default is key.empty]
     assert required == ["name", "design", "diameter_mm", "layers"]
     assert list(inspect.signature(unitcad.check).parameters)[:2] == ["files", "printer"]
-    assert list(inspect.signature(batch).parameters)[:2] == ["sweep", "out"]
 
 
 def test_the_typed_material_is_the_one_that_a_spec_takes() -> None:
@@ -289,41 +287,42 @@ class _Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
-def _shown(tmp_path: Path) -> dict[str, Any]:
+def _shown(tmp_path: Path) -> list[Any]:
     hostile = {**UNIT, "name": "<script>alert(1)</script>&" + "long" * 22}
     spec = unitcad.Spec(**hostile)
     good, bad = tmp_path / "<b>good.stl", tmp_path / "bad.stl"
     trimesh.creation.box((9, 9, 9)).export(good)
     bad.write_text("solid x\nfacet\n")
-    sweep = tmp_path / "few.toml"
-    sweep.write_text('base = "encapsulating"\n[sweep]\ndiameter_mm = [14.0, 15.0]\n')
-    return {
-        "spec": spec,
-        "variant": unitcad.Variant(spec),
-        "estimate": unitcad.estimate(spec),
-        "build": unitcad.build(spec, tmp_path / "out", only=["unit"], formats=["stl"]),
-        "check": unitcad.check(good, bad, tmp_path / "missing.stl"),
-        "batch": batch(sweep, tmp_path / "few", only=["estimate"], set={"layers.0.wall_mm": 1.3}),
-    }
+    return [
+        spec,
+        unitcad.Variant(spec),
+        unitcad.estimate(spec),
+        unitcad.build(spec, tmp_path / "out", only=["unit"], formats=["stl"]),
+        unitcad.check(good, bad, tmp_path / "missing.stl"),
+    ]
+
+
+def check_shown(value: Any) -> None:
+    """Check that a result is short to print, and that its table is whole and holds no script."""
+    assert len(repr(value)) <= 200
+    assert "\n" not in repr(value)
+    assert len(max(map(repr, getattr(value, "reports", ())), key=len, default="")) <= 200
+    tags = _Tags()
+    tags.feed(value._repr_html_())
+    tags.close()
+    assert tags.open == []
+    assert tags.seen <= {"table", "caption", "tr", "th", "td", "img", "src", "alt"}
+    for image in tags.images:
+        kind, _, content = image.partition(",")
+        assert kind == "data:image/svg+xml;base64"
+        svg = base64.b64decode(content).decode()
+        assert svg.startswith("<svg")
+        assert "<script" not in svg
 
 
 def test_reprs_are_short_and_html_holds_no_script(tmp_path: Path) -> None:
-    for name, value in _shown(tmp_path).items():
-        assert len(repr(value)) <= 200, name
-        assert "\n" not in repr(value)
-        assert len(max(map(repr, getattr(value, "reports", ())), key=len, default="")) <= 200
-        html = value._repr_html_()
-        tags = _Tags()
-        tags.feed(html)
-        tags.close()
-        assert tags.open == [], name
-        assert tags.seen <= {"table", "caption", "tr", "th", "td", "img", "src", "alt"}, name
-        for image in tags.images:
-            kind, _, content = image.partition(",")
-            assert kind == "data:image/svg+xml;base64"
-            svg = base64.b64decode(content).decode()
-            assert svg.startswith("<svg")
-            assert "<script" not in svg
+    for value in _shown(tmp_path):
+        check_shown(value)
     assert repr(unitcad.load("encapsulating")) == (
         "Spec('encapsulating': encapsulating, 14 mm, ecoflex-00-10 1.25 / dragon-skin-30 1.25)"
     )
@@ -360,11 +359,6 @@ def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
         (lambda: unitcad.build("embedded", only="units"), "^only = 'units': not known"),
         (lambda: unitcad.build("embedded", only=[3]), "^only = 3: takes a text or a list of"),  # type: ignore[list-item]
         (lambda: unitcad.estimate("embedded", models=3), "^models = 3: takes a text or"),  # type: ignore[arg-type]
-        (lambda: batch("publishd"), "^sweep = 'publishd': not known"),
-        (lambda: batch(None), "^sweep: takes a path, not NoneType$"),  # type: ignore[arg-type]
-        (lambda: batch("published", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
-        (lambda: batch("published", limit=0), "^limit = 0: must be a whole number from 1 "),
-        (lambda: batch("published", jobs=0, timeout=3), "^timeout = 3: only a worker process"),
         (lambda: unitcad.check("a.stl", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
         (lambda: unitcad.check("a.stl", timeout=True), "^timeout = true: must be a number"),
         (lambda: unitcad.check(["a.stl"]), r'^files = \["a.stl"\]: takes a path, not list$'),  # type: ignore[arg-type]

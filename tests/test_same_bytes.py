@@ -10,11 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.arrays.array_file import array_templates
+from unitcad.rooms import file_kinds
 from unitcad.validation import templates
+from unitcad.validation.shipped_files import shipped_of
 
-QUICK = ("encapsulating", "forearm-patch")
-ALL = sorted({*templates(), *array_templates()})
+BUILT = [sorted(templates()), *(sorted(shipped_of(kind)) for kind in file_kinds() if kind.subject)]
+QUICK = ["encapsulating", *(names[0] for names in BUILT[1:])]
+ALL = [name for names in BUILT for name in names]
 
 
 def built(name: str, seed: int, folder: Path) -> dict[str, str]:

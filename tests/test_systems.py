@@ -79,14 +79,6 @@ def test_other_names_are_no_devices(name: str) -> None:
     assert not files.names_device(name)
 
 
-def test_a_batch_s_folder_is_no_device() -> None:
-    from unitcad.sweeps.sweep import from_file
-
-    data = {"base": "encapsulating", "name": "Con", "sweep": {"diameter_mm": [14.0, 15.0]}}
-    assert from_file(data, Path(), "x").slug == "con-batch"
-    assert from_file({**data, "name": "Cone"}, Path(), "x").slug == "cone"
-
-
 def test_the_version_of_the_code_is_the_same_on_every_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same files by another separator, in the order in which another system sorts them."""
     for name in ("a/b.py", "a.py", "B.py", "a-b/c.toml"):

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import base64
 import gzip
+import io
 import json
 import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 from casting_rules import broken_rules
 
+from tests.report.test_glb import chunks
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_hash, load_array
 from unitcad.arrays.array_procedure import pocket_procedure
+from unitcad.arrays.array_view import patch_glb
 from unitcad.arrays.arrayed import unit_folders
-from unitcad.arrays.patch import patch_bodies, patch_moulds
+from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.cache import MemoryStore
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.steps import duration, in_short
@@ -211,3 +216,22 @@ def test_a_back_sheet_is_written_as_step(tmp_path: Path, store: MemoryStore) -> 
     for back, body in zip((layer1, sheet), bodies, strict=False):
         assert back.colour == pytest.approx(body.colour, abs=1e-6)
         assert back.measures.volume == pytest.approx(realise(body.shape, 720).volume(), rel=1e-4)
+
+
+def test_a_unit_s_bodies_are_in_a_patch_once_and_stand_at_every_place():
+    turned = {"kind": "list", "points_mm": [[-20.5, 1], [2, 3], [30, -4]]}
+    places = [{"at": "P2", "angle_deg": 37.5}]
+    array = load_array("forearm-pockets", {"layout": turned, "place": places, "sheet.strap_slot_mm": [3, 8]})
+    moulds = patch_moulds(array).blank
+    content = patch_glb(moulds, patch_parts(array))
+    document, _ = chunks(content)
+    names = [mesh["name"] for mesh in document["meshes"]]
+    assert names == ["sheet", "layer1", "layer2", "motor", "fpcb"]
+    scene = trimesh.load(io.BytesIO(content), file_type="glb")
+    bodies = patch_bodies(array)
+    assert sorted(node["name"] for node in document["nodes"][1:]) == sorted(body.name for body in bodies)
+    for body in bodies:
+        matrix, name = scene.graph.get(body.name)
+        mesh = scene.geometry[name].copy().apply_transform(matrix)
+        x0, y0, z0, x1, y1, z1 = moulds.mesh(body).bounding_box()
+        assert mesh.bounds * 1e3 == pytest.approx(np.array([[x0, z0, -y1], [x1, z1, -y0]]), abs=1e-4)

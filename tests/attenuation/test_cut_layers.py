@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -16,9 +15,6 @@ from unitcad.attenuation.edge.variant_units import merged
 from unitcad.attenuation.fem.motor_level import level as finite_elements
 from unitcad.attenuation.fem.prior_range import ALIKE
 from unitcad.estimating import estimate_input, estimate_spec
-from unitcad.spec import Spec
-from unitcad.sweeps.estimate_table import evaluate
-from unitcad.sweeps.sweep import from_file
 from unitcad.validation import from_data
 
 MATERIALS = ("ecoflex-00-10", "ecoflex-00-30", "dragon-skin-10-medium", "dragon-skin-30")
@@ -143,16 +139,3 @@ def test_two_pieces_of_one_silicone_are_named_by_the_first() -> None:
         "layers.2.wall_mm",
     }
     assert seen["tested"]["layers.2.youngs_modulus_kpa"]["of"] == 2
-
-
-def test_a_batch_gives_each_variant_the_level_of_its_estimate() -> None:
-    """The table's arrays merge as the estimate does: silicones and walls of three layers, swept."""
-    axes = {f"layers.{i}.material": [*MATERIALS[:1], *MATERIALS[2:]] for i in range(3)}
-    sweep = from_file({"base": "three-layer", "sweep": {**axes, "layers.1.wall_mm": [1.0, 1.5]}}, Path(), "cut")
-    (block,) = evaluate(sweep, sweep.count)
-    for index in range(sweep.count):
-        spec = sweep.spec(index)
-        assert isinstance(spec, Spec)
-        models = estimate_spec(spec)["models"]
-        for model in MODELS:
-            assert float(block.levels[model][index]) == pytest.approx(models[model]["edge_level"]["value"], rel=1e-8)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,16 +10,9 @@ from typer.testing import CliRunner
 
 from unitcad.attenuation.edge.closed_form import published_path
 from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table, whole_ratio
-from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.catalogue import materials
 from unitcad.cli import app
-from unitcad.estimating import estimate_input, estimate_spec
-from unitcad.search.candidates import candidates
-from unitcad.search.proposals import leads_block
-from unitcad.search.target_file import target_of
-from unitcad.sweeps.estimate_table import evaluate
-from unitcad.sweeps.insensitive_keys import swept_estimate
-from unitcad.sweeps.sweep import from_file
+from unitcad.estimating import estimate_spec
 from unitcad.validation import load
 
 SLOW = ["layers.0.wall_mm=1.3", "estimate.moduli=quasi-static"]
@@ -72,33 +64,6 @@ def test_the_level_has_the_constant_fitted_with_such_moduli() -> None:
     at = table.names.index("embedded E10/D30")
     level = estimate_spec(spec)["models"]["published"]["edge_level"]["value"]
     assert level == pytest.approx(s * path[at], rel=1e-4)
-
-
-def test_a_sweep_of_the_source_has_each_variant_s_own_levels() -> None:
-    sweep = from_file({"base": "embedded", "sweep": {"estimate.moduli": ["small-strain", "quasi-static"]}}, Path(), "s")
-    levels = next(iter(evaluate(sweep, sweep.count))).levels
-    for i, moduli in enumerate(("small-strain", "quasi-static")):
-        models = estimate_spec(load("embedded", [f"estimate.moduli={moduli}"]))["models"]
-        for model, block in models.items():
-            assert levels[model][i] == pytest.approx(block["edge_level"]["value"], rel=1e-6)
-    slow = from_file(
-        {"base": "embedded", "sweep": {"estimate.moduli": ["quasi-static"], "layers.0.wall_mm": [1.2, 1.3]}},
-        Path(),
-        "s",
-    )
-    found = swept_estimate(slow, slow.count)
-    assert found is not None
-    assert found.typical_error["published"] == pytest.approx(left_out(measured_table("quasi-static")), rel=1e-4)
-
-
-def test_a_design_s_range_is_that_of_the_estimate() -> None:
-    target = target_of({"target": {"edge_max": 0.3}, "estimate": {"moduli": "quasi-static"}, "vary": {"layers": [2]}})
-    assert leads_block(target)["by"] == "the paper's nine levels, by the moduli of a slow pull"
-    found = candidates(target)
-    spec = found.spec(3)
-    expected = predictive_of([estimate_input(spec)])
-    assert found.probability[3] == pytest.approx(expected.at_most(0.3)[0], rel=1e-9)
-    assert spec.estimate.moduli == "quasi-static"
 
 
 def test_the_terminal_and_the_json_say_it() -> None:

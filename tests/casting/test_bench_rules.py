@@ -9,9 +9,6 @@ import pytest
 from casting_rules import broken_rules
 
 from tests.sample_bodies import LEADLESS
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_procedure import back_sheet_procedure, curved_procedure
-from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.pouring import LEVEL_AGAIN, TACK
 from unitcad.casting.procedure import Pour, Procedure, procedure
 from unitcad.moulds.mould_set import MouldSet
@@ -21,24 +18,15 @@ STRAPS = ("templates/custom/strap-lugs.toml",)
 LIDS = ("encapsulating", "moulds.pour=injected", "moulds.cavities=[2,2]")
 FILM = ("templates/custom/film-closed.toml",)
 RESIN = ("three-layer", "moulds.printer=sla")
-PATCH, BAND = ("forearm-patch",), ("wrist-band",)
-CURVED = ("sleeve-curved", "layout.columns=2", "layout.rows=1")
-ARRAYS = (PATCH, BAND, CURVED)
 LOOSE = (LEADLESS, "design=embedded", "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]")
 
 
 def casting(*source: str) -> Procedure:
-    if source in ARRAYS:
-        array = patch_moulds(load_array(source[0], list(source[1:])))
-        made = curved_procedure if source == CURVED else back_sheet_procedure
-        return made(array, [100.0] * len(array.plan.steps), 1000.0)
     moulds = MouldSet(load(source[0], list(source[1:])))
     return procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
 
-@pytest.mark.parametrize(
-    "source", [*((name,) for name in templates()), LIDS, RESIN, FILM, STRAPS, *ARRAYS], ids=" ".join
-)
+@pytest.mark.parametrize("source", [*((name,) for name in templates()), LIDS, RESIN, FILM, STRAPS], ids=" ".join)
 def test_every_set_keeps_every_rule(source: tuple[str, ...]) -> None:
     assert broken_rules(casting(*source)) == []
 
@@ -172,14 +160,7 @@ def pulled_on_the_bench(made: Procedure) -> Procedure:
 
 
 PLANTED = {
-    "grease under a cup": (PATCH, greased_too_late, "greases what the cup already hides"),
-    "grease without a name": (PATCH, greased_with_nothing_named, "does not say what to grease with"),
-    "filament under the mould": (PATCH, pulled_on_the_bench, "while the mould lies on them"),
     "filament under a unit's mould": (("encapsulating",), pulled_on_the_bench, "while the mould lies on them"),
-    "no picture of the grease": (PATCH, without_pictures, "Grease the flanks: has no picture"),
-    "filament under a curved base": (CURVED, pulled_on_the_bench, "while the mould lies on them"),
-    "no picture of a curved set's grease": (CURVED, without_pictures, "Grease the flanks: has no picture"),
-    "bands round a curved mould": (CURVED, tilted_by_tape, "pour 1: nothing says to look at the level again"),
     "tape under the plate": (("encapsulating",), tilted_by_tape, "look at the level again"),
     "lids' bands": (LIDS, tilted_by_tape, "look at the level again"),
     "a coat before the mix": (FILM, coated_before_mixed, "uses the mix before"),

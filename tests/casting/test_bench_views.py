@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_procedure import back_sheet_procedure, curved_procedure
-from unitcad.arrays.patch import patch_moulds
-from unitcad.casting.drawings import ARROW, BAND, CARD, GREASE, TAPE, tongue_prop
-from unitcad.casting.pictures import SIZE, BenchPictures, pictures
+from unitcad.casting.drawings import ARROW, BAND, CARD, TAPE, tongue_prop
+from unitcad.casting.pictures import SIZE, pictures
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.views import View, picture_path, views
-from unitcad.designs import layer_colour
 from unitcad.export.raster import Layer, Surface, aim, finish, render
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
@@ -25,14 +22,14 @@ from unitcad.pipeline.write import build
 from unitcad.shape import box, moved
 from unitcad.validation import load, templates
 
-CURVED = ("sleeve-curved", "layout.columns=2", "layout.rows=1")
-ARRAYS = [("forearm-patch",), ("wrist-band",), CURVED]
 SETS = [
     *((name,) for name in templates()),
     ("encapsulating", "moulds.pour=injected", "moulds.cavities=[2,2]"),
     ("three-layer", "moulds.printer=sla"),
-    *ARRAYS,
 ]
+
+
+Planned = Callable[..., tuple[MouldSet, Procedure]]
 
 
 def titles(casting: Procedure) -> list[list[str]]:
@@ -42,16 +39,17 @@ def titles(casting: Procedure) -> list[list[str]]:
 
 
 def planned(*source: str) -> tuple[MouldSet, Procedure]:
-    if source in ARRAYS:
-        array = patch_moulds(load_array(source[0], list(source[1:])))
-        made = curved_procedure if source == CURVED else back_sheet_procedure
-        return array, made(array, [100.0] * len(array.plan.steps), 1000.0)
     moulds = MouldSet(load(source[0], list(source[1:])))
     return moulds, procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
 
+@pytest.fixture(name="planned")
+def _of_specs() -> Planned:
+    return planned
+
+
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn(source: tuple[str, ...]) -> None:
+def test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn(source: tuple[str, ...], planned: Planned) -> None:
     moulds, casting = planned(*source)
     steps = [*casting.preparation, *(step for pour in casting.pours for step in pour.steps)]
     steps += [*casting.release, *casting.assembly]
@@ -61,7 +59,7 @@ def test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn(source: tup
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_views_name_pieces_that_there_are(source: tuple[str, ...]) -> None:
+def test_views_name_pieces_that_there_are(source: tuple[str, ...], planned: Planned) -> None:
     moulds, _ = planned(*source)
     plan = moulds.plan
     tools = {body.name for body in (*plan.tools, *plan.pieces, *plan.steps[-1].inserts)} | {
@@ -73,7 +71,7 @@ def test_views_name_pieces_that_there_are(source: tuple[str, ...]) -> None:
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_a_picture_shows_the_state_that_its_words_speak_of(source: tuple[str, ...]) -> None:
+def test_a_picture_shows_the_state_that_its_words_speak_of(source: tuple[str, ...], planned: Planned) -> None:
     """Nothing moves while it cures, tape stays until it is taken off, filament comes after the dry fit."""
     moulds, casting = planned(*source)
     shown = {picture_path(name): view for name, view in views(moulds).items()}
@@ -121,22 +119,6 @@ def test_pictures_show_what_their_views_hold_and_repeat_to_the_byte() -> None:
     assert there == {name for name, view in shown.items() if any(part.name == "tongue" for part in view.parts)}
 
 
-def test_pictures_of_a_curved_set_show_what_is_there() -> None:
-    moulds, _ = planned(*CURVED)
-    shown = views(moulds)
-    names = [name for name, view in shown.items() if view.group == "curved"]
-    bench = BenchPictures(moulds)
-    drawn = {picture_path(name): bench.picture(name) for name in names}
-    for name in names:
-        colours = {extra.colour for extra in shown[name].extras}
-        assert (hues(drawn[picture_path(name)], ARROW) > 30) == (ARROW in colours), name
-        assert (hues(drawn[picture_path(name)], GREASE) > 30) == (GREASE in colours), name
-    layer1 = {name for name in names if hues(drawn[picture_path(name)], layer_colour(0)) > 300}
-    assert layer1 == {"pour2-laid-in", "pour2-lid-on"}
-    layer2 = {name for name in names if hues(drawn[picture_path(name)], layer_colour(1)) > 300}
-    assert layer2 == {"pour2-lid-off", "peel"}
-
-
 def test_a_nearer_body_hides_one_behind_it_whatever_the_order() -> None:
     eye, points = (0.0, -1.0, 0.0), np.array([[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]])
     camera = aim(eye, points, (40, 40))
@@ -155,7 +137,7 @@ def test_a_nearer_body_hides_one_behind_it_whatever_the_order() -> None:
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
-def test_what_words_name_is_named_in_the_picture(source: tuple[str, ...]) -> None:
+def test_what_words_name_is_named_in_the_picture(source: tuple[str, ...], planned: Planned) -> None:
     """What a step speaks of beside the pieces stands in its picture under the same name."""
     moulds, casting = planned(*source)
     shown = {picture_path(name): view for name, view in views(moulds).items()}
@@ -286,3 +268,12 @@ def test_a_cut_tongue_is_drawn_as_the_strip_that_its_step_describes() -> None:
     assert steps["Cut the tongues"] == picture_path("cut-tongue")
     printed = planned("encapsulating")[0].solids["tongue"].bounding_box()
     assert printed[4] - printed[1] == pytest.approx(10.0, abs=0.01)
+
+
+OF_EVERY_SET = (
+    test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn,
+    test_views_name_pieces_that_there_are,
+    test_a_picture_shows_the_state_that_its_words_speak_of,
+    test_what_words_name_is_named_in_the_picture,
+)
+"""The tests of any set's pictures; `planned` makes the set and its procedure from the words of a build."""

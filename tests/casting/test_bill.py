@@ -7,9 +7,6 @@ import re
 import pytest
 
 from tests.sample_bodies import LEADLESS
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_procedure import back_sheet_procedure
-from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.written import to_markdown
@@ -59,13 +56,8 @@ def test_a_ring_s_silicone_cures_and_is_no_smear() -> None:
 
 
 def test_a_pin_for_bubbles_is_bought_for_an_open_pour_only() -> None:
-    """A base that has pins of its own does not need one."""
     assert "pin" in quantities(casting("encapsulating"))
     assert "pin" not in quantities(casting("encapsulating", "moulds.pour=injected"))
-    moulds = patch_moulds(load_array("forearm-patch"))
-    made = back_sheet_procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
-    (cups_on,) = (step for step in made.preparation if "one pin stands off" in step.text)
-    assert "pin" not in cups_on.needs
 
 
 def test_pictures_and_bill_count_pieces() -> None:

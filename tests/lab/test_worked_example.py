@@ -4,7 +4,8 @@ import re
 import tomllib
 
 import pytest
-from page_examples import ROOT, run_console
+
+from tests.pages.page_examples import ROOT, run_console
 
 PAGE = ROOT / "docs" / "tutorials" / "lab-data-to-estimate.md"
 

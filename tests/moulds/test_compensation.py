@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from faulty_sets import set_of, with_fault
 
-from unitcad.arrays.array_file import load_array
 from unitcad.catalogue import materials
 from unitcad.checks import check_moulds
 from unitcad.checks.balance import findings as balance
@@ -98,9 +97,3 @@ def test_refused_with_a_value_that_is_accepted(source, changes, field, nearest):
 def test_moulds_of_other_kinds_refuse_what_they_do_not_draw():
     with pytest.raises(Refusal, match="complement"):
         _ = set_of("custom/strap-lugs", "moulds.shrinkage_percent=1").plan
-    asked = load_array("forearm-patch").asked
-    for key in ("shrinkage_percent", "bore_compensation_mm"):
-        unit = {**asked["unit"], "moulds": {**asked["unit"].get("moulds", {}), key: 0.1}}
-        with pytest.raises(Refusal) as refused:
-            load_array({**asked, "unit": unit})
-        assert refused.value.field == f"unit.moulds.{key}"

@@ -7,7 +7,6 @@ import pytest
 from casting_rules import broken_rules
 from faulty_sets import mesh_findings, set_of, with_fault
 
-from unitcad.arrays.array_file import load_array
 from unitcad.casting.procedure import procedure
 from unitcad.casting.views import picture_path, views
 from unitcad.checks import check_moulds, overlap
@@ -88,10 +87,6 @@ def test_refused_with_a_value_that_is_accepted():
     assert (refused.value.field, refused.value.nearest) == ("skin_mm", 0.3)
     with pytest.raises(Refusal, match="draws its own skin side"):
         load(str(Path(__file__).parents[2] / "templates/custom/strap-lugs.toml"), ["skin_mm=0.5"])
-    asked = load_array("forearm-pockets").asked
-    with pytest.raises(Refusal) as refused:
-        load_array({**asked, "unit": {**asked["unit"], "skin_mm": 0.5}})
-    assert refused.value.field == "unit.skin_mm"
 
 
 def test_the_estimate_is_said_to_be_that_of_the_open_unit():

@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_view import patch_glb
-from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.export import glb
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.pipeline.plan import glb_content
@@ -92,22 +89,3 @@ def test_a_box_is_shaded_flat_and_a_wall_smooth():
     outward = vertices[wall, :2] / np.linalg.norm(vertices[wall, :2], axis=1, keepdims=True)
     assert normals[wall, :2] == pytest.approx(outward, abs=1e-4)
     assert wall.sum() == 120
-
-
-def test_a_unit_s_bodies_are_in_a_patch_once_and_stand_at_every_place():
-    turned = {"kind": "list", "points_mm": [[-20.5, 1], [2, 3], [30, -4]]}
-    places = [{"at": "P2", "angle_deg": 37.5}]
-    array = load_array("forearm-pockets", {"layout": turned, "place": places, "sheet.strap_slot_mm": [3, 8]})
-    moulds = patch_moulds(array).blank
-    content = patch_glb(moulds, patch_parts(array))
-    document, _ = chunks(content)
-    names = [mesh["name"] for mesh in document["meshes"]]
-    assert names == ["sheet", "layer1", "layer2", "motor", "fpcb"]
-    scene = trimesh.load(io.BytesIO(content), file_type="glb")
-    bodies = patch_bodies(array)
-    assert sorted(node["name"] for node in document["nodes"][1:]) == sorted(body.name for body in bodies)
-    for body in bodies:
-        matrix, name = scene.graph.get(body.name)
-        mesh = scene.geometry[name].copy().apply_transform(matrix)
-        x0, y0, z0, x1, y1, z1 = moulds.mesh(body).bounding_box()
-        assert mesh.bounds * 1e3 == pytest.approx(np.array([[x0, z0, -y1], [x1, z1, -y0]]), abs=1e-4)

@@ -12,12 +12,8 @@ import msgspec
 from unitcad import catalogue
 from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import text_of
-from unitcad.sweeps.sweep import Range, SweepFile
 from unitcad.validation import put
 
-SCHEMAS = {
-    kind: msgspec.json.schema(table) for kind, table in {"spec": RawSpec, "sweep": SweepFile, "range": Range}.items()
-}
 ENTRY = {"materials": "ecoflex-00-30", "motors": "LCM0720A3463F", "printers": "fdm-0.4"}
 """The free tables of a spec, and what an entry of each starts from."""
 NUMBERS = (float("nan"), float("inf"), -float("inf"), -1e308, 1e308, -(10**30), 10**400)
@@ -28,9 +24,9 @@ Bad = tuple[str, Any]
 """A dotted path and a value that its schema forbids."""
 
 
-def bad_values(kind):
-    """Every forbidden value for every path of a spec or a sweep file, in the schema's order."""
-    schema = SCHEMAS[kind]
+def bad_values(kind=RawSpec):
+    """Every forbidden value for every path of a spec or of another kind of file, in the schema's order."""
+    schema = msgspec.json.schema(kind)
     return list(_bad(schema, schema, ""))
 
 
@@ -42,7 +38,7 @@ def with_value(data, path, value):
         changed[table] = {"ours": {"like": ENTRY[table]}}
         if len(rest) > 2 and rest[1] != "value":
             shipped = [getattr(entry, rest[0]) for entry in getattr(catalogue, table)().values()]
-            unshipped = "none" if rest[0] == "support" else 1.0
+            unshipped = "none" if rest[0] == "support" else 0.5
             changed[table]["ours"][rest[0]] = {"value": next((value.value for value in shipped if value), unshipped)}
     put(changed, path, value)
     return changed
@@ -61,9 +57,9 @@ def toml(data):
     return re.sub('"@@(.*?)@@"', r"\1", text_of(marked(data)))
 
 
-def sample(kind, count, seed):
-    """`count` of them, drawn from a seed; all if there are fewer."""
-    found = bad_values(kind)
+def sample(count, seed):
+    """`count` of a spec's, drawn from a seed; all if there are fewer."""
+    found = bad_values()
     return found if len(found) <= count else random.Random(seed).sample(found, count)
 
 

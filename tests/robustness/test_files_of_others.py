@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import signal
 import stat
 import subprocess
 import sys
@@ -15,8 +14,6 @@ from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import build, clear_leftovers, replacing, subject
 from unitcad.report import write_report
-from unitcad.sweeps import BatchOptions, load_sweep, run
-from unitcad.sweeps.executors import SerialExecutor
 from unitcad.validation import load
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and pipes as POSIX has them")
@@ -114,40 +111,6 @@ def _umask():
     return found
 
 
-@pytest.mark.parametrize("name", ["timings.json", "variants.csv", "batch.json", ".tmp-variants.csv", ".tmp-batch.json"])
-def test_a_link_planted_in_a_batchs_folder_is_not_written_through(name, tmp_path):
-    sweep, out = load_sweep("thickness"), tmp_path / "out"
-    options = BatchOptions(only=("estimate",), limit=1, cache=tmp_path / "cache")
-    run(sweep, out, options, SerialExecutor(), workers=1)
-    target = tmp_path / "target"
-    target.write_text("keep")
-    (out / name).unlink(missing_ok=True)
-    (out / name).symlink_to(target)
-    run(sweep, out, options, SerialExecutor(), workers=1)
-    assert target.read_text() == "keep"
-    if not name.startswith("."):
-        assert (out / name).read_text() != "keep"
-        assert not (out / name).is_symlink()
-
-
-@pytest.mark.parametrize("name", ["journal.jsonl", "batch.json", "batch.lock", "timings.json", "variants.csv"])
-@pytest.mark.parametrize("lost", ["nothing", "journal"])
-def test_a_pipe_planted_in_a_batchs_folder_holds_nothing_up(name, lost, tmp_path):
-    sweep, out = load_sweep("thickness"), tmp_path / "out"
-    options = BatchOptions(only=("estimate",), limit=1, cache=tmp_path / "cache")
-    run(sweep, out, options, SerialExecutor(), workers=1)
-    if lost == "journal":
-        (out / "journal.jsonl").unlink()
-    (out / name).unlink(missing_ok=True)
-    os.mkfifo(out / name)
-    signal.alarm(60)
-    try:
-        with contextlib.suppress(UnitcadError):
-            run(sweep, out, options, SerialExecutor(), workers=1)
-    finally:
-        signal.alarm(0)
-
-
 def test_a_link_planted_in_a_results_place_is_not_written_through(tmp_path):
     spec = load("single-embedded", ["output.formats=[]"])
     folder = build(spec, tmp_path, only=["estimate"]).folder
@@ -200,7 +163,7 @@ def test_json_that_is_none_is_one_clear_error(text, tmp_path):
         files.read_json(tmp_path / "a.json")
 
 
-@pytest.mark.parametrize("arguments", ["build {}", "estimate {}", "batch {}", "check --manifest {}"])
+@pytest.mark.parametrize("arguments", ["build {}", "estimate {}", "check --manifest {}"])
 @pytest.mark.parametrize("kind", ["pipe.toml", "/dev/zero", "large.toml"])
 def test_no_command_hangs_on_or_swallows_what_is_no_spec(arguments, kind, tmp_path):
     os.mkfifo(tmp_path / "pipe.toml")

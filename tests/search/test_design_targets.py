@@ -10,8 +10,11 @@ from unittest.mock import ANY
 
 import pytest
 
+from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.errors import Refusal
+from unitcad.estimating import estimate_input
 from unitcad.search.candidates import candidates
+from unitcad.search.proposals import leads_block
 from unitcad.search.target_file import load_target, shipped, target_of
 
 
@@ -89,3 +92,13 @@ def test_the_schema_takes_the_shipped_targets(run: Any) -> None:
     schema = json.loads(run("schema", "target").stdout)
     for path in shipped().values():
         jsonschema.validate(tomllib.loads(path.read_text("utf-8")), schema)
+
+
+def test_a_design_s_range_is_that_of_the_estimate() -> None:
+    target = target_of({"target": {"edge_max": 0.3}, "estimate": {"moduli": "quasi-static"}, "vary": {"layers": [2]}})
+    assert leads_block(target)["by"] == "the paper's nine levels, by the moduli of a slow pull"
+    found = candidates(target)
+    spec = found.spec(3)
+    expected = predictive_of([estimate_input(spec)])
+    assert found.probability[3] == pytest.approx(expected.at_most(0.3)[0], rel=1e-9)
+    assert spec.estimate.moduli == "quasi-static"

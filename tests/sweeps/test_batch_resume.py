@@ -37,7 +37,7 @@ def made(tmp_path):
 
 @pytest.mark.parametrize("verify", [False, True])
 def test_a_finished_variant_whose_file_changed_is_made_again(verify, made):
-    """By its size always, by its hash with verify; robustness/test_damaged_batches.py has every other damage."""
+    """By its size always, by its hash with verify; test_damaged_batches.py has every other damage."""
     sweep, out = made
     before = bytes_of(out)
     file = out / rows(out)[0]["folder"] / "unit" / "layer1.stl"

@@ -237,3 +237,11 @@ def test_a_fault_of_a_base_s_file_is_said_with_file_and_line(tmp_path):
     assert f"{tmp_path / 'base.toml'}:6: motor.thickness_mm = 'thick'" in said
     assert "; and moulds.land_mm = -2" in said
     assert said.startswith("diameter_mm = -3") or "; and diameter_mm = -3" in said
+
+
+def test_a_batch_s_folder_is_no_device() -> None:
+    from unitcad.sweeps.sweep import from_file
+
+    data = {"base": "encapsulating", "name": "Con", "sweep": {"diameter_mm": [14.0, 15.0]}}
+    assert from_file(data, Path(), "x").slug == "con-batch"
+    assert from_file({**data, "name": "Cone"}, Path(), "x").slug == "cone"

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("material", reason="the site needs the extra docs")
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 LOADED = re.compile(
     r"""<(?:script|img|iframe|source|object|embed)[^>]*\s(?:src|data)=["']?((?:https?:)?//[^"'\s>]+)"""
     r"""|<link(?![^>]*rel=["']?canonical)[^>]*\shref=["']?((?:https?:)?//[^"'\s>]+)"""

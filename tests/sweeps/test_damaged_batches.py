@@ -6,13 +6,10 @@ import json
 import os
 import random
 import shutil
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-sys.path.append(str(Path(__file__).parent.parent / "sweeps"))
 from batching import bytes_of, leftovers, ring_sweep
 
 from unitcad.errors import UnitcadError

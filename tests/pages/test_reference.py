@@ -15,6 +15,7 @@ from unitcad.catalogue.entries import kinds_of
 from unitcad.checks import mould_checks
 from unitcad.cli.command_line import app
 from unitcad.lab.record import RULES
+from unitcad.meshcheck.rules.registry import rules
 from unitcad.rooms import commands, load
 from unitcad.spec.fields import fields_of
 from unitcad.spec.raw import RawSpec
@@ -72,3 +73,10 @@ def test_the_command_line_page_has_every_command_and_option() -> None:
 def test_every_check_and_finding_has_a_section() -> None:
     assert re.findall(r"(?m)^## (C\d+) ", PAGES["reference/mould-checks.md"]) == list(mould_checks())
     assert re.findall(r"(?m)^## (L\d+) ", PAGES["reference/recording-findings.md"]) == list(RULES)
+
+
+def test_the_page_has_a_section_for_each_rule() -> None:
+    page = PAGES["reference/mesh-rules.md"]
+    assert re.findall(r"(?m)^### (\w+)", page) == list(rules())
+    for rule in rules().values():
+        assert f"{rule.cause}\n\n**Example.** {rule.example}\n\n**Fix.** {rule.fix}\n" in page

@@ -6,8 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.append(str(Path(__file__).parent.parent / "sweeps"))
 from batching import command, environment, ring_sweep, unitcad
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")

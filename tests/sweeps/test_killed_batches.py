@@ -9,17 +9,15 @@ import random
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
 import pytest
-
-sys.path.append(str(Path(__file__).parent.parent / "sweeps"))
 from batching import bytes_of, command, environment, leftovers, ring_sweep, rows
 
+from tests.robustness.test_orphans import ENDS, check_nothing_is_left
 from unitcad.pipeline.write import whole
 from unitcad.sweeps.journal import JOURNAL
 
@@ -119,3 +117,10 @@ def test_a_batch_that_is_killed_again_and_again(kills, seed, reference, tmp_path
     assert bytes_of(out) == reference.bytes
     assert len(rows(out)) == VARIANTS
     assert not leftovers(out)
+
+
+@pytest.mark.parametrize("end", ENDS, ids=lambda end: end.name)
+def test_a_batch_leaves_no_process(end, tmp_path):
+    sweep = ring_sweep(tmp_path / "s", "slow", [float(height) for height in range(2, 20)])
+    words = ["batch", sweep, "-o", tmp_path / "out", "-j", 2, "--cache", tmp_path / "cache", "--only", "unit"]
+    check_nothing_is_left(words, 2, end)

@@ -14,7 +14,7 @@ import pytest
 import unitcad
 from unitcad.validation import compound_kind
 
-GALLERY = Path(__file__).parent.parent / "docs" / "gallery"
+GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 SPECS = sorted(GALLERY.glob("*.toml"))
 POCKET = math.pi * 3.5**2 * 2.0
 """The volume that the motor of 7 x 2 mm takes from a gel, mm3."""

@@ -1,0 +1,39 @@
+"""`unitcad.sweeps.batch` as Python calls it: a short result, and each wrong argument refused in one sentence."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.test_public import check_shown
+from unitcad.errors import UnitcadError
+from unitcad.sweeps import batch
+
+
+def test_its_result_is_short_and_holds_no_script(tmp_path: Path) -> None:
+    sweep = tmp_path / "few.toml"
+    sweep.write_text('base = "encapsulating"\n[sweep]\ndiameter_mm = [14.0, 15.0]\n')
+    check_shown(batch(sweep, tmp_path / "few", only=["estimate"], set={"layers.0.wall_mm": 1.3}))
+    assert list(inspect.signature(batch).parameters)[:2] == ["sweep", "out"]
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: batch("publishd"), "^sweep = 'publishd': not known"),
+        (lambda: batch(None), "^sweep: takes a path, not NoneType$"),  # type: ignore[arg-type]
+        (lambda: batch("published", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
+        (lambda: batch("published", limit=0), "^limit = 0: must be a whole number from 1 "),
+        (lambda: batch("published", jobs=0, timeout=3), "^timeout = 3: only a worker process"),
+    ],
+)
+def test_arguments_of_another_type_are_refused_in_one_sentence(
+    call: Callable[[], object], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UnitcadError, match=words):
+        call()
+    assert list(tmp_path.iterdir()) == []
