@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from unitcad.casting.steps import duration
 from unitcad.cli import app
 from unitcad.export import slicer
+from unitcad.validation import templates
 
 
 def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -64,6 +65,25 @@ def test_asked_wrongly_is_exit_2_and_writes_nothing(words: list[str], tmp_path: 
     assert done.stderr
     assert "Traceback" not in done.stdout + done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_of_another_kind_is_named_with_its_command_and_a_bare_name_finds_its_file(tmp_path: Path) -> None:
+    for name, text in (("walls", 'base = "embedded"\n[sweep]\ndiameter_mm = [14, 15]\n'), ("mine", None)):
+        template = Path(str(templates()["single-embedded"]))
+        (tmp_path / f"{name}.toml").write_text(text or template.read_text("utf-8"), "utf-8")
+    for words, told in (
+        ("build walls", "SPEC = 'walls.toml': is a sweep: run unitcad batch walls.toml"),
+        ("estimate thickness", "SPEC = 'thickness': is a sweep: run unitcad batch thickness"),
+        ("batch mine.toml", "SWEEP = 'mine.toml': is a spec: run unitcad build mine.toml"),
+        ("batch forearm-patch", "SWEEP = 'forearm-patch': is an array: run unitcad build forearm-patch"),
+        ("design walls", "TARGET = 'walls.toml': is a sweep: run unitcad batch walls.toml"),
+        ("phantom mine", "PHANTOM = 'mine.toml': is a spec: run unitcad build mine.toml"),
+    ):
+        done = _run(*words.split(), cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (2, f"error: {told}\n"), words
+    done = _run("build", "mine", "--only", "unit", "--formats", "stl", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.startswith(str(Path("out", "single-embedded-")))
 
 
 def test_an_output_that_is_a_file_is_refused(tmp_path: Path) -> None:

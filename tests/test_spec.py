@@ -140,7 +140,7 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("layers=[]", r"^layers = \[\]: must not be empty: needs one \[\[layers\]\] table or more"),
         ("estimate.models=[]", r"^estimate\.models = \[\]: .* one or more of rule, published, .*fem$"),
         ("materials.mine.mix_ratio=[]", r"mix_ratio = \[\]: takes a number, or a table with value and optionally "),
-        ("motor=['a', 2.5]", r'^motor = \["a", 2.5\]: takes a table, with keys such as part, diameter_mm,'),
+        ("motor=['a', 2.5]", r'^motor = \["a", 2.5\]: takes true or false, or a table, with keys such as part,'),
         ("motor.fill={ b = true }", r"^motor\.fill = \{ b = true \}: takes true or false$"),
         ("nonsense", "path=value"),
         ("name.x=1", "table"),

@@ -34,10 +34,9 @@ def test_each_geometry_once_whatever_the_workers(tmp_path):
 
 
 def test_a_variant_is_the_same_as_built_alone(tmp_path):
-    run(load_sweep("all-materials").overridden(['output.formats=["stl","3mf"]']), tmp_path / "b",
-        BatchOptions(("unit", "moulds"), limit=2), SerialExecutor(), workers=1)  # fmt: skip
-    spec = load("embedded", ['layers.1.material="ecoflex-00-30"', 'output.formats=["stl","3mf"]'])
-    alone = build(spec, tmp_path / "a", only=("unit", "moulds")).folder
+    sweep = load_sweep("all-materials").overridden(['output.formats=["stl","3mf"]'])
+    run(sweep, tmp_path / "b", BatchOptions(("unit", "moulds"), limit=2), SerialExecutor(), workers=1)
+    alone = build(sweep.spec(1), tmp_path / "a", only=("unit", "moulds")).folder
     together = tmp_path / "b" / alone.name
     assert bytes_of(alone) == bytes_of(together)
     files = [f for f in together.rglob("*") if f.suffix in (".stl", ".3mf", ".svg")]

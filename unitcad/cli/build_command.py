@@ -67,6 +67,7 @@ def build(
     as_json: AsJson = False,
 ) -> None:
     """Make a unit and its casting moulds, or an array of units. The last line printed is the folder."""
+    specs = [confirm_known(spec) for spec in specs]
     once = partial(_built, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
     if not watch:
         if not once():
@@ -107,8 +108,6 @@ def _built(
     changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
     allow_code(code)
     # Every spec is validated before the first one is built.
-    for spec in specs:
-        confirm_known(spec)
     wanted = [load_subject(spec, changes) for spec in specs]
     for spec in wanted if slicing else ():
         check_slicing(spec.unit, chosen)
@@ -154,6 +153,8 @@ def _print_faults(manifest: Manifest) -> None:
             warn(f"note: STEP left out: {entry['reason']}; {install_command('step')}")
     checks = manifest["mould_checks"]
     for check in checks:
+        if check["ok"] and check["advice"]:
+            warn(f"note: {check['code']} {check['where']}: {check['advice']}")
         if not check["ok"]:
             measured = f"{check['value']:.3g} {check['unit']}, limit {check['limit']:.3g}"
             advice = f"; {check['advice']}" if check["advice"] else ""

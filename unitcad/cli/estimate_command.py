@@ -60,8 +60,7 @@ def estimate(
         raise Refusal("--frequency", frequency, "must be one frequency for fem, whose draws cost seconds each")
     models = None if not model else MODELS if model == "all" else (model,)
     hertz = frequencies(frequency) if frequency else []
-    for name in specs:
-        confirm_known(name)
+    specs = [confirm_known(name) for name in specs]
     kinds = [kind for kind in map(compound_kind, specs) if kind]
     if kinds:
         if pitch is not None:

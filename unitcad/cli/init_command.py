@@ -33,7 +33,7 @@ def init(
 
     Its first line names the schema that an editor checks it with; `unitcad schema -o FILE` writes that.
     """
-    kinds = [kind for kind in file_kinds() if kind.command]
+    kinds = [kind for kind in file_kinds() if kind.starts]
     starts = {shipped: (kind, file) for kind in reversed(kinds) for shipped, file in shipped_of(kind).items()}
     template = template or default_template()
     if template not in starts:

@@ -22,7 +22,6 @@ Formats = Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb,pdf;
 Only = Annotated[
     str | None, typer.Option(help="unit,moulds,estimate,casting; else all. In a batch estimate alone makes a table.")
 ]
-Page = Annotated[bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")]
 NoCheck = Annotated[bool, typer.Option("--no-check", help="Leave out the mould checks and the mesh checks.")]
 AllowCode = Annotated[
     bool, typer.Option("--allow-code", help="Run Python code that came with a spec (design_source), not from a file.")

@@ -188,6 +188,8 @@ def _standing(
                 continue
             if not _stands(piece):
                 why = f"a piece of {_place(piece)} would hang in the silicone: it touches neither base nor cup"
+                if bounds(piece)[5] > rim - LEVEL:
+                    why += "; it is open above: draw the unit turned over, and it is a core on the base"
                 raise _refused(spec, i, why)
             above = piece.trim_by_plane((0, 0, 1), 0.0)
             if i == len(rims) - 1:

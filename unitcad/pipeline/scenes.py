@@ -60,7 +60,9 @@ def moments(moulds: MouldSet) -> Iterator[Moment]:
             yield Moment(f"{pour}: cured, tongue out first", (*cured, step.name, cup))
         yield Moment(f"{pour}: cup up, layer {step.index} stays", (*cured, step.name))
     unit = tuple(body.name for body in moulds.unit)
-    yield Moment("The unit: peeled off" + ("" if inserts else ", motor and circuit in"), unit)
+    yield Moment(
+        "The unit: peeled off" + ("" if inserts or moulds.spec.motor.absent else ", motor and circuit in"), unit
+    )
 
 
 def taken_apart(moulds: MouldSet) -> dict[str, Offset]:

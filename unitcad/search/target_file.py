@@ -31,7 +31,7 @@ from unitcad.files import read_text
 from unitcad.spec import convert, read_toml
 from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
 from unitcad.validation.fit_text import lab_fit
-from unitcad.validation.shipped_files import named_file, shipped_files
+from unitcad.validation.shipped_files import expect_kind, named_file, shipped_files
 
 Level = Annotated[float, Meta(ge=0.001, le=2, description="of the motor's amplitude, at the unit's edge")]
 Ratio = Annotated[
@@ -192,7 +192,9 @@ def load_target(source: str | os.PathLike[str]) -> Target:
     Raises Refusal or UnitcadError for the first value that is not valid.
     """
     path = named_file(os.fspath(source), shipped(), "target", WrongArgument)
-    return target_of(read_toml(path), path.stem, path.parent)
+    data = read_toml(path)
+    expect_kind(data, str(path), "target")
+    return target_of(data, path.stem, path.parent)
 
 
 def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path()) -> Target:

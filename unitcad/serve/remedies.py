@@ -65,6 +65,8 @@ def _remedied(
         fault = _offering(fault, _tried(fault, data, own, alone, judge, whole))
     elif own and (nearest := _nearest(data, own, judge, whole)) is not None:
         fault = _offering(fault, nearest)
+    if fault.field == "diameter_mm" and own is None and _is_float(fault.nearest):
+        fault = _offering(fault, _with_ring(data, blamed, fault.nearest, judge, whole))
     if blamed is not None:
         back = blamed.value if isinstance(blamed.value, str) and not blamed.toml else None
         back = _nearest(data, blamed, judge, whole) if back is None else back
@@ -74,6 +76,24 @@ def _remedied(
         if drop(without, fault.field) and _accepted(without, judge):
             return replace(fault, leave_out=True)
     return fault
+
+
+def _with_ring(data: Mapping[str, Any], blamed: Edit | None, least: float, judge: Judge, whole: Judge) -> float:
+    """Return the diameter at which the ring of air round the motor is as wide as before a change; else the least."""
+    if blamed is None:
+        return least
+    try:
+        before = _ring(judge(_after(data, blamed)))
+        kept = round(least + 2 * (before - _ring(judge(_after(data, Edit(path="diameter_mm", value=least))))), 3)
+    except (UnitcadError, KeyError, TypeError):
+        return least
+    return kept if kept > least and _accepted(_after(data, Edit(path="diameter_mm", value=kept)), whole) else least
+
+
+def _ring(settled: Mapping[str, Any]) -> float:
+    """Return the width of the ring of air of a settled spec."""
+    walls = sum(layer["wall_mm"] for layer in settled["layers"])
+    return settled["diameter_mm"] / 2 - settled["motor"]["diameter_mm"] / 2 - walls
 
 
 def _offering(fault: Fault, nearest: Any) -> Fault:

@@ -66,6 +66,8 @@ def to_data(spec: Spec) -> dict[str, Any]:
     for layer in data["layers"]:
         if not layer["cap_mm"]:
             del layer["cap_mm"]
+    if spec.motor.absent:
+        data["motor"] = False
     return data
 
 

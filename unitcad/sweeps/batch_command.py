@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +17,6 @@ from unitcad.cli.shared_options import (
     Formats,
     NoCheck,
     Only,
-    Page,
     Sets,
     allow_code,
     finite,
@@ -37,6 +37,9 @@ from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.merging import merge
 from unitcad.sweeps.preview import preview
 from unitcad.sweeps.shards import shard_folders, shard_of
+
+PAGE_UP_TO = 100
+"""Variants to which a batch has a page unless asked otherwise: a page of 100 takes about 10 s."""
 
 
 def batch(
@@ -102,7 +105,13 @@ def batch(
     sets: Sets = None,
     formats: Formats = None,
     only: Only = None,
-    page: Page = False,
+    page: Annotated[
+        bool | None,
+        typer.Option(
+            "--report/--no-report",
+            help=f"Write report.html, one offline page. By default without --only, to {PAGE_UP_TO} variants.",
+        ),
+    ] = None,
     no_check: NoCheck = False,
     code: AllowCode = False,
     as_json: AsJson = False,
@@ -113,8 +122,9 @@ def batch(
     named = listed(table) if table is not None else None
     if sweep == "merge":
         _confirm_merges(ctx)
-        options = BatchOptions(folders=folders_for(page, folders), cache=cache, tables=checked_tables(named, page))
-        _merge(shards or [], out, options, page, as_json)
+        paged = bool(page)
+        options = BatchOptions(folders=folders_for(paged, folders), cache=cache, tables=checked_tables(named, paged))
+        _merge(shards or [], out, options, paged, as_json)
         return
     if shards:
         raise typer.BadParameter(f"one sweep a batch; {shards[0]} is one too many.", param_hint="SWEEP")
@@ -122,6 +132,8 @@ def batch(
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
     part = None if shard is None else shard_of(shard)
+    usual = only is None and not (folders is False or table or store or part or scheduler)
+    page = usual and wanted.count <= PAGE_UP_TO if page is None else page
     options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, store,
         folders_for(page, folders, chosen), checked_tables(named, page), part)  # fmt: skip
     if dry_run:
@@ -214,6 +226,8 @@ def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> N
         f"{summary.seconds:.1f} s",
     ]
     typer.echo("; ".join(parts))
+    there = (folder / PAGE).is_file()
+    typer.echo(f"open {folder / PAGE}" if there else f"unitcad report {shlex.quote(str(folder))} writes its page")
     typer.echo(str(folder))
 
 

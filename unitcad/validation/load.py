@@ -20,7 +20,7 @@ from unitcad.spec.toml_lines import line_of
 from unitcad.validation.defaults import resolve
 from unitcad.validation.dotted import ABSENT, at, put
 from unitcad.validation.faults import every_fault, settled
-from unitcad.validation.shipped_files import is_path, named_file, shipped_files, shipped_of
+from unitcad.validation.shipped_files import expect_kind, is_path, named_file, shipped_files, shipped_of, spelled
 from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
 
 
@@ -62,7 +62,7 @@ def compound_kind(source: object) -> FileKind | None:
         return next((kind for kind in _compounds() if all(key in source for key in kind.keys)), None)
     if not isinstance(source, str | os.PathLike):
         return None
-    text = os.fspath(source)
+    text = spelled(os.fspath(source), every_template())
     if text in templates():
         return None
     if not is_path(text):
@@ -73,9 +73,10 @@ def compound_kind(source: object) -> FileKind | None:
         return None
 
 
-def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArgument) -> None:
-    """Raise `kind`, of that field, for a name of no template and no file's path."""
+def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArgument) -> str:
+    """Return a name as `spelled` does. Raises `kind`, of that field, for a name of no template and no file's path."""
     named_file(name, every_template(), field, kind)
+    return spelled(name, every_template())
 
 
 def default_template() -> str:
@@ -168,7 +169,9 @@ def read(source: str | os.PathLike[str]) -> dict[str, Any]:
     The code of a design that the file names may run from now on: see `unitcad.spec.custom_code`.
     """
     path = named_file(os.fspath(source), templates() | custom_templates(), "spec", WrongArgument)
-    return with_source(read_toml(path), path.parent)
+    data = read_toml(path)
+    expect_kind(data, str(path), "spec")
+    return with_source(data, path.parent)
 
 
 def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
@@ -242,7 +245,9 @@ def all_faults(first: Refusal, data: Mapping[str, Any], text: str) -> list[Refus
 
 def _file(source: Source) -> Path | None:
     """Return the file that a text names by its path."""
-    return Path(source) if isinstance(source, str | os.PathLike) and is_path(os.fspath(source)) else None
+    known = every_template()
+    text = spelled(os.fspath(source), known) if isinstance(source, str | os.PathLike) else ""
+    return Path(text) if is_path(text) and text not in known else None
 
 
 def _parsed(raw: str) -> Any:
