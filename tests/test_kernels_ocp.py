@@ -84,7 +84,7 @@ def test_show_uses_the_viewer_that_is_installed(monkeypatch: pytest.MonkeyPatch)
     names = list(variant.bodies)
     installed: set[str] = set()
     monkeypatch.setattr("unitcad.kernels.build123d.find_spec", lambda name: name in installed or None)
-    with pytest.raises(UnitcadError, match="no viewer is installed: .* install ocp-vscode"):
+    with pytest.raises(UnitcadError, match=r"no viewer is installed: .* install ocp-vscode"):
         variant.show()
     installed.add("yacv_server")
     monkeypatch.setitem(sys.modules, "yacv_server", viewer)

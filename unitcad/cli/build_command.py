@@ -109,7 +109,7 @@ def _built(
     # Every spec is validated before the first one is built.
     for spec in specs:
         confirm_known(spec)
-    wanted = [load_subject(spec, changes) for spec in specs]
+    wanted = [load_subject(spec, changes, chosen) for spec in specs]
     for spec in wanted if slicing else ():
         check_slicing(spec.unit, chosen)
     results: list[Built] = []

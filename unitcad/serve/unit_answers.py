@@ -27,6 +27,7 @@ from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, is_c
 from unitcad.validation import from_data, warnings
 from unitcad.validation.defaults import effective
 from unitcad.validation.load import all_faults
+from unitcad.validation.load import judge as judge
 
 form = groups
 as_data = to_data
@@ -43,11 +44,6 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
     """Return plain data with the texts of the files that it may name."""
     folder = folder_for(data, trusted)
     return with_source(dict(data), folder) if folder else dict(data)
-
-
-def judge(data: dict[str, Any]) -> Mapping[str, Any]:
-    """Return plain data that has its files' texts, settled. Raises UnitcadError."""
-    return to_data(effective(convert(data, AskedSpec)))
 
 
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:

@@ -184,12 +184,10 @@ def _name(plain: type, kind: Any) -> str:
 
 
 def _list_of(kind: Any) -> str:
-    """Say what a list holds, by an example where its entries are short."""
+    """Describe a list of tables by its meaning or their keys, another list by an example."""
     entry = entry_in(kind)
-    if meaning(kind) and not _words(entry):
-        return f": {meaning(kind)}"
     if table_in(entry):
-        return f", each entry {_name(dict, entry)}"
+        return f": {meaning(kind)}" if meaning(kind) else f", each entry {_name(dict, entry)}"
     examples = {str: '"a"', int: "1", float: "1.5", bool: "true", dict: "{}", list: "[]"}
     one = f'"{_words(entry)[0]}"' if _words(entry) else next(examples[k] for k in examples if k in _plain_kinds(entry))
     return f" such as [{', '.join([one] * _length(kind))}]"
@@ -211,7 +209,7 @@ def _needs(kind: Any) -> str:
     """Say what an empty text, list or table must hold."""
     entry = named_in(kind) or entry_in(kind)
     words = f"one or more of {', '.join(_words(entry))}" if entry and _words(entry) else ""
-    needed = meaning(kind) or words or ("one entry or more" if entry else "one character or more")
+    needed = words or meaning(kind) or ("one entry or more" if entry else "one character or more")
     return f"must not be empty: needs {needed}"
 
 
