@@ -34,4 +34,8 @@ def named_file(text: str, known: Mapping[str, Path], field: str, kind: type[Refu
         return known[text]
     if is_path(text):
         return Path(text)
+    if Path(text).is_dir():
+        raise kind(field, text, "is a folder; name a TOML file in it")
+    if Path(text).is_file():
+        raise kind(field, text, "is not a TOML file, whose name ends in .toml")
     raise unknown_name(field, text, known, kind)

@@ -1,0 +1,55 @@
+"""TOML files of one kind: every fault of a file with its line, or the kind that the file is instead."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from unitcad.errors import Refusal, UnitcadError, UnknownKey
+from unitcad.files import read_text
+from unitcad.rooms import file_kinds, load
+from unitcad.spec import convert, read_toml
+from unitcad.spec.toml_lines import line_of
+from unitcad.validation.suggestions import every_fault
+
+T = TypeVar("T")
+
+
+def load_file(path: Path, kind: str, judge: Callable[[dict[str, Any]], T]) -> T:
+    """Return the result of `judge` for the data of a TOML file of a kind.
+
+    Raises Refusal with the file's other faults, each with file and line; UnitcadError for a file of another kind.
+    """
+    data = read_toml(path)
+    try:
+        return judge(data)
+    except Refusal as first:
+        expect_kind(path, kind, first, data)
+        every = every_fault(first, data, judge, {})
+        text = read_text(path)
+        for i, one in enumerate(every):
+            if isinstance(one, UnknownKey):
+                limit = one.limit.replace("`unitcad schema`", f"`unitcad schema {kind}`")
+                every[i] = one = UnknownKey(one.field, one.value, limit, one.nearest)
+            one.file, one.line = os.fspath(path), line_of(text, one.field)
+        every[0].others = tuple(every[1:])
+        raise every[0] from None
+
+
+def expect_kind(path: Path, kind: str, refusal: Refusal, data: Mapping[str, Any]) -> None:
+    """Raise UnitcadError if data that were refused as one kind of file are another kind without a fault."""
+    if not data:
+        raise UnitcadError(f"{path}: is empty; unitcad init writes a file to start from") from refusal
+    if not isinstance(refusal, UnknownKey) and refusal.value is not None:
+        return
+    for other in file_kinds():
+        if not other.model or other.name == kind:
+            continue
+        try:
+            convert(data, load(other.model))
+        except Refusal:
+            continue
+        command = f"; {other.command} {path} takes it" if other.command else ""
+        raise UnitcadError(f"{path}: is a file of the kind {other.name}, not {kind}{command}") from refusal
