@@ -123,7 +123,7 @@ def batch(
         bool | None,
         typer.Option(
             "--report/--no-report",
-            help=f"Write report.html, one offline page. By default without --only, to {PAGE_UP_TO} variants.",
+            help=f"Write report.html, one offline page. Default: on without --only, for at most {PAGE_UP_TO} variants.",
         ),
     ] = None,
     no_check: NoCheck = False,
