@@ -21,8 +21,10 @@ LIMITS = {
     "tests": (404_000, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
-MOST_FILES, MOST_LINES = 45, 900
-"""Files of a room and lines of a file, at most."""
+MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900
+"""Files of a room at most, and lines of a file that is no entry of a package."""
+MOST_INNER = 60
+"""Imports inside functions, at most: a command's own room, an optional extra, a kernel that a build may not need."""
 _LAYOUT = {
     getattr(tokenize, name)
     for name in (
@@ -38,6 +40,7 @@ _LAYOUT = {
     )
     if hasattr(tokenize, name)
 }
+_IMPORTS = (ast.Import, ast.ImportFrom)
 _START, _END = getattr(tokenize, "FSTRING_START", None), getattr(tokenize, "FSTRING_END", None)
 
 
@@ -99,10 +102,23 @@ def faults(rows: dict[str, list[int]]) -> list[str]:
     for name, (_, files, _) in rows.items():
         if name not in LIMITS and files > MOST_FILES:
             found.append(f"{name}: {files} files, at most {MOST_FILES}")
+    inner = 0
     for path in sorted((ROOT / "unitcad").rglob("*.py")):
-        if (lines := path.read_text("utf-8").count("\n")) > MOST_LINES:
-            found.append(f"{path.relative_to(ROOT)}: {lines} lines, at most {MOST_LINES}")
+        source = path.read_text("utf-8")
+        inner += inner_imports(ast.parse(source))
+        lines, least = source.count("\n"), 0 if path.name.startswith("__") else LEAST_LINES
+        if not least <= lines <= MOST_LINES:
+            found.append(f"{path.relative_to(ROOT)}: {lines} lines; {LEAST_LINES} to {MOST_LINES}")
+    if inner > MOST_INNER:
+        found.append(f"{inner} imports inside functions, at most {MOST_INNER}")
     return found
+
+
+def inner_imports(tree: ast.AST) -> int:
+    """Return the number of import statements inside a module's functions."""
+    functions = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+    inside = {id(node) for function in functions for node in ast.walk(function) if isinstance(node, _IMPORTS)}
+    return len(inside)
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+from itertools import groupby, islice
 from pathlib import Path
 
 import pytest
@@ -15,9 +16,16 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a 
 sys.path.append(str(Path(__file__).parent / "report"))
 
 
+def pytest_addoption(parser):
+    parser.addoption("--cases", type=int, help="run the first N cases of each test, for a look at all of them")
+
+
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Count a test that drives a browser or the slicer as long, unless it is marked `smoke`."""
+def pytest_collection_modifyitems(config, items):
+    """Count a test that drives a browser or the slicer as long, unless it is marked `smoke`; keep `--cases`."""
+    if most := config.getoption("cases"):
+        cases = groupby(items, lambda item: item.nodeid.partition("[")[0])
+        items[:] = [item for _, group in cases for item in islice(group, most)]
     for item in items:
         slow = "running" in item.fixturenames or item.get_closest_marker("slicer")
         if slow and not item.get_closest_marker("smoke"):

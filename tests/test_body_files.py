@@ -14,7 +14,7 @@ from unitcad.checks import check_moulds
 from unitcad.designs import unit_bodies
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_spec
-from unitcad.export import stl
+from unitcad.export import printing
 from unitcad.kernels import mesh
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
@@ -48,7 +48,7 @@ def spec_of(folder: Path, design: str, layers: int = 2, more: str = "") -> Path:
 
 def stl_of(shape: Shape) -> bytes:
     """Return a shape as STL."""
-    return stl.content(*arrays(realise(shape, 96)), "body")
+    return printing.stl(*arrays(realise(shape, 96)), "body")
 
 
 def step_of(folder: Path, **shapes: Shape) -> str:
@@ -133,9 +133,9 @@ def test_the_hash_is_of_the_geometry_alone(tmp_path: Path) -> None:
     texts = []
     rng = np.random.default_rng(1)
     for turned in (faces, np.roll(faces[rng.permutation(len(faces))], 1, axis=1)):
-        (tmp_path / "body.stl").write_bytes(stl.content(vertices, turned, "body"))
+        (tmp_path / "body.stl").write_bytes(printing.stl(vertices, turned, "body"))
         texts.append(load(spec_of(tmp_path, "body.stl", layers=1)).design_source)
-    (tmp_path / "body.stl").write_bytes(stl.content(vertices * (1, 1, 1.01), faces, "body"))
+    (tmp_path / "body.stl").write_bytes(printing.stl(vertices * (1, 1, 1.01), faces, "body"))
     texts.append(load(spec_of(tmp_path, "body.stl", layers=1)).design_source)
     assert texts[0] == texts[1] != texts[2]
 
@@ -198,19 +198,19 @@ def test_a_unit_without_a_motor_is_a_custom_design_without_circuit(template: str
 
 
 def _open(vertices: np.ndarray, faces: np.ndarray) -> bytes:
-    return stl.content(vertices, faces[:-1], "body")
+    return printing.stl(vertices, faces[:-1], "body")
 
 
 def _inverted(vertices: np.ndarray, faces: np.ndarray) -> bytes:
-    return stl.content(vertices, faces[:, ::-1], "body")
+    return printing.stl(vertices, faces[:, ::-1], "body")
 
 
 def _inches(vertices: np.ndarray, faces: np.ndarray) -> bytes:
-    return stl.content(vertices / 25.4, faces, "body")
+    return printing.stl(vertices / 25.4, faces, "body")
 
 
 def _huge(vertices: np.ndarray, faces: np.ndarray) -> bytes:
-    return stl.content(*arrays(realise(cylinder(7, 0, 3), 11000)), "body")
+    return printing.stl(*arrays(realise(cylinder(7, 0, 3), 11000)), "body")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from sample_bodies import all_bodies, cup
 
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.export import printing, stl
+from unitcad.export import printing
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.pipeline.write import build
 from unitcad.validation import load
@@ -102,7 +102,7 @@ def test_the_body_and_the_next_step_are_named_if_a_design_has_no_such_mesh(forma
 def test_stl_bytes_are_the_format(tmp_path):
     vertices, faces = printing.print_ready(*arrays(realise(cup().shape, 96)))
     path = tmp_path / "cup2.stl"
-    data = stl.content(vertices, faces, "cup2")
+    data = printing.stl(vertices, faces, "cup2")
     path.write_bytes(data)
     assert len(data) == 84 + 50 * len(faces)
     assert data[:80].decode("ascii").rstrip() == "unitcad, mm: cup2"
@@ -111,11 +111,11 @@ def test_stl_bytes_are_the_format(tmp_path):
     assert np.array_equal(read.triangles, vertices[faces].astype(float))
     stored = np.frombuffer(data[84:], dtype=np.uint8).reshape(-1, 50)[:, :12].copy().view("<f4")
     assert np.abs(stored - trimesh.triangles.normals(read.triangles)[0]).max() < 1e-6
-    assert stl.content(vertices, faces, "cup2") == data
+    assert printing.stl(vertices, faces, "cup2") == data
 
 
 def test_stl_header_never_starts_with_solid_and_never_overflows():
     vertices, faces = printing.print_ready(*arrays(manifold3d.Manifold.cube((1, 1, 1))))
-    data = stl.content(vertices, faces, "solid " + "é" * 100)
+    data = printing.stl(vertices, faces, "solid " + "é" * 100)
     assert not data.lower().startswith(b"solid")
     assert len(data) == 84 + 50 * 12

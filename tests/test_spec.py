@@ -144,7 +144,7 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("motor.fill={ b = true }", r"^motor\.fill = \{ b = true \}: takes true or false$"),
         ("nonsense", "path=value"),
         ("name.x=1", "table"),
-        ("motor.part='foo'", r"^motor\.part = 'foo': not known; known: HD-EMC1003-2, [^;]*$"),
+        ("motor.part='foo'", r"^motor\.part = 'foo': unknown name; known: HD-EMC1003-2, [^;]*$"),
         ("design='d.py'", r"^design = 'd\.py': name the function or Design in that file: d\.py:NAME$"),
     ],
 )

@@ -169,7 +169,7 @@ def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusa
     known = sorted(known)
     close = get_close_matches(value, known, n=3, cutoff=0.6)
     names = f"closest: {', '.join(close)}" if close else f"known: {some(known)}"
-    return kind(field, value, f"not known; {names}", close[0] if close else None)
+    return kind(field, value, f"unknown name; {names}", close[0] if close else None)
 
 
 def unknown_key(field: str, value: object, known: Iterable[str], lists: str = "") -> UnknownKey:

@@ -15,6 +15,7 @@ import math
 import os
 import re
 import secrets
+import shutil
 import stat
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -251,8 +252,6 @@ def _remove_scratch(folder: Path) -> None:
                 os.unlink(folder / name)
         os.rmdir(folder)
     except OSError:
-        import shutil
-
         shutil.rmtree(folder, ignore_errors=True)
 
 

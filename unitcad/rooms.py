@@ -27,6 +27,8 @@ class Command(Struct, frozen=True, forbid_unknown_fields=True):
     """"module:name" of its function, or of its Typer application."""
     group: str
     help: str
+    examples: tuple[str, ...] = ()
+    """Command lines at the end of its help."""
 
 
 class FileKind(Struct, frozen=True, forbid_unknown_fields=True):

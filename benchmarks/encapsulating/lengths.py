@@ -13,10 +13,10 @@ from typing import Any
 
 from unitcad.designs.limits import filament_groove
 from unitcad.moulds.base import plate_bottom, pry_floor
-from unitcad.moulds.blade import BLADE_EDGE, BLADE_THICKNESS
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.filament import FLARE, STUB_TAIL
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN
+from unitcad.moulds.pieces import BLADE_EDGE, BLADE_THICKNESS
 from unitcad.moulds.ribs import ROOT, ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
 from unitcad.pipeline.variant import Variant

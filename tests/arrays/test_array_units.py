@@ -56,7 +56,7 @@ def test_a_place_takes_like_too() -> None:
 @pytest.mark.parametrize(
     ("change", "field", "words"),
     [
-        ("unit.like=nope", "unit.like", "not known"),
+        ("unit.like=nope", "unit.like", "unknown name"),
         ("unit.like=3", "unit.like", "takes a text"),
         ("unit=nope.toml", "unit", "there is no file nope.toml"),
     ],

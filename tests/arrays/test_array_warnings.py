@@ -15,7 +15,7 @@ from unitcad.arrays.circuit.wiring import GAP_MM, TRACK_MM, crowded_tracks, widt
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks.gap import play_missing
 from unitcad.moulds.cup import groove_depth_of
-from unitcad.moulds.groove_depths import shallow_grooves
+from unitcad.moulds.mould_set import shallow_grooves
 from unitcad.pipeline.write import build as build_array
 
 

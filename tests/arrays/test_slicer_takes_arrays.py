@@ -9,7 +9,7 @@ import pytest
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.figures import FDM_ERROR, print_min
-from unitcad.export import slicer, stl
+from unitcad.export import printing, slicer
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
 from unitcad.spec import printer_of
@@ -32,7 +32,7 @@ def test_every_tool_of_an_array_is_sliced(name: str, tmp_path: Path) -> None:
         if tool.made != "printed":
             continue
         path = tmp_path / f"{tool.name}.stl"
-        path.write_bytes(stl.content(*print_ready(*arrays(moulds.mesh(tool)), tool.upside_down), tool.name))
+        path.write_bytes(printing.stl(*print_ready(*arrays(moulds.mesh(tool)), tool.upside_down), tool.name))
         assert not slicer.needs_repair(path), tool.name
         sliced = slicer.slice_file(path, printer_of(moulds.spec))
         assert sliced.print_s > 60, tool.name

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.robustness.test_bad_values import check_words_are_refused
 from unitcad.attenuation import FractionalKelvinVoigt
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
@@ -443,3 +444,8 @@ def test_a_unit_s_case_does_not_matter_where_it_can_t_be_another_unit(unit, fact
     path = _table(tmp_path / "a.csv", head, [33 * strain, stress * 18e-6 / factor])
     curve = read_curve(path, {}, Specimen(6.0, 3.0, 33.0))
     assert curve.stress[-1] == pytest.approx(stress[-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("option", ["--gauge-mm", "--cell-n"])
+def test_an_option_that_is_no_number_is_refused(option, tmp_path, capsys, monkeypatch):
+    check_words_are_refused(["material", "none.csv", option, "nan"], option, tmp_path, capsys, monkeypatch)

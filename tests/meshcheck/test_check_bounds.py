@@ -12,7 +12,7 @@ from conftest import Judge
 from shapes import box, stl
 
 from unitcad.geometry import boxes
-from unitcad.geometry.ticks import TooMany
+from unitcad.geometry.boxes import TooMany
 from unitcad.meshcheck.geometry import crossings, sieves
 
 Points = np.ndarray

@@ -84,7 +84,7 @@ def test_a_reader_that_dies_or_prints_is_a_finding(
         (dying.prints, "F012", "does not load"),
         (dying.hangs, "F011", "not finished"),
     ):
-        monkeypatch.setattr(read_step, "measure", child)
+        monkeypatch.setattr(read_step, "MEASURE", child)
         (found,) = check_file(path, Options(limits=Limits(seconds=5))).findings
         assert found.code == code
         assert said in found.message

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from unitcad.checks import check_moulds
-from unitcad.export import stl
+from unitcad.export import printing
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
 from unitcad.meshcheck import Options, check_bytes
@@ -37,7 +37,7 @@ def mesh_findings(moulds: MouldSet) -> list[str]:
     """Return what the mesh rules find in the bodies and the pieces of a set, as they are written to STL."""
     findings = []
     for body in (*moulds.unit, *moulds.plan.pieces):
-        content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
+        content = printing.stl(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
         printer = printer_of(moulds.spec) if body.made == "printed" else None
         report = check_bytes(content, f"{body.name}.stl", Options(printer=printer))
         findings += [f"{body.name}: {f.code} {f.message}" for f in report.findings if f.severity != "info"]

@@ -77,7 +77,7 @@ SLEEVE = """
 from unitcad.designs import Design, Tooling
 from unitcad.designs.dimensions import concentric
 from unitcad.moulds.base import stand
-from unitcad.moulds.blade import blade
+from unitcad.moulds.pieces import blade
 from unitcad.moulds.cup import cup_blank, groove, recess
 from unitcad.moulds.layout import layout
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece

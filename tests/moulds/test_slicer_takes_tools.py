@@ -15,7 +15,7 @@ from unitcad.casting.bill import mould_plates
 from unitcad.casting.preparation import slicer_settings
 from unitcad.catalogue import printers
 from unitcad.errors import UnitcadError
-from unitcad.export import slicer, stl
+from unitcad.export import printing, slicer
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.ribs import SLOPE, ribs
@@ -47,7 +47,7 @@ def written(folder, *source):
         if tool.made == "printed":
             ready = print_ready(*arrays(realise(tool.shape, moulds.segments)), tool.upside_down)
             files.append(folder / f"{tool.name}.stl")
-            files[-1].write_bytes(stl.content(*ready, tool.name))
+            files[-1].write_bytes(printing.stl(*ready, tool.name))
     return files
 
 
@@ -116,7 +116,7 @@ def test_the_slicer_draws_a_cup_s_ribs(name, tmp_path):
     layer, (rib, *_) = moulds.spec.moulds.layer_mm, ribs(moulds.spec, moulds.plan.layout)
     cup = moulds.plan.tool("cup1")
     file, code = tmp_path / "cup.stl", tmp_path / "cup.gcode"
-    file.write_bytes(stl.content(*print_ready(*arrays(moulds.solids["cup1"]), cup.upside_down), "cup"))
+    file.write_bytes(printing.stl(*print_ready(*arrays(moulds.solids["cup1"]), cup.upside_down), "cup"))
     nozzle = float(printers()[name].nozzle_mm)
     heights = ("--layer-height", f"{layer:g}", "--first-layer-height", f"{layer:g}")
     slicer._run("--export-gcode", "--output", str(code), "--nozzle-diameter", f"{nozzle:g}", *heights, str(file))
@@ -150,7 +150,7 @@ def test_durations():
 def test_coupon_needs_no_repair(tmp_path):
     for body in coupon.Coupon(printers()["fdm-0.4"]).bodies():
         file = tmp_path / f"{body.name}.stl"
-        file.write_bytes(stl.content(*print_ready(*arrays(realise(body.shape, 64))), body.name))
+        file.write_bytes(printing.stl(*print_ready(*arrays(realise(body.shape, 64))), body.name))
         assert not slicer.needs_repair(file)
 
 

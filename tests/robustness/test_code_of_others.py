@@ -33,7 +33,7 @@ def _unitcad(*arguments, cwd):
 
 
 class Planted:
-    """A folder with code that leaves a mark when it runs: as a file, embedded in a spec, in results, behind a sweep."""
+    """A folder with code that leaves a mark when it runs: as a file, embedded in a spec, in results."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -43,11 +43,6 @@ class Planted:
         (folder / "named.toml").write_text(SPEC.format(design="d.py:f"))
         source = f"design_source = {json.dumps(self.code)}\n"
         (folder / "embedded.toml").write_text(source + SPEC.format(design="d.py:f"))
-        for name, base in (("named", "./named.toml"), ("embedded", "./embedded.toml")):
-            text = f'base = "{base}"\n[sweep]\ndiameter_mm = [14.0, 15.0]\n'
-            (folder / f"sweep-{name}.toml").write_text(text)
-        text = f'base = "./named.toml"\n[sweep]\ndesign_source = [{json.dumps(self.code + "# other text")}]\n'
-        (folder / "sweep-swept.toml").write_text(text)
         for place, manifest in (("results/one", "{}"), ("results/two", '{"parts": []}')):
             (folder / place).mkdir(parents=True)
             (folder / place / "manifest.json").write_text(manifest)
@@ -67,13 +62,6 @@ def planted(tmp_path):
         "report results",
         "report results/one",
         "report results/two",
-        "batch sweep-named.toml --dry-run",
-        "batch sweep-embedded.toml --dry-run",
-        "batch sweep-swept.toml --dry-run",
-        "batch sweep-embedded.toml -j 0",
-        "batch sweep-embedded.toml -j 1",
-        "batch sweep-swept.toml -j 0",
-        "batch sweep-embedded.toml --only estimate",
         "build embedded.toml --only unit",
         "build results/one/spec.toml --only unit",
         "estimate embedded.toml",
@@ -97,10 +85,6 @@ def test_code_that_nobody_named_does_not_run(arguments, planted):
     [
         "build named.toml --only unit",
         "build embedded.toml --only unit --allow-code",
-        "batch sweep-named.toml --only unit -j 0",
-        "batch sweep-named.toml --only unit -j 1",
-        "batch sweep-embedded.toml --only unit -j 1 --allow-code",
-        "batch sweep-named.toml --dry-run --allow-code",
     ],
 )
 def test_code_of_a_file_that_was_named_runs_and_other_code_when_allowed(arguments, planted):

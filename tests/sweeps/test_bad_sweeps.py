@@ -13,6 +13,7 @@ from tests.robustness.test_bad_values import (
     check_words_are_refused,
     named,
 )
+from tests.robustness.test_long_lists import check_error_is_short
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import to_data
 from unitcad.sweeps.sweep import Range, SweepFile, from_file
@@ -74,3 +75,9 @@ def test_a_base_that_can_not_be_is_refused(text, tmp_path, capsys, monkeypatch):
     (tmp_path / "s.toml").write_text(text)
     (tmp_path / "sweep.toml").write_text('base = "./s.toml"\n[sweep]\ndiameter_mm = [14.0, 15.0]\n')
     check_file_is_refused(["batch", "sweep.toml", "--dry-run"], capsys, monkeypatch)
+
+
+def test_many_axes_of_unlike_lengths_give_no_long_line(tmp_path):
+    lists = "".join(f'"materials.a.k{i}" = {[1.0] * (i + 2)}\n' for i in range(100))
+    sweep = f'base = "encapsulating"\nname = "s"\n[sweep]\nmode = "zip"\n{lists}'
+    check_error_is_short(("batch", "s.toml", "--dry-run"), {"s.toml": sweep}, tmp_path)

@@ -137,7 +137,7 @@ def test_progress_is_lines_for_machines_and_nothing_in_a_pipe(tmp_path):
     (event,) = [json.loads(line) for line in refused.stdout.splitlines()]
     assert (refused.returncode, event["event"], event["error"]["field"]) == (2, "error", "--scheduler")
     unknown = unitcad("batch", sweep, "--json-lines", "--slow")
-    assert json.loads(unknown.stdout)["error"]["message"].startswith("No such option: --slow")
+    assert json.loads(unknown.stdout)["error"]["message"].startswith("--slow: unknown option")
     quiet = unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 1)
     assert quiet.stderr == ""
     assert quiet.stdout.splitlines()[-1] == str(tmp_path / "o")

@@ -27,6 +27,7 @@ from unitcad.arrays.array_file import (
     expanded,
     load_array,
     makeable_array,
+    sound_array,
     to_toml,
     with_formats,
 )
@@ -54,8 +55,7 @@ from unitcad.casting.written import step_section
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
 from unitcad.errors import Refusal
-from unitcad.moulds.groove_depths import shallow_grooves
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finished, geometry, mould_findings, record
 from unitcad.pipeline.manifest import (
     CASTING,
@@ -113,7 +113,7 @@ class Arrayed(Compound):
 
     @classmethod
     def offered(cls, refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
-        return offered(refusal, data, makeable_array)
+        return offered(refusal, data, makeable_array, sound_array(data))
 
     @classmethod
     def write_page(cls, folder: Path, warn: Callable[[str], None]) -> Path:

@@ -23,7 +23,7 @@ from unitcad import files
 from unitcad.catalogue import Printer
 from unitcad.designs.rib_leaves import LEAF_WIDTH, farthest_push, leaf_mm, least_skirt
 from unitcad.errors import UnitcadError
-from unitcad.export import stl, threemf
+from unitcad.export import printing, threemf
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.ribs import ROOT, SLOPE, SQUARE, drawn, leaf_slots, placed
@@ -229,7 +229,7 @@ def write(printer: Printer, out: Path) -> Path:
         for body in coupon.bodies():
             if body.made == "printed":
                 ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
-                files.write(folder / f"{body.name}.stl", stl.content(*ready, body.name))
+                files.write(folder / f"{body.name}.stl", printing.stl(*ready, body.name))
                 parts.append(threemf.MeshPart(body.name, body.colour, *ready))
         bed = float(printer.bed_x_mm), float(printer.bed_y_mm)
         files.write(folder / "coupon.3mf", threemf.content(parts, bed))

@@ -6,20 +6,17 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from unitcad.designs import layer_colour
 from unitcad.designs.tooling import Cell
 from unitcad.moulds.base import PRY_HALF_WIDTH, outline, plate_top
 from unitcad.moulds.cup import skirt_end, window_section
+from unitcad.moulds.dovetails import Axis, Interval
 from unitcad.moulds.layout import CORNER_RADIUS, MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
 from unitcad.shape import Extrude, Revolve, Shape, box, cut, moved, polygon, rotated, turned, union
-
-if TYPE_CHECKING:
-    from unitcad.moulds.dovetails import Axis, Interval
 
 ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0.38), (0.80, 0.86, 0.90)
 CARD, PAPER, GREASE, INK = (0.45, 0.72, 0.38), (0.96, 0.93, 0.62), (0.98, 0.72, 0.16), (0.10, 0.10, 0.12)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from unitcad.casting.bill import mould_plates
 from unitcad.casting.figures import (
@@ -23,6 +22,7 @@ from unitcad.catalogue import Material
 from unitcad.designs.rib_leaves import leaf_mm
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.dents import DENT, TILT_DEG
+from unitcad.moulds.dovetails import Split
 from unitcad.moulds.layout import BLADE_HEIGHT
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.ribs import ribs
@@ -30,9 +30,6 @@ from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
 from unitcad.shape.lettering import seen
 from unitcad.spec import MOTOR_SIZES, assumed_lengths, printer_of
 from unitcad.text import listed, number, spaced
-
-if TYPE_CHECKING:
-    from unitcad.moulds.dovetails import Split
 
 PERIMETERS = 3
 INFILL_PERCENT = 20

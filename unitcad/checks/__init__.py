@@ -7,8 +7,7 @@ from functools import cache
 from importlib import import_module
 
 from unitcad.checks import overlap
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.finding import MouldFinding
+from unitcad.checks.finding import MouldCheck, MouldFinding
 from unitcad.checks.strain import Strain, strain_findings, strains
 from unitcad.moulds.mould_set import MouldSet
 

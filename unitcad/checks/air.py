@@ -14,9 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from manifold3d import Manifold
 
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.each_cavity import each_cavity
-from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_most, each_cavity
 from unitcad.geometry.components import components
 from unitcad.kernels.mesh import arrays
 from unitcad.moulds.cavities import Cavity

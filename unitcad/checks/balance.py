@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.each_cavity import each_cavity
-from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_most, each_cavity
 from unitcad.designs.dimensions import growth
 from unitcad.kernels.mesh import realise, thick_pieces
 from unitcad.moulds.cavities import BALANCE, Cavity

@@ -15,8 +15,7 @@ from itertools import pairwise
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.finding import MouldFinding, at_least, at_most
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, at_most
 from unitcad.checks.leaves import thickest_leaf
 from unitcad.designs.rib_leaves import MOST_STRAIN, farthest_push, leaf_mm, leaf_strain
 from unitcad.kernels.sections import thick_parts

@@ -19,8 +19,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from unitcad.checks import overlap
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.geometry.boxes import Frame, boxes_of, frame_of, meeting_between, morton_order
 from unitcad.kernels.mesh import arrays, thick_pieces
 from unitcad.moulds.cavities import boxes_meet, united

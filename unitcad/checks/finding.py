@@ -1,9 +1,13 @@
-"""The result of a mould check at one place."""
+"""A mould check, and its result at one place."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
 from typing import TypedDict
+
+from unitcad.moulds.cavities import Cavity
+from unitcad.moulds.mould_set import MouldSet
 
 
 class FindingRecord(TypedDict):
@@ -50,3 +54,24 @@ def at_least(code: str, where: str, value: float, limit: float, unit: str, advic
     """Return a finding that passes from `limit` on."""
     ok = bool(value >= limit)
     return MouldFinding(code, where, ok, float(value), float(limit), unit, "" if ok else advice)
+
+
+@dataclass(frozen=True)
+class MouldCheck:
+    """A code, its demand in one line, and its function. `reads_silicone`: its limit is a material's."""
+
+    code: str
+    demands: str
+    findings: Callable[[MouldSet], Iterable[MouldFinding]]
+    reads_silicone: bool = False
+
+
+def each_cavity(moulds: MouldSet, judge: Callable[[Cavity], Iterable[MouldFinding]]) -> Iterator[MouldFinding]:
+    """Yield the findings of `judge` in every cavity; the place that it names begins with the cavity's."""
+    judged: dict[int, list[MouldFinding]] = {}
+    for cavity in moulds.cavities:
+        first = moulds.cavities[cavity.first]
+        if cavity.first not in judged:
+            judged[cavity.first] = list(judge(first))
+        for finding in judged[cavity.first]:
+            yield replace(finding, where=cavity.where + finding.where.removeprefix(first.where))

@@ -17,8 +17,7 @@ from itertools import pairwise
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.finding import MouldFinding, at_least
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_least
 from unitcad.kernels.mesh import arrays
 from unitcad.kernels.sections import gap as gap_between
 from unitcad.moulds.cavities import united

@@ -13,8 +13,7 @@ import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold, OpType
 from scipy.spatial import KDTree
 
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.finding import MouldFinding, at_least
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_least
 from unitcad.checks.hollows import GRID, hollows, wall_limit
 from unitcad.kernels.mesh import shells, thick_pieces
 from unitcad.moulds.congruence import Congruence, cropped, once_each, reaching

@@ -9,12 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.each_cavity import each_cavity
-from unitcad.checks.finding import MouldFinding, at_least
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, each_cavity
 from unitcad.moulds.cavities import Cavity
+from unitcad.moulds.complement import LEAST_AREA, LEAST_WIDTH, regions
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.pour_opening import LEAST_AREA, LEAST_WIDTH, regions
 from unitcad.shape.profile import GRID_PER_MM
 
 _SNAPPED = 1 / GRID_PER_MM

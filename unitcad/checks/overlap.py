@@ -14,8 +14,7 @@ from dataclasses import replace
 import numpy as np
 from manifold3d import Manifold
 
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.kernels.mesh import thick_pieces
 from unitcad.moulds.congruence import MARGIN, column_round
 from unitcad.moulds.mould_set import MouldSet

@@ -14,9 +14,8 @@ from itertools import chain, pairwise
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold
 
-from unitcad.checks.check import MouldCheck
 from unitcad.checks.draw import BLOCKED, blocked
-from unitcad.checks.finding import MouldFinding, at_least, at_most
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, at_most
 from unitcad.checks.gap import least_play, too_tight
 from unitcad.checks.overlap import OVERLAP
 from unitcad.kernels.mesh import arrays, thick_pieces

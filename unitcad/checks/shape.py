@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from unitcad.checks.check import MouldCheck
-from unitcad.checks.finding import MouldFinding, exactly
+from unitcad.checks.finding import MouldCheck, MouldFinding, exactly
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Plan
 

@@ -16,9 +16,8 @@ import numpy as np
 from manifold3d import CrossSection, Manifold
 
 from unitcad import catalogue
-from unitcad.checks.check import MouldCheck
 from unitcad.checks.draw import upright
-from unitcad.checks.finding import MouldFinding, at_most
+from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.designs.stretch import allowed_strain, lip_strain, tail_strain
 from unitcad.kernels.mesh import arrays
 from unitcad.kernels.sections import thick_parts

@@ -1,4 +1,4 @@
-"""A body for a printer's file: as printed on the bed, in the single precision that STL and slicers have."""
+"""A body for a printer's file: as printed on the bed, in the single precision that STL and slicers have, and as STL."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from unitcad.errors import UnitcadError
 from unitcad.geometry.arrays import unique_rows
 
 ROUNDS = 6
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 class TooThin(UnitcadError):
@@ -85,3 +86,19 @@ def _thinnest(vertices: np.ndarray, faces: np.ndarray) -> float:
     edges = corners[:, (1, 2, 0)] - corners
     doubled_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     return float(np.min(doubled_area / np.linalg.norm(edges, axis=2).max(axis=1)))
+
+
+def stl(vertices: np.ndarray, faces: np.ndarray, name: str) -> bytes:
+    """Return the bytes of a binary STL with a mesh: vertices (n, 3) in mm, faces (m, 3). The format has no unit.
+
+    `print_ready` makes a mesh that survives the rounding. The header names the part. It never starts
+    with "solid", by which some readers take a file for the ASCII kind.
+    """
+    corners = np.asarray(vertices, dtype=np.float32)[faces]
+    edges = corners[:, 1:].astype(np.float64) - corners[:, :1]
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    facets = np.zeros(len(faces), dtype=_FACET)
+    facets["normal"] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    facets["corners"] = corners
+    header = f"unitcad, mm: {name}".encode("ascii", "replace")[:80].ljust(80)
+    return header + len(faces).to_bytes(4, "little") + facets.tobytes()

@@ -40,6 +40,7 @@ from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.raw import Table
 from unitcad.validation import from_data
 from unitcad.validation.shipped_files import named_file, shipped_files
+from unitcad.validation.typed_files import load_file
 
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 LevelValue = Annotated[float, Meta(ge=1e-6, le=1e3, description="amplitude at the edge over the motor's")]
@@ -127,10 +128,13 @@ def shipped_fits() -> dict[str, Path]:
 def load_fit_lab(source: str) -> FitLab:
     """Return the lab of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
 
-    Raises Refusal or UnitcadError for the first value that is not valid.
+    Raises Refusal with every value that is not valid, and its line, or UnitcadError.
     """
     path = named_file(source, shipped_fits(), "LAB")
-    data = read_toml(path)
+    return load_file(path, "fit", lambda data: _lab_of(data, path))
+
+
+def _lab_of(data: dict[str, Any], path: Path) -> FitLab:
     settings = convert(data, FitLabFile)
     names = [unit.name for unit in settings.unit]
     inputs = {path.name: files.sha256(path)}

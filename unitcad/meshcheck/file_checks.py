@@ -10,6 +10,7 @@ import glob
 import os
 import signal
 import stat
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -20,10 +21,14 @@ import numpy as np
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
+from unitcad.meshcheck.builds import check_3mf, check_step
 from unitcad.meshcheck.findings import Facts, FileReport, Finding, detailed, ending, merge
 from unitcad.meshcheck.geometry.mesh import Mesh
+from unitcad.meshcheck.one_mesh import check_on_bed, check_surface
 from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.readers import kind_of
+from unitcad.meshcheck.readers.read_step import missing
+from unitcad.meshcheck.rules import g_shells, s_scale
 from unitcad.meshcheck.rules.f_file import F001, F005, F011, F012, Deadline, Limits, OutOfTime, Unreadable, keeping
 from unitcad.meshcheck.rules.p_package import P011
 from unitcad.meshcheck.rules.s_scale import UNITS_MM
@@ -91,12 +96,8 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
         raise F005.unreadable(f"named {path.suffix}, but the content is {content or f'no {wanted}'}")
     view = memoryview(data)
     if kind == "3mf":
-        from unitcad.meshcheck.builds import check_3mf
-
         return check_3mf(view, options, deadline)
     if kind == "step":
-        from unitcad.meshcheck.builds import check_step
-
         return check_step(path, view, options, deadline)
     if kind == "glb" and options.unit is None:
         options = replace(options, unit="meter")  # as the format says
@@ -131,9 +132,6 @@ def _bytes_of(path: Path, limits: Limits) -> bytes:
 
 def _check_surface(mesh: Mesh, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
     """Check the mesh of a file that has no instances."""
-    from unitcad.meshcheck.one_mesh import check_on_bed, check_surface
-    from unitcad.meshcheck.rules import g_shells, s_scale
-
     checked = check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
     findings, facts = [*checked.findings, *s_scale.likely_unit(checked.facts, options.unit)], checked.facts
     if options.printer is not None and checked.inspection is not None:
@@ -166,7 +164,7 @@ def expand(
             if not inside:
                 empty.append(FileReport(name, (F012.finding("no mesh file in this folder"),)))
             for file in inside:
-                if kind_of(file) == "step" and (needs := _step_needs()):
+                if kind_of(file) == "step" and (needs := missing()):
                     warning = F012.finding(f"{needs}; not checked", severity="warning")
                     empty.append(FileReport(file, (warning,)))
                 else:
@@ -179,13 +177,6 @@ def expand(
         else:
             files.append(name)
     return _once(files), empty
-
-
-def _step_needs() -> str:
-    """Return the missing requirement of STEP files, or nothing."""
-    from unitcad.meshcheck.readers import read_step
-
-    return read_step.missing()
 
 
 def _walked(folder: Path) -> Iterator[str]:
@@ -280,8 +271,6 @@ def _alarm(seconds: float) -> Iterator[None]:
 
     Does nothing outside the main thread or on Windows.
     """
-    import threading
-
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from typing import Any, SupportsFloat
 
-from unitcad.geometry.ticks import Interrupted
+from unitcad.geometry.boxes import Interrupted
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.text import number
 

@@ -11,8 +11,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from unitcad.geometry.arrays import extent
-from unitcad.geometry.boxes import box_pairs
-from unitcad.geometry.ticks import Tick
+from unitcad.geometry.boxes import Tick, box_pairs
 from unitcad.meshcheck.findings import Facts, Finding, Location, counted, detail, ending, point
 from unitcad.meshcheck.geometry.mesh import Mesh, representable, solid_of
 from unitcad.meshcheck.geometry.sieves import arranged, stars_of

@@ -22,21 +22,26 @@ import numpy as np
 from manifold3d import Manifold, OpType
 
 from unitcad.designs import design_of, dimensions, inserts
+from unitcad.designs.limits import check_seat
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Tooling
 from unitcad.errors import UNIT_ALONE, Refusal
 from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_count, thick_pieces
 from unitcad.kernels.sections import gap, thick_parts, widest
 from unitcad.moulds.base import stand
-from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import cup_blank, groove, grooves, recess, skirt_end
 from unitcad.moulds.layout import layout
-from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece
-from unitcad.moulds.pour_opening import LEAST_AREA, LEAST_WIDTH, regions
+from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece
 from unitcad.shape import Below, Common, Component, Cut, Shape, box, cut, moved, union
 from unitcad.shape.profile import GRID_PER_MM
 from unitcad.spec import Spec
 
+LEAST_AREA = 2.0
+"""Of an opening that silicone is poured or injected into, mm2 (assumed): a thread or a needle of 1.6 mm."""
+LEAST_WIDTH = 0.4
+"""Of that opening, and of a vent, mm (assumed): less than the thinnest wall that a spec may have."""
+_UNDER = 1 / 4096
+"""Depth of the section under the plane of the opening, mm."""
 FILM = 0.1
 """Area up to which films are left, mm2: they reach less far than the clearance."""
 FLAT = math.ceil(10 * math.sqrt(4 * LEAST_AREA / math.pi)) / 10
@@ -61,6 +66,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
             "moulds by complement make up for no shrinkage: draw the unit larger",
         )
         raise Refusal("moulds.shrinkage_percent", value, limit, 0.0)
+    check_seat(spec)
     given, clearance = dimensions(spec), spec.moulds.window_clearance_mm
     segments = segment_count(given.outer_radius, spec.output.tolerance_mm)
     laid, laid_in = [body.shape for body in inserts(spec)], design_of(spec).laid_in
@@ -313,3 +319,11 @@ def _place(piece: Manifold) -> str:
 
 def _refused(spec: Spec, layer: int, why: str) -> Refusal:
     return Refusal("design", spec.design, f"pour {layer + 1} can't be cast: {why}{UNIT_ALONE}")
+
+
+def regions(cavity: Manifold, top: float) -> list[tuple[float, float]]:
+    """Return (width in mm, area in mm2) of each region of a cavity's section just under z = `top`, the widest last.
+
+    Width is the diameter of the largest circle that fits.
+    """
+    return sorted((widest(part)[0], part.area()) for part in cavity.slice(top - _UNDER).decompose())

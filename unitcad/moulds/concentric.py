@@ -9,10 +9,18 @@ from unitcad.designs.dimensions import poured
 from unitcad.designs.tooling import Tooling
 from unitcad.moulds import dents, filament, lid
 from unitcad.moulds.base import base, plate_bottom
-from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import cup
 from unitcad.moulds.layout import layout
-from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, lid_piece, stub_pieces, tongue_pieces, tray_piece
+from unitcad.moulds.pieces import (
+    base_piece,
+    blade,
+    blade_piece,
+    cup_piece,
+    lid_piece,
+    stub_pieces,
+    tongue_pieces,
+    tray_piece,
+)
 from unitcad.moulds.seals import seals
 from unitcad.moulds.skin_tray import skin_tray
 from unitcad.moulds.tongue import tongues

@@ -10,12 +10,14 @@ from typing import Any, TypeVar
 from manifold3d import Manifold
 from msgspec import structs
 
+from unitcad.catalogue import printers
 from unitcad.designs import Design, Dimensions, design_of, unit_bodies
 from unitcad.designs.design import Fitting
 from unitcad.kernels import mesh
 from unitcad.kernels.mesh import realise, segment_count
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.cavities import Cavity, cavities, united
+from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.plan import Plan, Step, plan
 from unitcad.moulds.ribs import rib_spaces
 from unitcad.moulds.surroundings import Surroundings, surroundings
@@ -26,6 +28,7 @@ from unitcad.spec import Spec, from_json, to_json, with_formats
 from unitcad.spec.custom_code import is_body_file
 from unitcad.spec.raw import CastingTable
 from unitcad.spec.resolved import Estimate
+from unitcad.text import listed, number
 
 _T = TypeVar("_T")
 
@@ -266,3 +269,18 @@ class MouldSet:
         if name not in kept:
             kept[name] = make(self.blank)
         return kept[name]
+
+
+def shallow_grooves(moulds: MouldSet) -> list[str]:
+    """Return a sentence if the spec's depth, larger than the printer's own, is cut down to half a rim; otherwise []."""
+    spec = moulds.spec
+    asked = spec.moulds.groove_depth_mm
+    if asked <= float(printers(spec.printers)[spec.moulds.printer].groove_depth_mm):
+        return []
+    plan = moulds.plan
+    walls = [(plan.walled(step), step.rim) for step in plan.steps if step.groove and plan.walled(step) != step.lid]
+    cut_down = {plan.called(name): groove_depth_of(spec, rim) for name, rim in walls if rim / 2 < asked}
+    if not cut_down:
+        return []
+    drawn = listed([f"{number(depth, 3)} mm on {name}" for name, depth in cut_down.items()])
+    return [f"moulds.groove_depth_mm = {asked:g} mm is more than half the rim's height: the groove is drawn {drawn}"]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from unitcad.shape import Shape
+from unitcad.designs.tooling import Layout
+from unitcad.moulds.layout import BLADE_HEIGHT
+from unitcad.shape import Extrude, Shape, moved, polygon, turned
 from unitcad.shape.body import Body
 
 _BASE, _CUP, _CUP2, _TONGUE = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.73, 0.83, 0.93), (0.90, 0.30, 0.30)
@@ -63,3 +65,19 @@ def blade_piece(shape: Shape, *, too_long: bool = False) -> Body:
 
 def _numbered(name: str, index: int, among: Sequence[object]) -> str:
     return name if len(among) == 1 else f"{name}{index + 1}"
+
+
+BLADE_THICKNESS, BLADE_EDGE = 3.0, 0.8
+
+
+def blade(lay: Layout, rim: float) -> Shape:
+    """Draw the strike-off blade, edge down on the rim: a bar as long as the plate, bevelled to a flat edge."""
+    return bar(lay.plate[1], rim)
+
+
+def bar(half: float, rim: float) -> Shape:
+    """Draw a bevelled bar of the length 2 `half` along y, its edge at the height `rim`."""
+    t, e, h = BLADE_THICKNESS, BLADE_EDGE, BLADE_HEIGHT
+    section = polygon((0, 0), (e, 0), (t, 2 * (t - e)), (t, h), (0, h))
+    # Drawn in (x, z) and stood up: x to x, y to z, extrusion to -y.
+    return moved(turned(Extrude(section, -half, half), "x", 1), 0, 0, rim)

@@ -16,8 +16,7 @@ from unitcad.attenuation.edge.estimate_summary import summary
 from unitcad.checks.finding import FindingRecord
 from unitcad.designs import design_of, no_estimate
 from unitcad.designs.design import Reason
-from unitcad.moulds.groove_depths import shallow_grooves
-from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.mould_set import MouldSet, shallow_grooves
 from unitcad.pipeline.plan import kernel_versions
 from unitcad.spec import Spec, spec_hash
 from unitcad.spec.raw import OUTPUTS

@@ -25,7 +25,7 @@ from unitcad.casting.views import picture_path
 from unitcad.casting.written import step_section
 from unitcad.designs import design_of, no_estimate
 from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
-from unitcad.export import glb, stl, svg, threemf
+from unitcad.export import glb, printing, svg, threemf
 from unitcad.export.printing import TooThin, print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import mould_set
@@ -240,7 +240,7 @@ def forget() -> None:
 
 def stl_content(moulds: MouldSet, body: Body) -> bytes:
     """Return a body's STL."""
-    return stl.content(*ready(moulds, body), body.name)
+    return printing.stl(*ready(moulds, body), body.name)
 
 
 def threemf_content(moulds: MouldSet, bodies: Sequence[Body], settings: Mapping[str, str]) -> bytes:

@@ -27,6 +27,9 @@ _NAMES: dict[type, str] = {
 """Kinds of plain data in words, in the order in which a refusal lists them."""
 _HALF_PAIR = re.compile(r"[\ud800-\udfff]")
 """Replacement of a byte that is not UTF-8."""
+_MEASURE = re.compile(r"\s*([-+]?\d*[.,]?\d+)\s*([A-Za-z%]*)\s*")
+_MM = {"mm": 1, "cm": 10, "m": 1000, "um": 0.001, "in": 25.4}
+"""Millimetres in a unit of length."""
 _MOST_KEYS = 5
 """Keys of a table that a refusal names."""
 _LARGEST_INT = 2**63 - 1
@@ -123,7 +126,8 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     if not (given in known or (given is int and float in known)):
         names = [_name(plain, kind) for plain in _NAMES if plain in known]
         limit = f"takes {', or '.join(names) if table else ' or '.join(names)}"
-        return Refusal(field, value, limit, _in_list(value, kind) if list in known else None)
+        meant = _in_list(value, kind) if list in known else _number(value, field) if known & {int, float} else None
+        return Refusal(field, value, limit, meant if _fits(meant, kind) else None)
     if isinstance(value, int | float):
         return next(_out_of_range(value, kind, field))
     tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
@@ -184,13 +188,13 @@ def _name(plain: type, kind: Any) -> str:
 
 
 def _list_of(kind: Any) -> str:
-    """Describe the entries of a list, by an example if they are short."""
+    """Describe a list of tables by its meaning or their keys, another list by an example."""
     entry = entry_in(kind)
-    if meaning(kind) and _plain_kinds(entry) & {list, dict}:
-        return f": {meaning(kind)}"
     if table_in(entry):
-        return f", each entry {_name(dict, entry)}"
-    examples = {str: '"a"', int: "1", float: "1.5", bool: "true", dict: "{}", list: "[]"}
+        return f": {meaning(kind)}" if meaning(kind) else f", each entry {_name(dict, entry)}"
+    examples = {str: '"a"', int: "1", float: "1.5", bool: "true", dict: "{}"}
+    if list in _plain_kinds(entry):
+        return f" such as [{_list_of(entry).removeprefix(' such as ')}]"
     one = f'"{_words(entry)[0]}"' if _words(entry) else next(examples[k] for k in examples if k in _plain_kinds(entry))
     return f" such as [{', '.join([one] * _length(kind))}]"
 
@@ -199,6 +203,18 @@ def _length(kind: Any) -> int:
     """Return how many entries a list has: as many as are fixed, else one."""
     tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
     return next((len(entries) for entries in tuples if Ellipsis not in entries), 1)
+
+
+def _number(value: Any, field: str) -> float | None:
+    """Return the number that a text means, in the unit of its field: 14.5 for "14,5", "14.5 mm" or "1.45 cm"."""
+    parts = _MEASURE.fullmatch(value) if isinstance(value, str) else None
+    if not parts:
+        return None
+    unit, own = parts[2].lower(), field.rpartition("_")[2]
+    if unit not in ("", own) and not (own == "mm" and unit in _MM):
+        return None
+    number = float(parts[1].replace(",", ".")) * (_MM.get(unit, 1) if own == "mm" else 1)
+    return int(number) if number.is_integer() else number if math.isfinite(number) else None
 
 
 def _in_list(value: Any, kind: Any) -> list[Any] | None:

@@ -34,9 +34,8 @@ def check_path(path: str, base: dict[str, Any], place: str = "sweep") -> None:
         elif entry is not None:
             there = node if isinstance(node, list) else []
             if index_in(step, len(there)) is None:
-                raise Refusal(
-                    path, step, f"the base has no such entry of {'.'.join(steps[:i])}: {_entries(len(there))}"
-                )
+                limit = f"the base has no entry {step} of {'.'.join(steps[:i])}: {_entries(len(there))}"
+                raise Refusal(f"{place}.{path}", None, limit)
             kind = entry
         elif any(typing.get_origin(k) is dict or k is Any for k in alternatives(kind)):
             return
@@ -105,4 +104,4 @@ def _unknown(path: str, base: dict[str, Any], place: str) -> Refusal:
     known = known_paths(base)
     begun = sorted((name for name in known if path and name.startswith(path)), key=len)
     close = begun or difflib.get_close_matches(path, known, n=1, cutoff=0.0)
-    return Refusal(f"{place}.{path}", path, "there is no such path in a spec", close[0] if close else None)
+    return Refusal(f"{place}.{path}", path, "unknown key", close[0] if close else None)

@@ -28,13 +28,14 @@ from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import names_device, read_text
 from unitcad.pipeline.subjects import subject_of_data
 from unitcad.rooms import load
-from unitcad.spec import check_plain, convert, read_toml
+from unitcad.spec import check_plain, convert
 from unitcad.spec.fields import fields_of
 from unitcad.sweeps.paths import check_path, label
 from unitcad.text import some
 from unitcad.validation import compound_kind, confirm_known, every_template, override, put, read
 from unitcad.validation.load import all_faults
-from unitcad.validation.shipped_files import expect_kind, is_path, named_file, shipped_files
+from unitcad.validation.shipped_files import is_path, named_file, shipped_files
+from unitcad.validation.typed_files import load_file
 
 T = TypeVar("T", bound=Struct)
 Mode = Literal["product", "zip", "cases"]
@@ -253,9 +254,7 @@ def load_sweep(source: str | os.PathLike[str]) -> Sweep:
     Raises Refusal or UnitcadError for an unknown base or path, lists of unequal lengths in a zip, an empty sweep.
     """
     path = named_file(os.fspath(source), shipped(), "sweep", WrongArgument)
-    data = read_toml(path)
-    expect_kind(data, str(path), "sweep")
-    return from_file(data, path.parent, path.stem)
+    return load_file(path, "sweep", lambda data: from_file(data, path.parent, path.stem))
 
 
 def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:

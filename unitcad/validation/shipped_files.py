@@ -62,4 +62,8 @@ def named_file(text: str, known: Mapping[str, Path], field: str, kind: type[Refu
     for other in file_kinds():
         if other.command and other.plural and text in shipped_of(other):
             raise _other_kind(other, field, text, kind)
+    if Path(text).is_dir():
+        raise kind(field, text, "is a folder; name a TOML file in it")
+    if Path(text).is_file():
+        raise kind(field, text, "is not a TOML file, whose name ends in .toml")
     raise unknown_name(field, text, known, kind)

@@ -35,12 +35,11 @@ from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point, nearer
 from unitcad.moulds import filament
 from unitcad.moulds.base import PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER, core, outline, plate_top, pry_floor, pry_slot
-from unitcad.moulds.blade import blade
 from unitcad.moulds.cuts import BESIDE, Feature, seams
 from unitcad.moulds.dovetails import Interval, Seam, Split, split, strips, unseen
 from unitcad.moulds.labels import corner_labels, engraved, row_width, set_label
 from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
-from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, stub_pieces
+from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece, stub_pieces
 from unitcad.moulds.pins import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal

@@ -22,13 +22,12 @@ from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, uni
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise, segment_count, thick_pieces
-from unitcad.moulds.blade import bar
 from unitcad.moulds.cavities import united
 from unitcad.moulds.cuts import seams
 from unitcad.moulds.dovetails import Seam, split
 from unitcad.moulds.labels import engraved, set_label
 from unitcad.moulds.layout import groove_depth_of
-from unitcad.moulds.pieces import base_piece, blade_piece
+from unitcad.moulds.pieces import bar, base_piece, blade_piece
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Extrude, Shape, cut, cylinder, moved, ring, union

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
+from scipy.special import stdtrit
 
 from unitcad.attenuation.edge.models import BASELINE, COMPARED, MODELS, edge_levels
 from unitcad.attenuation.edge.nearest import COORDINATES
@@ -132,8 +133,6 @@ def predictive(fit: LabFit, model: str, variant: EstimateInput) -> tuple[int, fl
 
 def quantiles(df: int, centre: float, scale: float) -> tuple[float, ...]:
     """Return the levels at `PERCENT` of a predictive of ln level."""
-    from scipy.special import stdtrit
-
     return tuple(float(np.exp(centre + scale * stdtrit(df, percent / 100))) for percent in PERCENT)
 
 

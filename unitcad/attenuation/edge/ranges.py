@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.special import stdtr, stdtrit
 
 from unitcad.attenuation.edge.closed_form import Units, borders
 from unitcad.attenuation.edge.lab_fit import PERCENT, LabFit
@@ -50,15 +51,11 @@ class Predictive:
 
     def at_most(self, level: float | np.ndarray) -> np.ndarray:
         """Return the probability that the level (motor = 1) is at most `level`, shape (...)."""
-        from scipy.special import stdtr
-
         away = np.log(np.asarray(level, dtype=float)) - self.centre
         return stdtr(self.degrees_of_freedom, away / np.where(away < 0, self.below, self.above))
 
     def quantile(self, share: float) -> np.ndarray:
         """Return the level that a share of the distribution lies below, shape (...)."""
-        from scipy.special import stdtrit
-
         scale = self.below if share < 0.5 else self.above
         return np.exp(self.centre + scale * stdtrit(self.degrees_of_freedom, share))
 
@@ -123,8 +120,6 @@ class Lead:
         The rule between equal moduli and the least measured ratio: its range holds both ends. Each border but the
         strongest may count or not: half its effect.
         """
-        from scipy.special import stdtrit
-
         counts = borders(units)
         effect = (units.passes * -math.log(stored()[RULE]["q"]))[..., None]
         size = np.sort(np.abs(counts), axis=-1)[..., :-1]

@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import stdtr
 
 from unitcad.attenuation.edge.measured_levels import MeasuredTable
 from unitcad.attenuation.edge.models import Model
@@ -121,8 +122,6 @@ def shrunk(model: Model, campaigns: Campaigns, own: bool = True) -> Shrunk:
 
 def judge(model: Model, campaigns: Campaigns) -> Judged:
     """Predict each unit by the constants of its campaign, fitted without it, and by only the paper's."""
-    from scipy.special import stdtr
-
     table, logs = campaigns.table, np.log(campaigns.table.levels)
     centre, scale, df = np.empty(logs.size), np.empty(logs.size), 1
     for i in range(logs.size):

@@ -25,7 +25,7 @@ from unitcad.catalogue import Printer
 from unitcad.designs import layer_colour
 from unitcad.errors import Refusal
 from unitcad.lab.phantom.recipe import PhantomTable
-from unitcad.moulds.blade import bar
+from unitcad.moulds.pieces import bar
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union
 from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT, engraving, text_width

@@ -14,7 +14,7 @@ from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import to_csv
 from unitcad.catalogue import printers
-from unitcad.export import stl, svg, threemf
+from unitcad.export import printing, svg, threemf
 from unitcad.export.chart import Series, chart
 from unitcad.export.printing import print_ready
 from unitcad.export.raster import Surface, draw
@@ -37,7 +37,7 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
     for body in printed(phantom.tools):
         stage(body.name)
         ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
-        found[f"moulds/{body.name}.stl"] = stl.content(*ready, body.name)
+        found[f"moulds/{body.name}.stl"] = printing.stl(*ready, body.name)
         parts.append(threemf.MeshPart(body.name, body.colour, *ready))
     bed = float(phantom.printer.bed_x_mm), float(phantom.printer.bed_y_mm)
     found["moulds/moulds.3mf"] = threemf.content(parts, bed)

@@ -10,8 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, sorted_with_order
-from unitcad.geometry.boxes import Slabs, box_pairs, meeting_parts
-from unitcad.geometry.ticks import Interrupted, Tick, TooMany
+from unitcad.geometry.boxes import Interrupted, Slabs, Tick, TooMany, box_pairs, meeting_parts
 from unitcad.meshcheck.geometry import predicates
 from unitcad.meshcheck.geometry.mesh import MANY, area_vectors, float32_steps, same_place
 from unitcad.meshcheck.geometry.predicates import orient3d
@@ -27,6 +26,7 @@ from unitcad.meshcheck.geometry.sieves import (
     face_boxes,
     hub_walks,
     planes_of,
+    small_shells,
 )
 from unitcad.meshcheck.geometry.topology import Edges, Topology, Turns, max_side_squared, side_by_side
 
@@ -227,8 +227,6 @@ def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, 
     parts = _PARTS if len(ready.order) >= MANY else 1
     small = None
     if topology.n_shells >= LEAST_SHELLS and not every:
-        from unitcad.meshcheck.geometry.sieves import small_shells
-
         with suppress(TooMany):
             crossings.meeting = meeting = box_pairs(topology.low, topology.high, tick)
             small = small_shells(

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints
-from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, morton_order
-from unitcad.geometry.ticks import Tick
+from unitcad.geometry.boxes import Tick, boxes_of, frame_of, meeting_between, morton_order
 from unitcad.meshcheck.geometry.topology import Topology, max_side_squared
 
 _FACES = 1 << 13  # faces whose corners stay in the processor's cache

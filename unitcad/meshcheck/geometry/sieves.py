@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from unitcad.geometry.arrays import Bools, Floats, Ints, among, columns_of, distinct, grouped, sorted_with_order
 from unitcad.geometry.boxes import (
     Slabs,
+    Tick,
     box_order,
     boxes_of,
     frame_of,
@@ -20,7 +21,6 @@ from unitcad.geometry.boxes import (
     ranks_of,
     slabs_of,
 )
-from unitcad.geometry.ticks import Tick
 from unitcad.meshcheck.geometry.topology import Surface, Topology, edges_of, surrounded
 
 _FACES = 1 << 14  # faces whose corners stay in the processor's cache

@@ -24,9 +24,8 @@ from unitcad.geometry.arrays import (
     order_of_packed,
     sorted_with_order,
 )
-from unitcad.geometry.boxes import box_pairs
+from unitcad.geometry.boxes import Tick, box_pairs
 from unitcad.geometry.components import components
-from unitcad.geometry.ticks import Tick
 from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_steps, same_place
 
 _FACES = 1 << 14  # faces that stay in the processor's cache

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from unitcad.geometry.ticks import TooMany
+from unitcad.geometry.boxes import TooMany
 from unitcad.meshcheck.findings import Facts, Finding, Location, Unreadable, counted
 from unitcad.meshcheck.rules.registry import Rule
 

@@ -9,8 +9,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, among, grouped
-from unitcad.geometry.boxes import box_pairs
-from unitcad.geometry.ticks import Interrupted, Tick, TooMany
+from unitcad.geometry.boxes import Interrupted, Tick, TooMany, box_pairs
 from unitcad.meshcheck.findings import Finding, Location, counted, number, point
 from unitcad.meshcheck.geometry.mesh import solid_of
 from unitcad.meshcheck.geometry.predicates import without_area

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, Protocol, SupportsFloat
 
 from unitcad.geometry.arrays import Floats, Ints
-from unitcad.geometry.ticks import Tick
+from unitcad.geometry.boxes import Tick
 from unitcad.meshcheck.findings import Location, detail, point
 from unitcad.meshcheck.geometry.crossings import Crossings, crossings_of
 from unitcad.meshcheck.geometry.mesh import Mesh
