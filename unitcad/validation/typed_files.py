@@ -12,6 +12,7 @@ from unitcad.files import read_text
 from unitcad.rooms import file_kinds, load
 from unitcad.spec import convert, read_toml
 from unitcad.spec.toml_lines import line_of
+from unitcad.validation.shipped_files import shipped_of
 from unitcad.validation.suggestions import every_fault
 
 T = TypeVar("T")
@@ -27,7 +28,7 @@ def load_file(path: Path, kind: str, judge: Callable[[dict[str, Any]], T]) -> T:
         return judge(data)
     except Refusal as first:
         expect_kind(path, kind, first, data)
-        every = every_fault(first, data, judge, {})
+        every = every_fault(first, data, judge, _sound(kind))
         text = read_text(path)
         for i, one in enumerate(every):
             if isinstance(one, UnknownKey):
@@ -38,10 +39,16 @@ def load_file(path: Path, kind: str, judge: Callable[[dict[str, Any]], T]) -> T:
         raise every[0] from None
 
 
+def _sound(kind: str) -> dict[str, Any]:
+    """Return the data of a shipped file of a kind; {} if none is shipped."""
+    shipped = [file for one in file_kinds() if one.name == kind and one.plural for file in shipped_of(one).values()]
+    return read_toml(shipped[0]) if shipped else {}
+
+
 def expect_kind(path: Path, kind: str, refusal: Refusal, data: Mapping[str, Any]) -> None:
     """Raise UnitcadError if data that were refused as one kind of file are another kind without a fault."""
     if not data:
-        raise UnitcadError(f"{path}: is empty; unitcad init writes a file to start from") from refusal
+        raise UnitcadError(f"{path}: is empty; `unitcad schema {kind}` lists its keys") from refusal
     if not isinstance(refusal, UnknownKey) and refusal.value is not None:
         return
     for other in file_kinds():
