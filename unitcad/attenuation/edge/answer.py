@@ -44,8 +44,12 @@ def answer(
     `lines`: the two that lead, `headline` the first without its source; `details`: how sure they are.
     `level`: the headline's, measured or else `p50` (null if a modulus is known as a range only, or if the unit is
     `too_far` from the measured ones). `p10`, `p50` and `p90`: the leading model's median and 80 % range, fractions of
-    the motor's amplitude. `analytic`: the levels of the paper's model. Errors are factors with the unit left out.
-    `held`: how many of the nine measured units lay in the range that was predicted without them. With a lab's fit
+    the motor's amplitude. `analytic`: the levels of the paper's model.
+
+    Errors are factors with the unit left out.
+    `held`: how many of the nine measured units lay in the range that was predicted without them.
+
+    With a lab's fit
     `measured` and `nearest` are the lab's own; `elsewhere` is the paper's measurement of this unit.
     """
     lead, errors = lead_of(variant.moduli, fit), left_out(variant.moduli, fit)

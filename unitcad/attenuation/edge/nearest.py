@@ -126,7 +126,7 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
 def nearest(variant: EstimateInput) -> dict[str, Any]:
     """Return {unit, level, differs_in, not_read} of the paper's unit that is nearest to a variant.
 
-    `differs_in`: what widens the range; `not_read`: what the range does not know.
+    `differs_in`: inputs that widen the range; `not_read`: inputs that the range does not know.
 
     Among units of its class, of its design if there are any, the one whose moduli are nearest.
     """

@@ -27,7 +27,7 @@ LENGTH_SLOPES = np.array([1.2, 0.5, 0.5, 0.5, 1.0, 0.5, 0.5, 0.5, 0.5])
 MODULUS_SLOPE = 1.0
 """Standard deviations of d ln level / d ln input without measurement, of the first `COORDINATES`: assumed.
 
-Finite elements give 0.1 for walls and caps, up to 1.2 for the diameter, and factors of 0.2 to 3 from 60 to 200 Hz; the
+Finite elements give 0.1 for walls and caps, up to 1.2 for the diameter, and factors of 0.2 to 3 from 60 to 200 Hz. The
 two measured pairs that differ in one modulus give +0.7 and +1.6.
 """
 OF_THE_KIND = 0.5
