@@ -23,7 +23,6 @@ from unitcad.validation.dotted import ABSENT, at, put
 from unitcad.validation.shipped_files import expect_kind, is_path, named_file, shipped_files, shipped_of, spelled
 from unitcad.validation.suggestions import every_fault, suggested
 from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
-from unitcad.validation.typed_files import expect_kind
 
 
 def templates() -> dict[str, Path]:
@@ -146,8 +145,6 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
     try:
         return settled(whole)
     except Refusal as first:
-        if path := _file(source):
-            expect_kind(path, "spec", first, data)
         every = every_fault(first, whole, lambda data: to_data(settled(data)), _sound(whole))
         raise _located(every, data, source) from None
 
