@@ -1,4 +1,4 @@
-"""TOML files of one kind: every fault of a file with its line, or the kind that the file is instead."""
+"""TOML files of one kind: every fault of a file with its line."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from unitcad.errors import Refusal, UnitcadError, UnknownKey
+from unitcad.errors import Refusal, UnknownKey
 from unitcad.files import read_text
+from unitcad.rooms import file_kinds
 from unitcad.spec import read_toml
 from unitcad.spec.toml_lines import line_of
-from unitcad.validation.shipped_files import expect_kind
+from unitcad.validation.shipped_files import expect_kind, shipped_of
 from unitcad.validation.suggestions import every_fault
 
 T = TypeVar("T")
@@ -20,16 +21,14 @@ T = TypeVar("T")
 def load_file(path: Path, kind: str, judge: Callable[[dict[str, Any]], T]) -> T:
     """Return the result of `judge` for the data of a TOML file of a kind.
 
-    Raises Refusal with the file's other faults, each with file and line; UnitcadError for a file of another kind.
+    Raises Refusal with the file's other faults, each with file and line; WrongArgument for a file of another kind.
     """
     data = read_toml(path)
-    if not data:
-        raise UnitcadError(f"{path}: is empty; unitcad init writes a file to start from")
     expect_kind(data, str(path), kind)
     try:
         return judge(data)
     except Refusal as first:
-        every = every_fault(first, data, judge, {})
+        every = every_fault(first, data, judge, _sound(kind))
         text = read_text(path)
         for i, one in enumerate(every):
             if isinstance(one, UnknownKey):
@@ -38,3 +37,9 @@ def load_file(path: Path, kind: str, judge: Callable[[dict[str, Any]], T]) -> T:
             one.file, one.line = os.fspath(path), line_of(text, one.field)
         every[0].others = tuple(every[1:])
         raise every[0] from None
+
+
+def _sound(kind: str) -> dict[str, Any]:
+    """Return the data of a shipped file of a kind; {} if none is shipped."""
+    shipped = [file for one in file_kinds() if one.name == kind and one.plural for file in shipped_of(one).values()]
+    return read_toml(shipped[0]) if shipped else {}
