@@ -406,7 +406,9 @@ def _check_held(
             }
         for key, value in of_one.items():
             if value:
-                raise Refusal(f"{field}.{key}", value, "only a single unit's moulds have it", 0.0)
+                raise Refusal(f"{field}.{key}", value, "only a single unit's moulds have it, no array's", 0.0)
+        if unit.motor.absent:
+            raise Refusal(f"{field}.motor", False, "an array's circuit joins motors, and this unit has none")
         if why := way.unfit(unit, sheet):
             known = sorted(templates(), key=lambda name: name != default_template())
             raise Refusal(field, unit.name, why, next((name for name in known if _accepted(data, field, name)), None))

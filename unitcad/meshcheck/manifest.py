@@ -12,8 +12,7 @@ import msgspec
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError, misfit
 from unitcad.meshcheck.findings import FileReport, counted, merge
-from unitcad.meshcheck.options import Options
-from unitcad.meshcheck.rules.inspection import Printer
+from unitcad.meshcheck.rules.inspection import Options, Printer
 from unitcad.meshcheck.rules.m_manifest import M004, M005, ListedFile, check_listed
 
 _MESHES = ("stl", "3mf")
