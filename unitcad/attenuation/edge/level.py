@@ -32,8 +32,8 @@ _OF_WAVES: dict[str, Callable[[Units, cf.Wave], Any]] = {
 }
 KINDS = {
     "rule": "two constants fitted to the measured levels: s, times q for each pass of a border whose inside is the "
-    "softer layer. It reads no thickness and no damping, and of the moduli which side is softer and, below the least measured "
-    "ratio, an assumed line in the ratio's logarithm",
+    "softer layer. It reads which side is softer and, below the least measured ratio of moduli, an assumed line in the "
+    "ratio's logarithm",
     "published": "the paper's closed form as printed: transmission coefficients and exponentials along the walls, one "
     "constant s from the table (f1 and f2 are not printed)",
     "corrected": "the same path with complex moduli, complex impedances and the exact attenuation; one constant s",
