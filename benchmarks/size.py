@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (540_000, 406, 67_500),
-    "core": (260_000, 226, 33_700),
-    "tests": (404_000, 0, 0),
+    "total": (535_600, 401, 66_900),
+    "core": (264_000, 220, 34_050),
+    "tests": (404_100, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900
