@@ -159,6 +159,42 @@ def test_a_body_that_meets_the_motor_is_an_error(tmp_path: Path) -> None:
     (finding,) = [finding for finding in done.manifest["mould_checks"] if not finding["ok"]]
     assert (finding["code"], finding["where"]) == ("C200", "unit: layer1 and motor")
     assert finding["value"] == pytest.approx(math.pi * 3.5**2 * 2, rel=1e-3)
+    assert "room for the motor of 7 x 2 mm" in finding["advice"]
+    assert finding["advice"].endswith("motor = false")
+    without = load(spec_of(tmp_path, "body.stl", layers=1, more="motor = false"))
+    done = build(without, tmp_path / "without", only=("unit", "moulds", "casting"))
+    assert done.ok
+    assert [body.name for body in unit_bodies(without)] == ["layer1"]
+    assert "motor" not in (done.folder / "casting.md").read_text().lower()
+    assert load(done.folder / "spec.toml") == without
+
+
+@pytest.mark.parametrize(("facets", "passes"), [(24, True), (16, False)])
+def test_a_pocket_that_only_its_facets_make_narrow_passes_with_a_note(
+    facets: int, passes: bool, tmp_path: Path
+) -> None:
+    """The middles of a pocket's facets are 3.5 (1 - cos(pi / facets)) mm inside the motor: 0.03, or 0.067 mm."""
+    turns = [2 * math.pi * i / facets for i in range(facets)]
+    pocket = Extrude(polygon(*((3.5 * math.cos(a), 3.5 * math.sin(a)) for a in turns)), -1, 2)
+    (tmp_path / "body.stl").write_bytes(stl_of(cut(hexagon(6.5, 3.25), [pocket])))
+    done = build(load(spec_of(tmp_path, "body.stl", layers=1)), tmp_path / "out", only=("unit",))
+    (finding,) = done.manifest["mould_checks"]
+    polygon_area = facets / 2 * 3.5**2 * math.sin(2 * math.pi / facets)
+    assert finding["value"] == pytest.approx(2 * (math.pi * 3.5**2 - polygon_area), rel=0.01)
+    assert (finding["ok"], "gives way" in finding["advice"]) == (passes, passes)
+
+
+@pytest.mark.parametrize(
+    ("template", "change", "why"),
+    [
+        ("embedded", "motor=false", "motor = false: the design embedded is drawn round one"),
+        ("custom/strap-lugs", "motor=true", "motor = true: takes a table, or false for none; nearest accepted: false"),
+        ("custom/strap-lugs", "motor=false", "(fpcb|wires): leads to a motor, and motor = false"),
+    ],
+)
+def test_a_unit_without_a_motor_is_a_custom_design_without_circuit(template: str, change: str, why: str) -> None:
+    with pytest.raises(Refusal, match=why):
+        load(template, [change])
 
 
 def _open(vertices: np.ndarray, faces: np.ndarray) -> bytes:

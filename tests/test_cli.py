@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from unitcad.casting.steps import duration
 from unitcad.cli import app
 from unitcad.export import slicer
+from unitcad.validation import templates
 
 
 def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -66,6 +67,25 @@ def test_asked_wrongly_is_exit_2_and_writes_nothing(words: list[str], tmp_path: 
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_file_of_another_kind_is_named_with_its_command_and_a_bare_name_finds_its_file(tmp_path: Path) -> None:
+    for name, text in (("walls", 'base = "embedded"\n[sweep]\ndiameter_mm = [14, 15]\n'), ("mine", None)):
+        template = Path(str(templates()["single-embedded"]))
+        (tmp_path / f"{name}.toml").write_text(text or template.read_text("utf-8"), "utf-8")
+    for words, told in (
+        ("build walls", "SPEC = 'walls.toml': is a sweep: run unitcad batch walls.toml"),
+        ("estimate thickness", "SPEC = 'thickness': is a sweep: run unitcad batch thickness"),
+        ("batch mine.toml", "SWEEP = 'mine.toml': is a spec: run unitcad build mine.toml"),
+        ("batch forearm-patch", "SWEEP = 'forearm-patch': is an array: run unitcad build forearm-patch"),
+        ("design walls", "TARGET = 'walls.toml': is a sweep: run unitcad batch walls.toml"),
+        ("phantom mine", "PHANTOM = 'mine.toml': is a spec: run unitcad build mine.toml"),
+    ):
+        done = _run(*words.split(), cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (2, f"error: {told}\n"), words
+    done = _run("build", "mine", "--only", "unit", "--formats", "stl", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.startswith(str(Path("out", "single-embedded-")))
+
+
 def test_an_output_that_is_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine")
     done = _run("build", "embedded", "--formats", "stl", cwd=tmp_path)
@@ -97,25 +117,30 @@ def test_estimate_says_that_build_would_refuse_the_moulds(setting: str, field: s
 
 
 WRONG = {
-    "build --nope": "No such option: --nope",
-    "build": "Missing argument 'SPEC'",
-    "bild": "No such command 'bild'",
-    "batch x -j abc": "Invalid value for '-j' / '--jobs'",
-    "batch a b": "Invalid value for SWEEP: one sweep a batch; b is one too many",
-    "build a --out": "Option '--out' requires an argument",
-    "check --jobs 0": "Invalid value for '--jobs' / '-j'",
+    "build --nope": "--nope: unknown option; see unitcad build --help",
+    "build --jobs 4": "--jobs: unknown option; see unitcad build --help",
+    "build --format stl": "--format: unknown option; closest: --formats",
+    "build": "SPEC...: is required; see unitcad build --help",
+    "bild": "COMMAND = 'bild': unknown name; closest: build; nearest accepted: 'build'",
+    "batch x -j abc": "--jobs = 'abc': takes a whole number, such as 1",
+    "batch a b": "SWEEP = 'b': a batch takes one sweep; build this one by another command",
+    "build a --out": "Option '--out' requires an argument; see unitcad --help",
+    "check --jobs 0": "--jobs = 0: must be at least 1; nearest accepted: 1",
+    "cache gc --limit -1": "--limit = -1: must be from 0 to 1e+12; nearest accepted: 0",
+    "material a.csv --width-mm nan": "--width-mm: nan is not a finite number; see unitcad material --help",
 }
 
 
 @pytest.mark.parametrize("words", WRONG)
 def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words: str) -> None:
     command, *rest = words.split()
-    plain, as_json = _run(command, *rest), _run(command, "--json", *rest)
+    below = rest[:1] if command == "cache" else []
+    plain = _run(command, *rest)
+    as_json = _run(command, *below, "--json", *rest[len(below) :])
     assert plain.returncode == as_json.returncode == 2
     assert plain.stdout == ""
     (line,) = plain.stderr.splitlines()
-    assert line.startswith(f"error: {WRONG[words]}")
-    assert line.endswith(" --help")
+    assert line == f"error: {WRONG[words]}"
     assert f"error: {json.loads(as_json.stdout)['error']['message']}" == line
 
 

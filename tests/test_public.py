@@ -260,9 +260,9 @@ def test_meshes_are_handed_out_in_both_libraries() -> None:
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(solid.volume(), rel=1e-12)
     assert variant.mesh(variant.bodies["cup1"]).volume() == variant.mesh("cup1").volume()
-    with pytest.raises(Refusal, match="body = 'layer3': not known; closest: layer2, layer1"):
+    with pytest.raises(Refusal, match="body = 'layer3': unknown name; closest: layer2, layer1"):
         variant.mesh("layer3")
-    with pytest.raises(Refusal, match="library = 'open3d': not known"):
+    with pytest.raises(Refusal, match="library = 'open3d': unknown name"):
         variant.mesh("layer1", "open3d")  # type: ignore[call-overload]
     with pytest.raises(Refusal, match="body = 1: takes a body's name or a Body"):
         variant.mesh(1)  # type: ignore[call-overload]
@@ -329,9 +329,9 @@ def test_reprs_are_short_and_html_holds_no_script(tmp_path: Path) -> None:
 
 
 def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(Refusal, match="printer = 'fdm': not known"):
+    with pytest.raises(Refusal, match="printer = 'fdm': unknown name"):
         unitcad.check("a.stl", printer="fdm")
-    with pytest.raises(Refusal, match="unit = 'yard': not known"):
+    with pytest.raises(Refusal, match="unit = 'yard': unknown name"):
         unitcad.check("a.stl", unit="yard")
     with pytest.raises(Refusal, match=r"timeout = 0: must be a number from 0\.001"):
         unitcad.check("a.stl", timeout=0)
@@ -339,9 +339,9 @@ def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
         unitcad.check()
     with pytest.raises(Refusal, match=r"estimate\.frequency_hz = 9000: must be at most 5000"):
         unitcad.estimate("encapsulating", frequency_hz=9000)
-    with pytest.raises(Refusal, match=r"estimate\.models\.0 = 'own': not known"):
+    with pytest.raises(Refusal, match=r"estimate\.models\.0 = 'own': unknown name"):
         unitcad.estimate("encapsulating", models=["own"])  # type: ignore[list-item]
-    with pytest.raises(Refusal, match=r"output\.formats\.0 = 'stp': not known"):
+    with pytest.raises(Refusal, match=r"output\.formats\.0 = 'stp': unknown name"):
         unitcad.build("encapsulating", tmp_path, formats=["stp"])  # type: ignore[list-item]
     assert list(tmp_path.iterdir()) == []
 
@@ -353,10 +353,10 @@ def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
         (lambda: unitcad.load("encapsulating", set=3), "^set takes a dict by path or texts"),  # type: ignore[arg-type]
         (lambda: unitcad.load("encapsulating", set=[3]), "^set takes .*, not int$"),  # type: ignore[list-item]
         (lambda: unitcad.Spec("encapsulating"), "^Spec takes its keys by name"),  # type: ignore[call-arg]
-        (lambda: unitcad.load("encapsulatin"), "^spec = 'encapsulatin': not known"),
+        (lambda: unitcad.load("encapsulatin"), "^spec = 'encapsulatin': unknown name"),
         (lambda: unitcad.load("encapsulating", set="x"), "^set = 'x': needs the form path=value"),
         (lambda: unitcad.build("embedded", 3), "^out = 3: takes a path, not int$"),  # type: ignore[arg-type]
-        (lambda: unitcad.build("embedded", only="units"), "^only = 'units': not known"),
+        (lambda: unitcad.build("embedded", only="units"), "^only = 'units': unknown name"),
         (lambda: unitcad.build("embedded", only=[3]), "^only = 3: takes a text or a list of"),  # type: ignore[list-item]
         (lambda: unitcad.estimate("embedded", models=3), "^models = 3: takes a text or"),  # type: ignore[arg-type]
         (lambda: unitcad.check("a.stl", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]

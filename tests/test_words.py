@@ -24,6 +24,8 @@ PATTERNS = {
 }
 LONG = 25
 """Words of a sentence, at most."""
+LIMIT = 25_000
+"""Words of the pages that people write, without code, at most."""
 
 
 def _strings(source: str) -> str:
@@ -68,6 +70,11 @@ def test_bad_words_do_not_increase() -> None:
         if count > limits.get(folder, {}).get(pattern, 0)
     ]
     assert more == []
+
+
+def test_the_docs_stay_short() -> None:
+    pages = [path.read_text("utf-8") for path in (ROOT / "docs").rglob("*.md") if "evidence" not in path.parts]
+    assert sum(len(re.sub(r"(?s)```.*?```", "", page).split()) for page in pages) <= LIMIT
 
 
 if __name__ == "__main__":

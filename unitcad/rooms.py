@@ -27,6 +27,8 @@ class Command(Struct, frozen=True, forbid_unknown_fields=True):
     """"module:name" of its function, or of its Typer application."""
     group: str
     help: str
+    examples: tuple[str, ...] = ()
+    """Command lines at the end of its help."""
 
 
 class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
@@ -42,7 +44,9 @@ class FileKind(Struct, frozen=True, forbid_unknown_fields=True):
     schema: str = ""
     """"module:name" of the function that returns the JSON Schema; default: the schema of `model`."""
     command: str = ""
-    """The command that takes the file; empty if `unitcad init` does not write one."""
+    """The command that takes the file; empty if none does."""
+    starts: bool = False
+    """Whether `unitcad init` writes one."""
     keys: tuple[str, ...] = ()
     """The top-level keys by which a file is known to be of this kind."""
     subject: str = ""

@@ -9,6 +9,9 @@ import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.errors import Refusal
+from unitcad.export.printing import stl
+from unitcad.kernels.mesh import arrays, realise
+from unitcad.shape import cylinder
 
 LIKE = """
 name = "pair"
@@ -53,7 +56,7 @@ def test_a_place_takes_like_too() -> None:
 @pytest.mark.parametrize(
     ("change", "field", "words"),
     [
-        ("unit.like=nope", "unit.like", "not known"),
+        ("unit.like=nope", "unit.like", "unknown name"),
         ("unit.like=3", "unit.like", "takes a text"),
         ("unit=nope.toml", "unit", "there is no file nope.toml"),
     ],
@@ -80,3 +83,12 @@ def test_what_moulds_of_arrays_do_not_draw_is_refused(name: str, unit: dict[str,
     with pytest.raises(Refusal) as refused:
         load_array({**asked, "unit": {**asked["unit"], **unit}})
     assert refused.value.field == field
+
+
+def test_an_array_refuses_a_unit_without_a_motor(tmp_path: Path) -> None:
+    (tmp_path / "disc.stl").write_bytes(stl(*arrays(realise(cylinder(7, 0, 4), 96)), "disc"))
+    layer = '[[layers]]\nmaterial = "ecoflex-00-30"\nwall_mm = 3.0\n'
+    text = f'name = "disc"\ndesign = "disc.stl"\ndiameter_mm = 14.0\nmotor = false\n{layer}'
+    (tmp_path / "disc.toml").write_text(text)
+    with pytest.raises(Refusal, match=r"^unit\.motor = false: an array's circuit joins motors"):
+        load_array("forearm-pockets", {"unit": str(tmp_path / "disc.toml")})

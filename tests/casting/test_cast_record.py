@@ -108,8 +108,8 @@ def test_a_record_without_its_spec_says_so() -> None:
 
 
 def test_the_example_of_the_docs_is_a_record() -> None:
-    text = (Path(__file__).parents[2] / "docs" / "explanation" / "moulds.md").read_text("utf-8")
-    example = text.split("## The cast record")[1].split("```json\n")[1].split("```")[0]
+    text = (Path(__file__).parents[2] / "docs" / "how-to" / "print-and-cast.md").read_text("utf-8")
+    example = text.split("## Write a cast record")[1].split("```json\n")[1].split("```")[0]
     assert cast_record(json.loads(example)).units[0].wall_mm(1) == (1.2, 1.3)
 
 

@@ -167,7 +167,7 @@ def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path):
         ({"printer": "sla"}, "printer", "inside would fit"),
         ({"printer": "fdm"}, "printer", "closest"),
         ({"layers": [{**LAYERS[0], "thinner_pct": 40.0}]}, "layers.0.thinner_pct", "25"),
-        ({"layers": [{**LAYERS[0], "silicone": "dragon-skin-30"}]}, "layers.0.silicone", "not known"),
+        ({"layers": [{**LAYERS[0], "silicone": "dragon-skin-30"}]}, "layers.0.silicone", "unknown name"),
         ({"layers": [LAYERS[0], LAYERS[0]]}, "layers", "name of its own"),
         ({"layers": [{**LAYERS[0], "thickness_mm": 0.1}]}, "layers.0.thickness_mm", "0.5"),
         ({"most_echo_pct": 0.1}, "most_echo_pct", "0.5"),

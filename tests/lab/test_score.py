@@ -76,16 +76,16 @@ def test_the_shipped_figure_says_that_it_is_synthetic_and_is_scored(tmp_path: Pa
 @pytest.mark.parametrize(
     ("row", "field", "limit"),
     [
-        ("embeded D30/E10,0,0.6,,f", "row 1, unit", "closest: embedded"),
-        ("embedded D30/X10,0,0.6,,f", "row 1, unit", "not known"),
-        ("single D30/E10,0,0.6,,f", "row 1, unit", "single has one silicone"),
-        ("embedded D30,0,0.6,,f", "row 1, unit", "a design two or more"),
-        ("embedded D30/E10,0,62,,f", "row 1, value", "not per cent"),
-        ("embedded D30/E10,0,0,,f", "row 1, value", "from 1e-06"),
-        ("embedded D30/E10,-1,0.6,,f", "row 1, distance_mm", "from 0 to 30"),
-        ("embedded D30/E10,0,x,,f", "row 1, value", "must be a number"),
-        ("embedded D30/E10,0,0.6", "row 1", "must have 5 cells"),
-        ("embedded D30/E10,0,0.6,,f,g", "row 1", "must have 5 cells"),
+        ("embeded D30/E10,0,0.6,,f", "unit", "closest: embedded"),
+        ("embedded D30/X10,0,0.6,,f", "unit", "unknown name"),
+        ("single D30/E10,0,0.6,,f", "unit", "single has one silicone"),
+        ("embedded D30,0,0.6,,f", "unit", "a design two or more"),
+        ("embedded D30/E10,0,62,,f", "value", "not per cent"),
+        ("embedded D30/E10,0,0,,f", "value", "from 1e-06"),
+        ("embedded D30/E10,-1,0.6,,f", "distance_mm", "from 0 to 30"),
+        ("embedded D30/E10,0,x,,f", "value", "must be a number"),
+        ("embedded D30/E10,0,0.6", "row", "must have 5 cells"),
+        ("embedded D30/E10,0,0.6,,f,g", "row", "must have 5 cells"),
     ],
 )
 def test_what_is_refused(tmp_path: Path, row: str, field: str, limit: str) -> None:
@@ -96,7 +96,7 @@ def test_what_is_refused(tmp_path: Path, row: str, field: str, limit: str) -> No
 
 
 def test_files_that_are_no_figures_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(Refusal, match="FIGURE = 'synthetc': not known; closest: synthetic"):
+    with pytest.raises(Refusal, match="FIGURE = 'synthetc': unknown name; closest: synthetic"):
         load_figure("synthetc")
     with pytest.raises(UnitcadError):
         load_figure(str(tmp_path / "none.csv"))

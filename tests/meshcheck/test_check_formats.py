@@ -282,9 +282,12 @@ def test_explain_takes_commas_and_prefixes() -> None:
 
 
 def test_an_unknown_code_names_one_nearest_at_most() -> None:
-    with pytest.raises(Refusal, match=r"^--explain = 'T0001': begins no rule's code; nearest accepted: 'T00\d'$"):
+    with pytest.raises(
+        Refusal,
+        match=r"^--explain = 'T0001': unknown code; unitcad check --list-rules lists all; nearest accepted: 'T00\d'$",
+    ):
         explain("T0001")
-    with pytest.raises(Refusal, match=r"^--select = 'boundary': begins no rule's code$"):
+    with pytest.raises(Refusal, match=r"^--select = 'boundary': unknown code; unitcad check --list-rules lists all$"):
         check_prefixes("--select", ["boundary"])
 
 

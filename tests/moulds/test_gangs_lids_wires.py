@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from pathlib import Path
 
 import pytest
 from faulty_sets import broken, of_spec, set_of
@@ -234,13 +233,6 @@ def test_a_connector_that_would_tear_the_slot() -> None:
     # 2 (w + t) = 2 (3.4 + 0.4) (1 + 0.5 x 3.64), Dragon Skin 30's elongation being 364 %.
     assert nearest == pytest.approx(3.8 * 2.82 - 0.11, abs=1e-3)
     of_spec(load("encapsulating", {"fpcb.tail_end_width_mm": nearest}))
-
-
-def test_docs_list_every_code() -> None:
-    from unitcad.checks import mould_checks
-
-    page = (Path(__file__).parents[2] / "docs" / "explanation" / "moulds.md").read_text("utf-8")
-    assert all(f"| {code} |" in page for code in mould_checks())
 
 
 @pytest.mark.parametrize(

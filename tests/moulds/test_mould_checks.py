@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from faulty_sets import broken, set_of, with_fault, without
@@ -141,11 +139,9 @@ def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Call
     assert code in broken(with_fault(set_of("encapsulating"), tool, change)), what
 
 
-def test_every_check_has_a_planted_fault_and_a_row_in_the_docs() -> None:
-    page = (Path(__file__).parents[2] / "docs/explanation/moulds.md").read_text("utf-8")
-    rows = re.findall(r"^\| (C\d+) \|", page, re.M)
+def test_every_check_has_a_planted_fault() -> None:
     # A bar inside the template's layer does not stretch it by its limit: C310 has closed forms below.
-    assert {fault[0] for fault in FAULTS} | {"C310"} == set(rows) == set(mould_checks())
+    assert {fault[0] for fault in FAULTS} | {"C310"} == set(mould_checks())
 
 
 def test_a_forgotten_tongue_is_a_leak() -> None:

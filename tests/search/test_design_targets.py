@@ -34,11 +34,11 @@ from unitcad.search.target_file import load_target, shipped, target_of
             "unknown key",
             "target.diameter_max_mm",
         ),
-        ({"at_hand": {"materials": ["ecoflex"]}}, "at_hand.materials.0", "not known", "ecoflex-00-50"),
+        ({"at_hand": {"materials": ["ecoflex"]}}, "at_hand.materials.0", "unknown name", "ecoflex-00-50"),
         ({"at_hand": {"materials": ["ecoflex-00-10"] * 2}}, "at_hand.materials.1", "is there twice", None),
-        ({"at_hand": {"printer": "prusa"}}, "at_hand.printer", "not known", ANY),
-        ({"at_hand": {"motors": ["LCM"]}}, "at_hand.motors.0", "not known", None),
-        ({"at_hand": {"designs": ["embeded"]}}, "at_hand.designs.0", "not known", "embedded"),
+        ({"at_hand": {"printer": "prusa"}}, "at_hand.printer", "unknown name", ANY),
+        ({"at_hand": {"motors": ["LCM"]}}, "at_hand.motors.0", "unknown name", None),
+        ({"at_hand": {"designs": ["embeded"]}}, "at_hand.designs.0", "unknown name", "embedded"),
         ({"at_hand": {"materials": ["ecoflex-00-50"]}}, "at_hand.materials", "no level can be estimated", None),
         ({"vary": {"wall_mm": [2.0, 1.0]}}, "vary.wall_mm", "from the least to the largest", [1.0, 2.0]),
         ({"vary": {"wall_mm": [0.1, 1.0]}}, "vary.wall_mm.0", "at least 0.5", 0.5),
@@ -46,7 +46,7 @@ from unitcad.search.target_file import load_target, shipped, target_of
         ({"vary": {"layers": [2, 2]}}, "vary.layers.1", "is there twice", None),
         ({"vary": {"layers": [2], "step_mm": 0.01}}, "vary.step_mm", "more than 20000 sets of lengths", 0.02),
         ({"estimate": {"fit": "none.toml"}}, "estimate.fit", "none.toml", None),
-        ({"spec": {"layers": {}}}, "spec.layers", "not known", None),
+        ({"spec": {"layers": {}}}, "spec.layers", "unknown name", None),
         ({"spec": {"motor": {"part": "x"}}}, "spec.motor.part", "is in at_hand.motors", None),
     ],
 )
@@ -75,7 +75,7 @@ def test_shipped_targets_load_and_are_listed(run: Any) -> None:
 def test_a_name_that_is_no_target_is_refused(run: Any) -> None:
     done = run("design", "quiet")
     assert done.returncode == 2
-    assert "TARGET = 'quiet': not known; closest: quiet-edge" in done.stderr
+    assert "TARGET = 'quiet': unknown name; closest: quiet-edge" in done.stderr
 
 
 def test_a_target_to_start_from(run: Any, tmp_path: Path) -> None:
@@ -83,7 +83,7 @@ def test_a_target_to_start_from(run: Any, tmp_path: Path) -> None:
     assert load_target(tmp_path / "mine.toml").goals.edge_max == 0.06
     done = run("init", "other", "--template", "quiet", cwd=tmp_path)
     assert done.returncode == 2
-    assert "--template = 'quiet': not known; closest: quiet-edge" in done.stderr
+    assert "--template = 'quiet': unknown name; closest: quiet-edge" in done.stderr
     assert not (tmp_path / "other.toml").exists()
 
 

@@ -43,6 +43,31 @@ def test_a_refused_value_stays_with_its_reason_and_a_button_that_accepts(live):
     assert live.page.evaluate("() => document.activeElement.name") == "layers.0.wall_mm"
 
 
+def test_a_part_fills_the_motor_s_fields_and_the_pieces_lie_side_by_side(live):
+    def value(name):
+        return live.page.input_value(f'[name="{name}"]')
+
+    live.choose('input[name="motor.diameter_mm"]', "6.9")
+    count = len(live.timings())
+    live.page.select_option('select[name="motor.part"]', "VG1040003D")
+    live.until(lambda: len(live.timings()) > count)
+    live.settled()
+    # It is refused at 14 mm, and its size is there all the same; the ring of air of 1 mm is kept.
+    assert (value("motor.diameter_mm"), value("motor.thickness_mm"), value("motor.drive")) == ("10", "4", "axial")
+    live.page.click("text=Use diameter_mm = 17")
+    live.until(lambda: "passed" in live.state)
+    assert value("motor.diameter_mm") == "10"
+    ranges = live.page.locator('.field[data-path="layers.0.wall_mm"] .range').inner_text()
+    assert ranges == "0.5 to 5 mm"
+    live.page.evaluate("() => window.scrollTo(0, document.body.scrollHeight)")
+    assert live.page.get_by_role("button", name="Build this").bounding_box()["y"] < 100
+    live.page.check('input[value="moulds"]')
+    looks = [live.page.input_value('input[name="apart"]'), live.page.is_checked('input[name="cut"]')]
+    assert looks == ["100", False]
+    live.page.click('button[aria-label="Step on"]')
+    assert live.page.input_value('input[name="apart"]') == "0"
+
+
 def test_form_and_text_are_in_step_and_changes_are_undone(live):
     live.page.click("text=As TOML text")
     live.choose(WALL, "1.4")
@@ -103,9 +128,9 @@ def test_a_change_that_another_field_refuses_is_refused_where_it_was_made(live):
     fault = live.page.locator('.field[data-path="layers.0.wall_mm"] .refusal')
     assert "walls of 10.25 a side need 27.7 mm" in fault.inner_text()
     buttons = [button.inner_text() for button in fault.get_by_role("button").all()]
-    assert buttons == ["Use 2.15", "Use diameter_mm = 27.7"]
+    assert buttons == ["Use 2.15", "Use diameter_mm = 29.5"]
     live.pressed(fault.get_by_role("button").nth(1))
-    assert live.page.input_value('input[name="diameter_mm"]') == "27.7"
+    assert live.page.input_value('input[name="diameter_mm"]') == "29.5"
     assert "passed" in live.state
 
 

@@ -42,6 +42,20 @@ def test_a_refusal_stands_where_the_change_was(path, accepted, refused, other):
     assert faults("encapsulating", [edit, Edit(path=other, value=fault.nearest)], []) == []
 
 
+@pytest.mark.parametrize(
+    ("path", "accepted", "refused", "diameter"),
+    [
+        ("motor.part", "LCM0720A3463F", "VG1040003D", 17.0),
+        ("motor.diameter_mm", 7.0, 9.0, 16.0),
+        ("layers.0.wall_mm", 1.25, 2.5, 16.5),
+    ],
+)
+def test_the_offered_diameter_keeps_the_ring_of_air(path, accepted, refused, diameter):
+    """The template is 14 mm across: a motor of 7 mm, walls of 2.5 mm a side and a ring of 1 mm."""
+    fault = faults("encapsulating", [Edit(path=path, value=refused)], [Edit(path=path, value=accepted)])[0]
+    assert (fault.field, fault.nearest) == ("diameter_mm", diameter)
+
+
 def test_a_change_that_is_not_to_blame_is_not_blamed():
     edits = [Edit(path="layers.0.wall_mm", value=9.0), Edit(path="moulds.plate_mm", value=5.0)]
     assert faults("encapsulating", edits, [Edit(path="moulds.plate_mm", value=4.0)])[0].at == ""

@@ -232,7 +232,7 @@ def test_who_is_not_of_the_authority_is_not_talked_to(encrypted, tmp_path):
     ("address", "files", "message"),
     [
         ("tls://127.0.0.1:9", [], "needs --tls-ca-file, --tls-cert and --tls-key"),
-        ("tls://127.0.0.1:9", ["none.pem"], "--tls-ca-file = '{}/none.pem': there is no such file"),
+        ("tls://127.0.0.1:9", ["none.pem"], "--tls-ca-file = '{}/none.pem': no such file"),
         ("tls://127.0.0.1:9", ["text", "text", "text"], "the certificates can't be used: "),
         ("tcp://127.0.0.1:9", ["text"], "--tls-ca-file = '{}/text': needs a --scheduler at tls://"),
         (None, ["text"], "--tls-ca-file = '{}/text': needs a --scheduler at tls://"),

@@ -111,7 +111,7 @@ def test_shards_that_do_not_fit_together(tmp_path):
         merge(out, shard_folders(out), BatchOptions())
     with pytest.raises(UnitcadError, match=r"is not a shard of a batch \(no shard.json\)"):
         merge(out, [out], BatchOptions())
-    with pytest.raises(UnitcadError, match="nowhere: there is no such folder"):
+    with pytest.raises(UnitcadError, match="nowhere: no such folder"):
         merge(out, [tmp_path / "nowhere"], BatchOptions())
     with pytest.raises(UnitcadError, match="has shards, which unitcad batch merge joins"):
         made(sweep, out)

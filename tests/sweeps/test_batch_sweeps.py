@@ -11,11 +11,12 @@ from typer.testing import CliRunner
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline.plan import build_key
+from unitcad.pipeline.subjects import subject
 from unitcad.sweeps import load_sweep
 from unitcad.sweeps.paths import known_paths
 from unitcad.sweeps.run import counted
 from unitcad.sweeps.sweep import Range, from_file, shipped
-from unitcad.validation import read
+from unitcad.validation import load, read
 
 SOFT, STIFF = "ecoflex-00-10", "dragon-skin-30"
 
@@ -47,9 +48,20 @@ def test_a_zip_walks_its_lists_together_and_repeats_what_is_one():
 def test_cases_name_their_base_and_values():
     cases = [{"diameter_mm": 15.0}, {"base": "single-embedded", "name": "one", "layers.0.wall_mm": 2.4}]
     sweep = _sweep({"mode": "cases", "cases": cases})
-    assert [sweep.spec(i).name for i in (0, 1)] == ["encapsulating", "one"]
+    assert [sweep.spec(i).name for i in (0, 1)] == ["encapsulating-diameter15", "one"]
     assert [len(sweep.spec(i).layers) for i in (0, 1)] == [2, 1]
     assert sweep.spec(1).layers[0].wall_mm == 2.4
+
+
+def test_a_variant_s_folder_carries_the_swept_values():
+    walls = {"layers.0.wall_mm": [1.0, 1.2], "layers.1.wall_mm": [1.0], "motor.fill": [True, False], "fpcb.tail": "one"}
+    sweep = _sweep({**walls, "moulds.cavities": [[1, 1], [2, 3]], "layers.0.material": [SOFT, STIFF]}, "embedded")
+    names = [subject(sweep.spec(i)).folder_name[:-13] for i in range(sweep.count)]
+    assert names[0] == "embedded-wall1-fill-cavities1x1-ecoflex-00-10"
+    assert names[-1] == "embedded-wall1.2-no-fill-cavities2x3-dragon-s"
+    both = _sweep({"layers.0.wall_mm": [1.0, 1.2], "layers.1.wall_mm": [1.1, 1.3]}, "embedded").spec(2)
+    assert subject(both).folder_name == f"embedded-wall1-1.2-wall2-1.1-{subject(both).hash[:12]}"
+    assert subject(load("embedded", {"name": "com1.5 .x."})).folder_name.startswith("com1-5-x-")  # a device on Windows
 
 
 def test_whole_tables_and_fixed_values():
@@ -97,12 +109,12 @@ def test_the_paper_sweep_has_every_measured_unit():
         ({"layers.0.wal_mm": [1.0]}, ["sweep.layers.0.wal_mm", "nearest accepted: 'layers.0.wall_mm'"]),
         ({"estimate.freq": [1.0]}, ["nearest accepted: 'estimate.frequency_hz'"]),
         ({"diameter": [1.0]}, ["nearest accepted: 'diameter_mm'"]),
-        ({"layers.2.wall_mm": [1.0]}, ["layers.2.wall_mm = '2'", "no such entry of layers: they are 0 to 1"]),
-        ({"diameter_mm.x": [1.0]}, ["no such path"]),
+        ({"layers.2.wall_mm": [1.0]}, ["sweep.layers.2.wall_mm: the base has no entry 2 of layers: they are 0 to 1"]),
+        ({"diameter_mm.x": [1.0]}, ["unknown key"]),
         ({}, ["the sweep is empty"]),
         ({"diameter_mm": []}, ["sweep.diameter_mm", "the sweep is empty"]),
         ({"mode": "cases"}, ["the sweep is empty"]),
-        ({"mode": "cases", "cases": [{"nme": 1}]}, ["there is no such path"]),
+        ({"mode": "cases", "cases": [{"nme": 1}]}, ["unknown key"]),
         ({"mode": "cases", "cases": [{}], "diameter_mm": [1.0]}, ["[[sweep.cases]] only"]),
         ({"cases": [{}]}, ["another mode", "cases"]),
         ({"mode": "prodct", "diameter_mm": [14.0]}, ["sweep.mode", "closest: product"]),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -103,6 +105,14 @@ def test_examples_with_a_brep_library_run(text: str, tmp_path: Path, monkeypatch
 @pytest.mark.parametrize("page", _pages_with("console"))
 def test_console_examples_run(page: Path, tmp_path: Path) -> None:
     run_console(page, tmp_path)
+
+
+def test_the_readme_shows_the_output_of_its_first_command(tmp_path: Path) -> None:
+    """The text block, and nothing before or between its lines; estimate and folder follow."""
+    command = [sys.executable, "-m", "unitcad", "build", "encapsulating", "-o", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    [shown] = blocks(ROOT / "README.md", "text")
+    assert done.stderr.startswith(shown)
 
 
 LINK = re.compile(r"\]\(([^)\s#]*)(?:#([^)\s]+))?\)")

@@ -50,16 +50,16 @@ _RANGES = ("ranges", "specs", "built", "refused", "faults", "longest_s")
 def accuracy(
     spec: Annotated[
         str | None,
-        typer.Argument(metavar="SPEC", help="A unit or an array: template or TOML file; default: the survey."),
+        typer.Argument(metavar="[SPEC]", help="Spec or array file, or name of a template. Default: the survey."),
     ] = None,
     sets: Sets = None,
     media: Annotated[
-        int | None, typer.Option(min=1, max=90_000, help=f"Survey: number of random media; default: {_MEDIA}.")
+        int | None, typer.Option(metavar="N", min=1, max=90_000, help=f"Random media of the survey. Default: {_MEDIA}.")
     ] = None,
     specs: Annotated[
-        int | None, typer.Option(min=2, max=90_000, help=f"Survey: number of random specs; default: {_SPECS}.")
+        int | None, typer.Option(metavar="N", min=2, max=90_000, help=f"Random specs of the survey. Default: {_SPECS}.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Survey: seed of the random media and specs.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the random media and specs.")] = 0,
     as_json: AsJson = False,
 ) -> None:
     """Measure the errors of meshes and response, their bounds and what they cost. Exit 1 if an error exceeds its bound.

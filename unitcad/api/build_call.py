@@ -141,11 +141,11 @@ def build(
     >>> built.ok, round(built.volumes["layer1"])
     (True, 181)
     """
-    into, say = Path(path("out", out)), progress or _silent
-    wanted = load_subject(source, set)
+    into, say, outputs = Path(path("out", out)), progress or _silent, texts("only", only)
+    wanted = load_subject(source, set, outputs)
     if formats is not None:
         wanted = load_subject(wanted.of, {"output.formats": texts("formats", formats)})
-    built = build_whole(wanted.of, into, only=texts("only", only), check=check, say=say)
+    built = build_whole(wanted.of, into, only=outputs, check=check, say=say)
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
         with held(built.folder):
             write_report(built.folder)

@@ -39,6 +39,7 @@ from unitcad.validation import custom_templates, default_template, from_data, te
 from unitcad.validation.dotted import ABSENT, at
 from unitcad.validation.load import changed, override
 from unitcad.validation.shipped_files import named_file, shipped_files
+from unitcad.validation.suggestions import every_fault
 from unitcad.validation.tables import Changes, changes_of
 
 
@@ -205,10 +206,22 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
     try:
         return array_of(whole, lay_tails=lay_tails)
     except Refusal as first:
-        refusal = offered(first, whole, makeable_array if lay_tails else partial(array_of, lay_tails=False))
+        sound = sound_array(whole)
+        every = every_fault(first, whole, partial(array_of, lay_tails=lay_tails), sound)
+        if len(every) == 1:
+            every = [offered(first, whole, makeable_array if lay_tails else partial(array_of, lay_tails=False), sound)]
         if path is not None:
-            _locate(refusal, path, data, written, whole)
-        raise refusal from None
+            for one in every:
+                _locate(one, path, data, written, whole)
+        every[0].others = tuple(every[1:])
+        raise every[0] from None
+
+
+def sound_array(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the whole data of a shipped array: of the same construction and kind of layout, if there is one."""
+    shipped = [expanded(read_toml(path), path.parent) for path in array_templates().values()]
+    alike = [one for one in shipped if one["layout"]["kind"] == at(data, "layout.kind")] or shipped
+    return next((one for one in alike if one["array"] == data.get("array")), alike[0])
 
 
 def makeable_array(data: Mapping[str, Any]) -> Array:
@@ -393,7 +406,9 @@ def _check_held(
             }
         for key, value in of_one.items():
             if value:
-                raise Refusal(f"{field}.{key}", value, "only a single unit's moulds have it", 0.0)
+                raise Refusal(f"{field}.{key}", value, "only a single unit's moulds have it, no array's", 0.0)
+        if unit.motor.absent:
+            raise Refusal(f"{field}.motor", False, "an array's circuit joins motors, and this unit has none")
         if why := way.unfit(unit, sheet):
             known = sorted(templates(), key=lambda name: name != default_template())
             raise Refusal(field, unit.name, why, next((name for name in known if _accepted(data, field, name)), None))

@@ -27,6 +27,7 @@ from unitcad.arrays.array_file import (
     expanded,
     load_array,
     makeable_array,
+    sound_array,
     to_toml,
     with_formats,
 )
@@ -112,7 +113,7 @@ class Arrayed(Compound):
 
     @classmethod
     def offered(cls, refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
-        return offered(refusal, data, makeable_array)
+        return offered(refusal, data, makeable_array, sound_array(data))
 
     @classmethod
     def write_page(cls, folder: Path, warn: Callable[[str], None]) -> Path:

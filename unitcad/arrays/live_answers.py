@@ -11,7 +11,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import array_of, array_templates, expanded, makeable_array, to_toml
+from unitcad.arrays.array_file import array_of, expanded, makeable_array, sound_array, to_toml
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.array_tables import AskedArray, CircuitTable, LimbTable, SheetTable
 from unitcad.arrays.array_view import patch_model, tools_model
@@ -31,11 +31,11 @@ from unitcad.serve.messages import Answer, Field, Group, Trusted
 from unitcad.serve.unit_answers import has_code as unit_holds_code
 from unitcad.serve.unit_answers import unit_procedure
 from unitcad.spec.custom_code import files_named
-from unitcad.spec.toml import from_json, read_toml, to_json
+from unitcad.spec.toml import from_json, to_json
 from unitcad.spec.toml_lines import line_of
 from unitcad.validation import templates
 from unitcad.validation.dotted import at
-from unitcad.validation.faults import every_fault
+from unitcad.validation.suggestions import every_fault
 
 as_toml = to_toml
 
@@ -73,17 +73,10 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
 
 def faults_of(first: Refusal, whole: dict[str, Any], text: str) -> list[Refusal]:
     """Return every fault of an array's data, the units' specs whole in it, `first` among them, each with its line."""
-    every = every_fault(first, whole, array_of, _sound(whole))
+    every = every_fault(first, whole, judge, sound_array(whole))
     for one in every:
         one.line = line_of(text, one.field)
     return every
-
-
-def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the whole data of a shipped array: of the same construction and kind of layout, if there is one."""
-    shipped = [expanded(read_toml(path), path.parent) for path in array_templates().values()]
-    alike = [one for one in shipped if one["layout"]["kind"] == at(data, "layout.kind")] or shipped
-    return next((one for one in alike if one["array"] == data.get("array")), alike[0])
 
 
 def named_files(data: Mapping[str, Any]) -> dict[str, str]:

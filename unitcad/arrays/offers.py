@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-import copy
 import math
-from collections.abc import Callable, Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from unitcad.errors import Refusal, UnitcadError
-from unitcad.text import number
-from unitcad.validation.dotted import at, drop, put
+from unitcad.errors import Refusal, shown
+from unitcad.validation.dotted import at
+from unitcad.validation.suggestions import (
+    Judge,
+    bare,
+    culprit_of,
+    followed,
+    good_numbers,
+    is_number,
+    listed,
+    nearest_number,
+    refused,
+)
 
-Judge = Callable[[dict[str, Any]], object]
-"""Makes an array of plain data; raises Refusal for data that can't be made."""
-_MOST = 8
-"""Changes that are tried together."""
+PATIENCE_S = 10.0
+"""How long suggestions are looked for, s of processor time: one try of a large array takes a second."""
 _PITCH = "layout.pitch_mm"
 _OF_TAIL = ("fpcb.tail_length_mm", "wires.length_mm")
 _WIDEST = 16
@@ -34,36 +42,64 @@ _COUNTS: dict[str, dict[str, str]] = {
 """Keys that shorten an array of a kind of layout along each side of the bed."""
 
 
-def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
-    """Return the refusal of plain data with a nearest value that is accepted, or with the further changes needed."""
-    if type(refusal) is not Refusal or (refusal.nearest is None and not refusal.field.endswith(_OF_TAIL)):
+def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Refusal:
+    """Return the refusal of plain data with a suggestion that was tried; `sound` is the data of a shipped array.
+
+    The nearest value is accepted, or the limit names the other values that it needs.
+    """
+    if type(refusal) is not Refusal or (refusal.value is None and refusal.nearest is None):
         return refusal
-    changes: dict[str, object] = {refusal.field: refusal.nearest}
-    limit, met = refusal.limit, _met(data, changes, judge)
-    if refusal.field.endswith(_OF_TAIL) and (wider := _wider(_present_pitches(data), data, judge)):
-        limit += f"; with {_listed(wider, 'and')} it is accepted as it is"
-    for _ in range(_MOST):
-        if met is None or met.nearest is None or changes.get(met.field) == met.nearest:
-            break
-        changes[met.field] = met.nearest
-        met = _met(data, changes, judge)
-    if met is not None or len(changes) > 1:
+    judge = _patient(judge)
+    field, limit = refusal.field, refusal.limit
+    if field.endswith(_OF_TAIL) and (wider := _wider(_present_pitches(data), data, judge)):
+        limit += f"; with {listed(wider, 'and')} it is accepted as it is"
+    changes, met = followed(refusal, data, judge)
+    if set(changes) != {field}:
         pitches = {path: value for path, value in changes.items() if path.startswith(_PITCH)}
-        if refusal.field in pitches and (wider := _wider(pitches, data, judge)):
-            if met is None:
+        if not pitches and field.startswith(_PITCH):
+            pitches = {field: refusal.nearest}
+        if field in pitches and (wider := _wider(pitches, data, judge)):
+            if changes:
                 rest = {path: value for path, value in changes.items() if path not in pitches}
-                limit += f"; {_listed(pitches, 'and')} would also need {_listed(rest, 'and')}"
-            changes, met = wider, None
-    nearest = changes.pop(refusal.field)
-    if refusal.field.startswith(_OF_BED) and met is None and not changes and _places(data) <= _FEW:
+                limit += f"; {listed(pitches, 'and')} would also need {listed(rest, 'and')}"
+            changes = wider
+    if not changes:
+        return _otherwise(Refusal(field, refusal.value, limit), met, data, judge, sound)
+    nearest = changes.pop(field, None)
+    if field.startswith(_OF_BED) and not changes and _places(data) <= _FEW:
         nearest = _nearer(refusal, nearest, data, judge)
-    if met is not None and met.field == refusal.field:
-        return Refusal(refusal.field, refusal.value, limit)
     if changes:
-        limit += f"; the value offered here also needs {_listed(changes, 'and')}"
-    if met is not None:
-        limit += f"; then {met.field} is refused: {met.limit}"
-    return Refusal(refusal.field, refusal.value, limit, nearest)
+        limit += f"; the value offered here also needs {listed(changes, 'and')}"
+    return Refusal(field, refusal.value, limit, nearest)
+
+
+def _otherwise(
+    refusal: Refusal, met: Sequence[Refusal], data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]
+) -> Refusal:
+    """Return a refusal whose offers lead nowhere with another value, or with the key that is to blame."""
+    field, value, limit = refusal.field, refusal.value, refusal.limit
+    own = [one for one in met if one.field == field]
+    bad = next((one for one in (own[-1].nearest, value) if is_number(one)), None)
+    good = None if bad is None else next(good_numbers(data, field, judge, sound), None)
+    if bad is not None and good is not None:
+        if met[-1] is not own[-1]:
+            limit += f"; at {shown(bad)}, {bare(met[met.index(own[-1]) + 1])}"
+        return Refusal(field, value, limit, nearest_number(data, field, good, bad, judge))
+    if culprit := culprit_of(data, judge, sound):
+        limit += f"; {listed(culprit, 'and')} would do"
+    return Refusal(field, value, limit)
+
+
+def _patient(judge: Judge) -> Judge:
+    """Return a judge that refuses everything once it has been asked for PATIENCE_S."""
+    end = time.process_time() + PATIENCE_S
+
+    def judged(data: dict[str, Any]) -> object:
+        if time.process_time() > end:
+            raise Refusal("", None, "not tried")
+        return judge(data)
+
+    return judged
 
 
 def _present_pitches(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -77,7 +113,7 @@ def _nearer(refusal: Refusal, nearest: Any, data: Mapping[str, Any], judge: Judg
     """Return a bed that is accepted and smaller than the one that was found, if tries between find one."""
     low, high, same = float(str(refusal.value)), float(nearest), 0
     while (middle := math.floor((low + high) * 5) / 10) > low:
-        met = _met(data, {refusal.field: middle}, judge)
+        met = refused(data, {refusal.field: middle}, judge)
         if met is None:
             high = middle
             continue
@@ -85,7 +121,7 @@ def _nearer(refusal: Refusal, nearest: Any, data: Mapping[str, Any], judge: Judg
         same += asked == high
         if same > 1:
             break  # its tools ask for no less
-        if isinstance(asked, float) and asked < high and _met(data, {refusal.field: asked}, judge) is None:
+        if isinstance(asked, float) and asked < high and refused(data, {refusal.field: asked}, judge) is None:
             high, same = asked, 0
     return high
 
@@ -112,10 +148,10 @@ def _wider(pitches: Mapping[str, Any], data: Mapping[str, Any], judge: Judge) ->
         return {path: (math.ceil(pitch * 10 - 1e-6) + tenths) / 10 for path, pitch in pitches.items()}
 
     for whole in range(10, 10 * _WIDEST + 1, 10):
-        met = _met(data, raised(whole), judge)
+        met = refused(data, raised(whole), judge)
         if met is None:
             nearer = (raised(tenths) for tenths in range(whole - 9, whole))
-            return next((each for each in nearer if _met(data, each, judge) is None), raised(whole))
+            return next((each for each in nearer if refused(data, each, judge) is None), raised(whole))
     return {}
 
 
@@ -127,7 +163,7 @@ def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judg
     bed = refusal.field.startswith(_OF_BED)
     found: dict[str, object] = {}
     if places <= _MANY and (bed or refusal.field.startswith(_OF_CIRCUIT)):
-        found = next((each for each in _pitches(refusal, data) if _met(data, each, judge) is None), {})
+        found = next((each for each in _pitches(refusal, data) if refused(data, each, judge) is None), {})
     if places <= _MANY and bed:
         found |= _shorter_slot(data, judge)
     word = "or"
@@ -135,25 +171,8 @@ def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judg
         found, word = _fewer(refusal, data, judge), "and"
     if not found:
         return refusal
-    limit = f"{refusal.limit}; {'on this bed' if bed else 'with this circuit'} {_listed(found, word)} would do"
+    limit = f"{refusal.limit}; {'on this bed' if bed else 'with this circuit'} {listed(found, word)} would do"
     return Refusal(refusal.field, refusal.value, limit, refusal.nearest)
-
-
-def _met(data: Mapping[str, Any], changes: Mapping[str, object], judge: Judge) -> Refusal | None:
-    """Return the refusal of data with changes; None if it is accepted."""
-    tried = copy.deepcopy(dict(data))
-    try:
-        for path, value in changes.items():
-            if value is None:
-                drop(tried, path)
-            else:
-                put(tried, path, value)
-        judge(tried)
-    except Refusal as refusal:
-        return refusal
-    except UnitcadError as error:
-        return Refusal("array", None, str(error))
-    return None
 
 
 def _pitches(refusal: Refusal, data: Mapping[str, Any]) -> Iterator[dict[str, object]]:
@@ -173,9 +192,9 @@ def _shorter_slot(data: Mapping[str, Any], judge: Judge) -> dict[str, object]:
     """Return the longest strap slot, in whole mm, that leaves room for cuts; {} if slots are not the cause."""
     path = "sheet.strap_slot_mm"
     slot = at(data, path)
-    if not isinstance(slot, list | tuple) or _met(data, {path: None}, judge) is not None:
+    if not isinstance(slot, list | tuple) or refused(data, {path: None}, judge) is not None:
         return {}
-    length = _largest(int(slot[1]), lambda mm: _met(data, {f"{path}.1": float(mm)}, judge) is None)
+    length = _largest(int(slot[1]), lambda mm: refused(data, {f"{path}.1": float(mm)}, judge) is None)
     return {f"{path}.1": float(length)} if length else {path: None}
 
 
@@ -191,11 +210,11 @@ def _fewer(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> dict[str,
                 count, lambda n, bed=bed, more=changes, path=path: not _refused_for(bed, data, {**more, path: n}, judge)
             )
             changes = {**changes, path: fewer}
-    return changes if changes and all(changes.values()) and _met(data, changes, judge) is None else {}
+    return changes if changes and all(changes.values()) and refused(data, changes, judge) is None else {}
 
 
 def _refused_for(bed: str, data: Mapping[str, Any], changes: Mapping[str, object], judge: Judge) -> bool:
-    met = _met(data, changes, judge)
+    met = refused(data, changes, judge)
     return met is not None and met.field == bed
 
 
@@ -206,12 +225,3 @@ def _largest(most: int, fits: Callable[[int], bool]) -> int:
         middle = (low + high) // 2
         low, high = (middle, high) if fits(middle) else (low, middle)
     return low
-
-
-def _listed(changes: Mapping[str, object], word: str) -> str:
-    """Write changes as a person types them."""
-    texts = [
-        f"no {path}" if value is None else f"{path} = {number(value, 6) if isinstance(value, float) else repr(value)}"
-        for path, value in changes.items()
-    ]
-    return f" {word} ".join(texts)

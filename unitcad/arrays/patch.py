@@ -12,7 +12,7 @@ from manifold3d import Manifold
 from msgspec import structs
 
 from unitcad.arrays.array import Array, Placed
-from unitcad.arrays.array_file import made_plan, makeable_array
+from unitcad.arrays.array_file import made_plan, makeable_array, sound_array
 from unitcad.arrays.circuit.circuit_files import has_circuit
 from unitcad.arrays.circuit.outline import laid_circuit
 from unitcad.arrays.construction import Construction, construction_of
@@ -242,7 +242,7 @@ class PatchMoulds(MouldSet):
             return made_plan(self.arranged)
         except Refusal as refusal:
             asked, places = self.arranged.asked, len(self.arranged.places)
-            better = offered(refusal, asked, makeable_array)
+            better = offered(refusal, asked, makeable_array, sound_array(asked))
             raise with_other_ways(better, asked, places, makeable_array) from None
 
     @cached_property

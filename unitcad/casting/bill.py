@@ -116,7 +116,8 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
         ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}
         note += "".join(f", {number(value, 3)} {unit}" for unit, value in ratings.items() if value)
         note += f", mass {number(motor.mass_g, 3)} g" if motor.mass_g else ""
-    yield Item(motor_name(spec), cells, "piece", "bought", note)
+    if not spec.motor.absent:
+        yield Item(motor_name(spec), cells, "piece", "bought", note)
     if any(body.kind == "circuit" for body in moulds.laid_later):
         yield Item("flexible circuit", 1, "piece", "bought", "for all motors, as circuit.dxf and circuit-pads.csv say")
     if fpcb := spec.fpcb:

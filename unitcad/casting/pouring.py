@@ -76,7 +76,8 @@ def bond_faces(moulds: MouldSet) -> tuple[BondFace, ...]:
         # Its bore may meet a layer that is cured already, to which the last one has to bond; a back sheet's, whose cups
         # are on pins, meets none.
         found.append((last.cup, "bore", f"layer {last.index - 1}"))
-    found.append(("base", "core", "motor"))
+    if not moulds.spec.motor.absent:
+        found.append(("base", "core", "motor"))
     if len(plan.steps) > 1:
         found.append(("base", "seat", "the next layer"))
     return tuple(BondFace(Face(tool, face), to) for tool, face, to in found)
@@ -496,8 +497,8 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
 
 
 def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
-    """Describe how motor and circuit go in after casting; nothing if they were laid in."""
-    if moulds.design.laid_in:
+    """Describe how motor and circuit go in after casting; nothing if they were laid in, or there is no motor."""
+    if moulds.design.laid_in or moulds.spec.motor.absent:
         return
     fittings, casting = assembly(moulds), moulds.spec.casting
     for i, fitting in enumerate(fittings):
@@ -626,7 +627,8 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
     weights = " + ".join(shown(each) for each in masses_g) + (f" = {shown(sum(masses_g))}" if len(masses_g) > 1 else "")
     low = "" if spec.moulds.pour == "injected" else " or a low strike"
     motor = "motor" if moulds.makes == "unit" else "motors"
-    weighed = f"Weigh one {moulds.makes}, trimmed, without {motor} and circuit: {weights} g."
+    without = "" if spec.motor.absent else f", without {motor} and circuit"
+    weighed = f"Weigh one {moulds.makes}, trimmed{without}: {weights} g."
     if moulds.design.laid_in:
         weighed = (
             f"The silicone of one unit, trimmed, weighs {weights} g. What was laid in comes on top: weigh it before."

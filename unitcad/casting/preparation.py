@@ -146,7 +146,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
 def sizes(moulds: MouldSet) -> tuple[Size, ...]:
     """Return the lengths of bought parts that the tools are drawn for."""
     spec, assumed = moulds.spec, assumed_lengths(moulds.spec)
-    lengths = {f"motor.{size}": getattr(spec.motor, size) for size in MOTOR_SIZES}
+    lengths = {} if spec.motor.absent else {f"motor.{size}": getattr(spec.motor, size) for size in MOTOR_SIZES}
     if spec.fpcb:
         lengths["fpcb.thickness_mm"] = spec.fpcb.thickness_mm
     if spec.wires:

@@ -114,7 +114,8 @@ def troubles(moulds: MouldSet | None = None) -> tuple[Trouble, ...]:
     """Return the troubles that a set can have; all of them without a set."""
     spec = moulds and moulds.spec
     there = {tool.kind for tool in moulds.plan.tools} if moulds else set[str]()
-    there |= {"motor", *(["fpcb"] if spec and spec.fpcb else [])}
+    if spec:
+        there |= {*([] if spec.motor.absent else ["motor"]), *(["fpcb"] if spec.fpcb else [])}
     return tuple(trouble for trouble, part in _KNOWN if not moulds or part is None or part in there)
 
 

@@ -24,7 +24,7 @@ class FindingRecord(TypedDict):
 
 @dataclass(frozen=True)
 class MouldFinding:
-    """One check at one place: `value` against `limit` in `unit`, whether it passes, and the remedy if not."""
+    """One check at one place: `value` against `limit` in `unit`, whether it passes, and a remedy or a note."""
 
     code: str
     where: str

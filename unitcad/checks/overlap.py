@@ -2,13 +2,14 @@
 
 Ribs count as crushed: C220 looks at them. A pocket counts as stretched round its unit: C310 looks at its strain. In
 bodies from a file films of facets are ignored: two facets reach into each other by their distances from the true
-surface.
+surface. A pocket of coarse facets for a bought part passes with a note.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from manifold3d import Manifold
@@ -19,7 +20,11 @@ from unitcad.moulds.congruence import MARGIN, column_round
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape import Shape, union
+from unitcad.spec.custom_code import is_custom
+from unitcad.text import number
 
+POCKET = 0.05
+"""Depth to which the facets of a pocket may reach into the bought part in it, mm: soft silicone gives way."""
 OVERLAP = 1e-6
 """Largest volume two pieces may share, mm3: rounding of faces that touch."""
 
@@ -50,7 +55,28 @@ def _of_layers(moulds: MouldSet, volumes: _Volumes) -> dict[tuple[str, str], flo
 def of_unit(moulds: MouldSet, known: Mapping[tuple[str, str], float] | None = None) -> list[MouldFinding]:
     """Look at the unit, or the patch, alone; `known` has volumes that pairs share, by their names."""
     there = [(name, moulds.meshes(shapes)) for name, shapes in moulds.together]
-    return _findings("unit", there, _Volumes(moulds.facets, known))
+    found = _findings("unit", there, _Volumes(moulds.facets, known))
+    return [finding if finding.ok else _explained(moulds, finding) for finding in found]
+
+
+def _explained(moulds: MouldSet, found: MouldFinding) -> MouldFinding:
+    """Return a finding of the unit with its remedy; one of a pocket that only its facets make narrow passes."""
+    bodies = {body.name: body for body in moulds.unit}
+    pair = [bodies.get(name) for name in found.where.removeprefix("unit: ").split(" and ")]
+    bought = next((body for body in pair if body and body.made == "bought"), None)
+    cast = next((body for body in pair if body and body.made == "cast"), None)
+    if not (bought and cast and is_custom(moulds.spec.design)):
+        return found
+    shared = moulds.mesh(bought) ^ moulds.mesh(cast)
+    if not thick_pieces(shared, POCKET):
+        film = max(found.value, POCKET * float(shared.surface_area()) / 2)
+        note = f"{cast.name} is at most {POCKET} mm narrower than its {bought.name}, as facets are: it gives way"
+        return replace(found, ok=True, limit=film, advice=note)
+    size = "" if bought.kind != "motor" else f" of {number(moulds.spec.motor.diameter_mm, 4)} x "
+    size += size and f"{number(moulds.spec.motor.thickness_mm, 4)} mm on the skin"
+    ways = f"draw {cast.name} with room for the {bought.name}{size}"
+    ways += ", change motor.diameter_mm and motor.thickness_mm, or leave it out: motor = false" if size else ""
+    return replace(found, advice=ways)
 
 
 _There = Sequence[tuple[str, Sequence[Manifold]]]

@@ -41,10 +41,10 @@ from unitcad.validation import confirm_known
 
 
 def build(
-    specs: Annotated[
-        list[str], typer.Argument(metavar="SPEC", help="A spec or array file, or the name of a template.")
-    ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Where the result's folder goes.")] = Path("out"),
+    specs: Annotated[list[str], typer.Argument(metavar="SPEC...", help="Spec or array files, or names of templates.")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the result's folder.")] = Path(
+        "out"
+    ),
     fit: Fit = None,
     sets: Sets = None,
     formats: Formats = None,
@@ -53,12 +53,13 @@ def build(
         bool | None,
         typer.Option(
             "--report/--no-report",
-            help="Write report.html, one offline page. By default without --only; a page that is there is kept up.",
+            help="Write report.html, one offline page. Default: on, except with --only. An existing page is updated.",
         ),
     ] = None,
     no_check: NoCheck = False,
     slicing: Annotated[
-        bool, typer.Option("--slice", help="Have PrusaSlicer say print time and filament of each piece (slicer.json).")
+        bool,
+        typer.Option("--slice", help="Compute print time and filament of each piece with PrusaSlicer (slicer.json)."),
     ] = False,
     watch: Annotated[
         bool, typer.Option("--watch", help="Build again after every save of the spec, until Ctrl-C.")
@@ -67,6 +68,7 @@ def build(
     as_json: AsJson = False,
 ) -> None:
     """Make a unit and its casting moulds, or an array of units. The last line printed is the folder."""
+    specs = [confirm_known(spec) for spec in specs]
     once = partial(_built, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
     if not watch:
         if not once():
@@ -107,9 +109,7 @@ def _built(
     changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
     allow_code(code)
     # Every spec is validated before the first one is built.
-    for spec in specs:
-        confirm_known(spec)
-    wanted = [load_subject(spec, changes) for spec in specs]
+    wanted = [load_subject(spec, changes, chosen) for spec in specs]
     for spec in wanted if slicing else ():
         check_slicing(spec.unit, chosen)
     results: list[Built] = []
@@ -154,6 +154,8 @@ def _print_faults(manifest: Manifest) -> None:
             warn(f"note: STEP left out: {entry['reason']}; {install_command('step')}")
     checks = manifest["mould_checks"]
     for check in checks:
+        if check["ok"] and check["advice"]:
+            warn(f"note: {check['code']} {check['where']}: {check['advice']}")
         if not check["ok"]:
             measured = f"{check['value']:.3g} {check['unit']}, limit {check['limit']:.3g}"
             advice = f"; {check['advice']}" if check["advice"] else ""

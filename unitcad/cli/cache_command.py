@@ -12,9 +12,12 @@ from unitcad.cli.output import print_json
 from unitcad.cli.shared_options import AsJson, finite
 
 cache = typer.Typer(
-    help="The cache of distinct parts.", no_args_is_help=True, add_completion=False, rich_markup_mode=None
+    help="Show or shrink the cache of distinct parts.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
 )
-Where = Annotated[Path | None, typer.Option("--cache", help="The cache's folder; else the user's.")]
+Where = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Folder of the cache. Default: the user's.")]
 
 
 @cache.command("ls")
@@ -30,7 +33,10 @@ def ls(where: Where = None, as_json: AsJson = False) -> None:
 def gc(
     where: Where = None,
     limit: Annotated[
-        float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="What may stay; 0 empties it.")
+        float,
+        typer.Option(
+            metavar="MB", min=0, max=1e12, callback=finite, help="Maximum size afterwards; 0 empties the cache."
+        ),
     ] = 4096,
     as_json: AsJson = False,
 ) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from difflib import get_close_matches
 from typing import Annotated, Any, cast
 
 import typer
@@ -10,7 +12,7 @@ from typer.main import get_command
 
 from unitcad import __version__
 from unitcad.cli.output import Form, form_of, say_error
-from unitcad.errors import UnitcadError
+from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.rooms import commands, load
 
 WrongArguments = cast(type[typer.BadParameter], typer.BadParameter.__mro__[2])
@@ -31,7 +33,7 @@ class _Commands(TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         known = commands()
         if cmd_name not in known:
-            return None
+            raise unknown_name("COMMAND", cmd_name, known)
         command = load(known[cmd_name].run)
         if not isinstance(command, typer.Typer):
             alone = typer.Typer(**_PLAIN)
@@ -39,6 +41,8 @@ class _Commands(TyperGroup):
             command = alone
         made = get_command(command)
         made.name = cmd_name
+        for one in (made, *getattr(made, "commands", {}).values()):
+            one.epilog = "\n".join(["\b", "Examples:", *(f"  {line}" for line in known[cmd_name].examples)])
         return made
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -78,7 +82,7 @@ app.callback()(_root)
 def run(words: list[str]) -> int:
     """Run the command of the program's arguments; return its exit code. Says itself what is wrong with them."""
     try:
-        return app(words, standalone_mode=False) or 0
+        return app(words, prog_name="unitcad", standalone_mode=False) or 0
     except WrongArguments as error:
         _refuse(error, form_of(words))
         return error.exit_code
@@ -91,5 +95,27 @@ def _refuse(error: Any, form: Form) -> None:
     if context and message == context.get_help() and form == "text":  # a command alone that needs another one after it
         error.show()
         return
-    line = " ".join(message.partition("\n")[0].split()).rstrip(".")
-    say_error(UnitcadError(f"{line}; see {context.command_path if context else 'unitcad'} --help"), form)
+    say_error(_in_style(error, context.command_path if context else "unitcad"), form)
+
+
+def _in_style(error: Any, command: str) -> UnitcadError:
+    """Return an error of Typer's as one of unitcad's: option, value, limit, nearest accepted value or next step."""
+    text = " ".join(error.message.partition("\n")[0].split()).rstrip(".") if error.message else "is required"
+    parameter, option, more = getattr(error, "param", None), getattr(error, "option_name", ""), f"see {command} --help"
+    if parameter is None:
+        if getattr(error, "possibilities", None) is None:
+            return UnitcadError(f"{error.format_message().rstrip('.')}; {more}")
+        known = {name.lstrip("-"): name for one in error.ctx.command.params for name in one.opts}
+        close = [known[name] for name in get_close_matches(option.lstrip("-"), known, cutoff=0.6)]
+        return Refusal(option, None, f"unknown option; {'closest: ' + ', '.join(close) if close else more}")
+    name = max(parameter.opts, key=len) if parameter.param_type_name == "option" else parameter.make_metavar(error.ctx)
+    if outside := re.fullmatch(r"(\S+) is not in the range .*", text):
+        low, high = parameter.type.min, parameter.type.max
+        value = float(outside[1])
+        limit = f"must be at least {low:g}" if high is None else f"must be from {low:g} to {high:g}"
+        return Refusal(name, value, limit, float(low if high is None or value < low else high))
+    if wrong := re.fullmatch(r"'(.*)' is not a valid (int|float).*", text):
+        unit = f" ({parameter.metavar})" if parameter.metavar not in (None, "N") else ""
+        whole = "whole " if wrong[2] == "int" else ""
+        return Refusal(name, wrong[1], f"takes a {whole}number{unit}, such as {parameter.default or 1}")
+    return Refusal(name.strip("{}"), None, f"{text}; {more}")

@@ -17,7 +17,9 @@ def coupon(
     printer: Annotated[
         str, typer.Argument(metavar="PRINTER", help="A printer of the catalogue (unitcad list printers).")
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Where the coupon's folder goes.")] = Path("out"),
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the coupon's folder.")] = Path(
+        "out"
+    ),
     as_json: AsJson = False,
 ) -> None:
     """Write a fit coupon to print first, and how to read it. The last line printed is the folder."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated
 
 import typer
@@ -13,7 +14,7 @@ from unitcad.cli.estimate_tables import print_errors, print_estimate, print_freq
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
 from unitcad.designs import design_of
-from unitcad.errors import Refusal
+from unitcad.errors import Refusal, unknown_name
 from unitcad.estimating import FEM, estimate_spec, frequency_table_of_spec, neighbours_of_specs
 from unitcad.moulds.plan import plan
 from unitcad.rooms import load as load_named
@@ -24,26 +25,33 @@ _MOST_FREQUENCIES = 1000
 
 
 def estimate(
-    specs: Annotated[
-        list[str], typer.Argument(metavar="SPEC", help="a template's name or a path to a TOML file; or arrays")
-    ],
+    specs: Annotated[list[str], typer.Argument(metavar="SPEC...", help="Spec or array files, or names of templates.")],
     model: Annotated[
-        str, typer.Option(help="Model of the details: rule, published, corrected, divider, all, or fem.")
+        str,
+        typer.Option(
+            metavar="MODEL",
+            help="Model of the details: rule, published, corrected, divider, fem or all. Default: the spec's.",
+        ),
     ] = "",
     frequency: Annotated[
-        str, typer.Option(metavar="HZ|FROM:TO:STEP", help="one frequency, or a table over frequencies")
+        str,
+        typer.Option(
+            metavar="HZ|FROM:TO:STEP", help="One frequency, or a table over frequencies. Default: the motor's."
+        ),
     ] = "",
     pitch: Annotated[
         float | None,
         typer.Option(
-            metavar="MM", help="units in a row, so far apart: how far the first moves the others, with their masses"
+            metavar="MM", help="Pitch of units in a row: how far the first moves the others. Default: one unit."
         ),
     ] = None,
-    masses: Annotated[bool, typer.Option("--masses", help="an array's crosstalk with the units' masses too")] = False,
+    masses: Annotated[
+        bool, typer.Option("--masses", help="Include the units' masses in an array's crosstalk.")
+    ] = False,
     fit: Fit = None,
     sets: Sets = None,
     details: Annotated[
-        bool, typer.Option("--details", help="How sure it is: models, errors, slopes, the skin's curve, assumptions.")
+        bool, typer.Option("--details", help="Print models, errors, slopes, the skin's curve and assumptions.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -55,13 +63,12 @@ def estimate(
     """
 
     if model not in ("", "all", *MODELS, FEM):
-        raise Refusal("--model", model, f"is none of {', '.join((*MODELS, FEM, 'all'))}", MODELS[0])
+        raise unknown_name("--model", model, (*MODELS, FEM, "all"))
     if ":" in frequency and model == FEM:
         raise Refusal("--frequency", frequency, "must be one frequency for fem, whose draws cost seconds each")
     models = None if not model else MODELS if model == "all" else (model,)
     hertz = frequencies(frequency) if frequency else []
-    for name in specs:
-        confirm_known(name)
+    specs = [confirm_known(name) for name in specs]
     kinds = [kind for kind in map(compound_kind, specs) if kind]
     if kinds:
         if pitch is not None:
@@ -118,7 +125,10 @@ def frequencies(text: str) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) not in (1, 3) or not all(math.isfinite(n) and n > 0 for n in numbers):
-        raise Refusal("--frequency", text, "must be HZ or FROM:TO:STEP, numbers above 0", "100:150:10")
+        meant = [float(number) for number in re.findall(r"\d+(?:\.\d+)?", text)][:3]
+        meant += [10.0] * (len(meant) == 2)
+        nearest = ":".join(f"{n:g}" for n in meant) if meant and min(meant) > 0 else "100:150:10"
+        raise Refusal("--frequency", text, "must be HZ or FROM:TO:STEP, numbers above 0", nearest)
     lowest, highest = FREQUENCIES_HZ
     clipped = [min(max(n, lowest), highest) for n in numbers[:2]]
     if clipped != numbers[:2]:

@@ -19,12 +19,12 @@ from unitcad.validation.starter import commented
 
 
 def init(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the variant and of the file, NAME.toml.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the variant, and of its file NAME.toml.")],
     template: Annotated[
         str | None,
         typer.Option(
             metavar="TEMPLATE",
-            help="Shipped file to start from, see `unitcad list`; default: the default design's template.",
+            help="Shipped file to start from (unitcad list templates). Default: the default design's template.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -33,7 +33,7 @@ def init(
 
     Its first line names the schema that an editor checks it with; `unitcad schema -o FILE` writes that.
     """
-    kinds = [kind for kind in file_kinds() if kind.command]
+    kinds = [kind for kind in file_kinds() if kind.starts]
     starts = {shipped: (kind, file) for kind in reversed(kinds) for shipped, file in shipped_of(kind).items()}
     template = template or default_template()
     if template not in starts:

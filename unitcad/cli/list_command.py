@@ -20,7 +20,7 @@ from unitcad.validation.shipped_files import shipped_of
 
 
 def list_(
-    kind: Annotated[str, typer.Argument(help="Kind to list; default: list the kinds.", metavar="[KIND]")] = "",
+    kind: Annotated[str, typer.Argument(help="Kind to list. Default: the kinds.", metavar="[KIND]")] = "",
     as_json: AsJson = False,
 ) -> None:
     """List what is shipped, each value with its source and status."""
@@ -29,7 +29,7 @@ def list_(
         print_json({"kinds": list(kinds)}) if as_json else typer.echo("\n".join(kinds))
         return
     if kind not in kinds:
-        raise unknown_name("list", kind, kinds)
+        raise unknown_name("KIND", kind, kinds)
     entries = kinds[kind]()
     if as_json:
         print_json({kind: entries})

@@ -86,9 +86,18 @@ def warn(line: str) -> None:
 
 
 def console(stderr: bool = False) -> Console:
-    """Return a rich console. Text is shown as it is: a name may hold square brackets, or colons that spell an emoji."""
+    """Return a rich console. Text is shown as it is: a name may hold square brackets, or colons that spell an emoji.
 
-    return Console(markup=False, emoji=False, highlight=False, stderr=stderr)
+    Only a terminal's width crops a table.
+    """
+    made = Console(markup=False, emoji=False, highlight=False, stderr=stderr)
+    if not made.is_terminal:
+        made.width = _NO_TERMINAL
+    return made
+
+
+_NO_TERMINAL = 10_000
+"""Characters in a line of a file or pipe."""
 
 
 def stage_lines() -> Callable[[str], None] | None:

@@ -14,7 +14,7 @@ from unitcad.report.read_results import check_casts
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A variant's folder, or one that holds variants.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a variant, or of several.")],
     code: AllowCode = False,
     as_json: AsJson = False,
 ) -> None:

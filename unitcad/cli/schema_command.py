@@ -16,11 +16,11 @@ from unitcad.rooms import file_kinds, load
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(help="spec, cast-record, or another kind that an error names.")] = "spec",
+    kind: Annotated[str, typer.Argument(metavar="[KIND]", help="Kind of file: spec, array, sweep ...")] = "spec",
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write it there, for an editor; else print it.")
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="File for an editor. Default: print the schema.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="The schema is JSON in any case.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; the schema always is one.")] = False,
 ) -> None:
     """Print the JSON Schema of a spec, or of another kind of file.
 
@@ -28,7 +28,7 @@ def schema(
     """
     kinds = {known.name: known for known in file_kinds() if known.model}
     if kind not in kinds:
-        raise unknown_name("schema", kind, kinds)
+        raise unknown_name("KIND", kind, kinds)
     chosen = kinds[kind]
     found = load(chosen.schema)() if chosen.schema else msgspec.json.schema(load(chosen.model))
     document = {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}

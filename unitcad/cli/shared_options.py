@@ -13,17 +13,27 @@ from unitcad.errors import unknown_name
 from unitcad.spec import custom_code
 from unitcad.spec.raw import FORMATS, OUTPUTS
 
-AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
-Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the spec, such as diameter_mm=15."),
+]
 Fit = Annotated[
-    Path | None, typer.Option(help="A lab-fit.toml of unitcad fit: the lab's constants and ranges in the estimate.")
+    Path | None,
+    typer.Option(metavar="FILE", help="A lab-fit.toml of unitcad fit. Default: the shipped models' constants."),
 ]
-Formats = Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb,pdf; else the spec's.")]
+Formats = Annotated[
+    str | None,
+    typer.Option(metavar="NAMES", help="Formats of the files: stl,3mf,step,svg,png,glb,pdf. Default: the spec's."),
+]
 Only = Annotated[
-    str | None, typer.Option(help="unit,moulds,estimate,casting; else all. In a batch estimate alone makes a table.")
+    str | None,
+    typer.Option(
+        metavar="NAMES",
+        help="Outputs: unit,moulds,estimate,casting. Default: all. In a batch, estimate makes one table.",
+    ),
 ]
-Page = Annotated[bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")]
-NoCheck = Annotated[bool, typer.Option("--no-check", help="Leave out the mould checks and the mesh checks.")]
+NoCheck = Annotated[bool, typer.Option("--no-check", help="Skip the mould checks and the mesh checks.")]
 AllowCode = Annotated[
     bool, typer.Option("--allow-code", help="Run Python code that came with a spec (design_source), not from a file.")
 ]

@@ -149,7 +149,9 @@ def inserts(spec: Spec) -> tuple[Body, ...]:
 
 def _inside(spec: Spec, dims: Dimensions) -> tuple[Body, ...]:
     """Return the bought bodies that go into the silicone."""
-    bodies = [Body("motor", "unit", "motor", parts.motor(dims), _MOTOR_COLOUR, made="bought")]
+    bodies: list[Body] = []
+    if not spec.motor.absent:
+        bodies.append(Body("motor", "unit", "motor", parts.motor(dims), _MOTOR_COLOUR, made="bought"))
     if spec.fpcb and dims.pad:
         drawn = parts.circuit(spec.fpcb, dims.pad, dims)
         bodies.append(Body("fpcb", "unit", "circuit", drawn, CIRCUIT_COLOUR, made="bought"))

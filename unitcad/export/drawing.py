@@ -20,7 +20,7 @@ from manifold3d import CrossSection, Manifold
 from unitcad.errors import missing_extra
 from unitcad.export import svg
 from unitcad.export.chart import number
-from unitcad.export.svg import Measure, Region
+from unitcad.export.svg import Measure, Region, Side
 from unitcad.kernels.mesh import arrays
 
 MM = 72 / 25.4
@@ -214,7 +214,8 @@ def across(
 def windows(loops: Sequence[Loop], width_at: Callable[[float, float], float]) -> list[Measure]:
     """Return the openings in the outer faces of a section; `width_at(x, z)` is an opening's width."""
     found = list[Measure]()
-    for side, end in (("left", min), ("right", max)):
+    sides: tuple[tuple[Side, Callable[..., float]], ...] = (("left", min), ("right", max))
+    for side, end in sides:
         edge = end(x for loop in loops for x, _ in loop)
         walls = sorted(sorted((a[1], b[1])) for a, b in _sides(loops) if abs(a[0] - edge) + abs(b[0] - edge) < SAME_MM)
         for (_, low), (high, _) in pairwise(walls):

@@ -21,7 +21,7 @@ from unitcad.lab.unit_files import Cavity, file_of, source_file
 from unitcad.lab.units import Quantity, to_si
 from unitcad.spec.convert import convert
 from unitcad.spec.raw import Table
-from unitcad.spec.toml import read_toml
+from unitcad.validation.typed_files import load_file
 
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 Record = Annotated[str, Meta(min_length=1, max_length=1000)]
@@ -121,8 +121,12 @@ class Campaign(Table, frozen=True, kw_only=True):
 
 
 def read_campaign(path: Path) -> Campaign:
-    """Return the campaign of a TOML file. Raises Refusal for the first value that is not valid."""
-    campaign = convert(read_toml(path), Campaign)
+    """Return the campaign of a TOML file. Raises Refusal with every value that is not valid, and its line."""
+    return load_file(path, "campaign", _campaign_of)
+
+
+def _campaign_of(data: dict[str, Any]) -> Campaign:
+    campaign = convert(data, Campaign)
     band, motor_channel = campaign.chain.band_hz, campaign.recording.motor_channel
     if band[0] >= band[1]:
         raise Refusal("chain.band_hz", list(band), "must rise", [60.0, 250.0])

@@ -17,10 +17,16 @@ from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
 
 def fit(
     lab: Annotated[
-        str, typer.Argument(metavar="LAB", help="a TOML file of the units a lab measured, or a shipped one's name")
+        str, typer.Argument(metavar="LAB", help="File of the units that a lab measured, or name of a shipped one.")
     ],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder for lab-fit.toml, fit.json, fit.md and fit.svg.")
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            metavar="DIR",
+            help="Folder for lab-fit.toml, fit.json, fit.md and fit.svg. Default: only print.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

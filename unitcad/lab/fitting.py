@@ -40,6 +40,7 @@ from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.raw import Table
 from unitcad.validation import from_data
 from unitcad.validation.shipped_files import named_file, shipped_files
+from unitcad.validation.typed_files import load_file
 
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 LevelValue = Annotated[float, Meta(ge=1e-6, le=1e3, description="amplitude at the edge over the motor's")]
@@ -127,10 +128,13 @@ def shipped_fits() -> dict[str, Path]:
 def load_fit_lab(source: str) -> FitLab:
     """Return the lab of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
 
-    Raises Refusal or UnitcadError for the first value that is not valid.
+    Raises Refusal with every value that is not valid, and its line, or UnitcadError.
     """
     path = named_file(source, shipped_fits(), "LAB")
-    data = read_toml(path)
+    return load_file(path, "fit", lambda data: _lab_of(data, path))
+
+
+def _lab_of(data: dict[str, Any], path: Path) -> FitLab:
     settings = convert(data, FitLabFile)
     names = [unit.name for unit in settings.unit]
     inputs = {path.name: files.sha256(path)}
@@ -240,13 +244,19 @@ class Compared:
         return sorted(self.judged, key=place)
 
     def at_bound(self, name: str) -> str | None:
-        """Return a constant that the units do not determine: none of them reads it, or the search met its bound."""
+        """Return a constant that the units do not determine, None if they determine all.
+
+        None of the units reads it, all read it alike with another constant, or the search met its bound.
+        """
         constants = self.fitted[name].constants
         if name == "divider" and np.any(np.isclose(constants[0], KAPPA, rtol=1e-6)):
             return "kappa"
         assert self.campaigns is not None
-        unread = ~gradients(COMPARED[name], self.campaigns.table, constants).any(axis=0)
-        return COMPARED[name].names[int(np.argmax(unread))] if unread.any() and name != BASELINE else None
+        read = gradients(COMPARED[name], self.campaigns.table, constants)
+        unread = ~read.any(axis=0)
+        if name == BASELINE or (not unread.any() and np.linalg.matrix_rank(read) == read.shape[1]):
+            return None
+        return COMPARED[name].names[int(np.argmax(unread)) if unread.any() else -1]
 
 
 @dataclass(frozen=True)

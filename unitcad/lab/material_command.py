@@ -22,40 +22,69 @@ from unitcad.lab.readers import Layout
 from unitcad.lab.tensile import Specimen, TensileResult, evaluate, read_curve
 
 _DELIMITERS = {"tab": "\t", "space": " "}
-_Length = typer.Option(min=0.001, max=10000, callback=finite, help="Of the specimen; goes before the file's header.")
+_LENGTH: dict[str, Any] = {"metavar": "MM", "min": 0.001, "max": 10000, "callback": finite}
+_FROM_FILE = "Default: the file's header."
 
 
 def material(
     curves: Annotated[
-        list[Path] | None, typer.Argument(metavar="FILES", help="Tensile curves, one a specimen.")
+        list[Path] | None, typer.Argument(metavar="[FILE]...", help="Tensile curves, one a specimen.")
     ] = None,
-    dma: Annotated[Path | None, typer.Option(help="Storage and loss modulus over frequency.")] = None,
-    name: Annotated[str, typer.Option(help="Of the entry; else the first file's name.")] = "",
-    like: Annotated[str, typer.Option(help="The shipped silicone that gives the other values; else that name.")] = "",
+    dma: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Storage and loss modulus over frequency. Default: no dynamic test."),
+    ] = None,
+    name: Annotated[str, typer.Option(metavar="NAME", help="Name of the entry. Default: the first file's name.")] = "",
+    like: Annotated[
+        str,
+        typer.Option(
+            metavar="SILICONE", help="Shipped silicone for the other values (unitcad list materials). Default: --name."
+        ),
+    ] = "",
     column: Annotated[
-        list[str] | None, typer.Option(metavar="QUANTITY=COLUMN[:UNIT]", help="A column by name or number, its unit.")
+        list[str] | None,
+        typer.Option(metavar="QUANTITY=COLUMN[:UNIT]", help="Column of a quantity, by name or number, and its unit."),
     ] = None,
     delimiter: Annotated[
-        str, typer.Option(help="Delimiter of the columns: , ; tab or space. Default: found in the file.")
+        str, typer.Option(metavar="SIGN", help="Delimiter of the columns: , ; tab or space. Default: as in the file.")
     ] = "",
-    decimal: Annotated[str, typer.Option(help="Decimal sign: . or a comma. Default: found in the file.")] = "",
+    decimal: Annotated[
+        str, typer.Option(metavar="SIGN", help="Decimal sign: . or a comma. Default: as in the file.")
+    ] = "",
     skip_lines: Annotated[
-        int, typer.Option(min=0, max=100_000, help="Lines of each file to skip, such as a table of results.")
+        int,
+        typer.Option(metavar="N", min=0, max=100_000, help="Lines to skip in each file, such as a table of results."),
     ] = 0,
-    width_mm: Annotated[float | None, _Length] = None,
-    thickness_mm: Annotated[float | None, _Length] = None,
-    gauge_mm: Annotated[float | None, _Length] = None,
+    width_mm: Annotated[float | None, typer.Option(help=f"Width of the specimen. {_FROM_FILE}", **_LENGTH)] = None,
+    thickness_mm: Annotated[
+        float | None, typer.Option(help=f"Thickness of the specimen. {_FROM_FILE}", **_LENGTH)
+    ] = None,
+    gauge_mm: Annotated[
+        float | None, typer.Option(help=f"Gauge length of the specimen. {_FROM_FILE}", **_LENGTH)
+    ] = None,
     cell_n: Annotated[
-        float | None, typer.Option(min=0.001, callback=finite, help="Full scale of the force cell.")
+        float | None,
+        typer.Option(metavar="N", min=0.001, callback=finite, help="Full scale of the force cell. Default: not known."),
     ] = None,
     strain: Annotated[
-        str, typer.Option(metavar="LOW:HIGH", help="Strain of use in %; else amplitude over the walls.")
+        str, typer.Option(metavar="LOW:HIGH", help="Strain of use in %. Default: amplitude over walls.")
     ] = "",
-    amplitude_um: Annotated[float, typer.Option(min=0.001, max=1e5, callback=finite, help="Of the motor.")] = 300.0,
-    wall_mm: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Walls that the motor strains.")] = "1.25:2.5",
-    frequency_hz: Annotated[float, typer.Option(min=1, max=5000, callback=finite, help="Of the motor.")] = 125.0,
-    deformation: Annotated[str, typer.Option(help="Deformation of --dma, if not in the file: shear or tension.")] = "",
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for material.toml, .json and charts.")] = None,
+    amplitude_um: Annotated[
+        float, typer.Option(metavar="UM", min=0.001, max=1e5, callback=finite, help="Amplitude of the motor.")
+    ] = 300.0,
+    wall_mm: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Walls that the motor strains, in mm.")] = "1.25:2.5",
+    frequency_hz: Annotated[
+        float, typer.Option(metavar="HZ", min=1, max=5000, callback=finite, help="Frequency of the motor.")
+    ] = 125.0,
+    deformation: Annotated[
+        str, typer.Option(metavar="KIND", help="Deformation of --dma: shear or tension. Default: as in the file.")
+    ] = "",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--out", metavar="DIR", help="Folder for material.toml, .json and charts. Default: only print."
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Turn tensile curves into a silicone's table.
@@ -77,6 +106,9 @@ def material(
     shipped = catalogue.materials()
     named = name or _slug((curves or [dma])[0])  # type: ignore[arg-type]
     base = like or named
+    if not like and named not in shipped:
+        limit = f"is required: {named!r} is no shipped silicone, and a curve gives only a modulus"
+        raise Refusal("--like", None, f"{limit}; known: {', '.join(shipped)}")
     if base not in shipped:
         raise unknown_name("--like", base, shipped)
     given = declared(column or [])

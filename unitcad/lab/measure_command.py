@@ -17,9 +17,12 @@ from unitcad.lab.campaign import read_campaign
 
 
 def measure(
-    campaign: Annotated[Path, typer.Argument(metavar="CAMPAIGN.toml", help="Units, their recordings, the sensor.")],
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="File of the units, their recordings and the sensor.")
+    ],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder for the results; out/measure-CAMPAIGN if not given.")
+        Path | None,
+        typer.Option("-o", "--out", metavar="DIR", help="Folder for the results. Default: out/measure-CAMPAIGN."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -17,10 +17,12 @@ from unitcad.lab.phantom.recipe import load_phantom
 
 def phantom(
     source: Annotated[
-        str, typer.Argument(metavar="PHANTOM", help="A shipped phantom's name, or a TOML file (unitcad list phantoms).")
+        str, typer.Argument(metavar="[PHANTOM]", help="Phantom file, or name of a shipped one (unitcad list phantoms).")
     ] = "skin",
-    out: Annotated[Path, typer.Option("-o", "--out", help="Parent folder of the phantom's folder.")] = Path("out"),
-    png: Annotated[bool, typer.Option("--png", help="Also box.png: the box taken apart.")] = False,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the phantom's folder.")] = Path(
+        "out"
+    ),
+    png: Annotated[bool, typer.Option("--png", help="Also draw the box taken apart, box.png.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Make a skin phantom to cast, and its response.

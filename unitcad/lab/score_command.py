@@ -16,13 +16,13 @@ from unitcad.lab.scoring import score as scored
 def score(
     figure: Annotated[
         str,
-        typer.Argument(metavar="FIGURE", help="CSV file of a digitised figure, or one of the catalogue."),
+        typer.Argument(metavar="FIGURE", help="CSV file of a digitised figure, or name of a shipped one."),
     ],
     as_json: AsJson = False,
 ) -> None:
-    """Score every model on a digitised figure, with the constants of the nine measured levels.
+    """Score every model on a digitised figure, blind.
 
-    Columns: unit, distance_mm, value, error, source.
+    The constants are those of the nine measured levels. Columns: unit, distance_mm, value, error, source.
     Points at 0 mm are levels at the edge, farther points are on the skin.
     """
     points = load_figure(figure)

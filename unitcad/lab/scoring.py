@@ -41,27 +41,43 @@ class Point:
 
 
 def load_figure(source: str) -> tuple[Point, ...]:
-    """Return the points of a CSV file, or of a figure in the catalogue. Raises Refusal for the first fault."""
+    """Return the points of a CSV file, or of a figure in the catalogue. Raises Refusal with every fault."""
     known = figures()
     path = known.get(source) or Path(source)
     if source not in known and not source.endswith(".csv"):
+        if Path(source).exists():
+            raise Refusal("FIGURE", source, "is not a CSV file")
         raise unknown_name("FIGURE", source, known)
-    lines = [line for line in read_text(path).splitlines() if line.strip() and not line.startswith("#")]
-    rows = csv.DictReader(lines)
-    if tuple(rows.fieldnames or ()) != COLUMNS:
-        raise Refusal("header", ",".join(rows.fieldnames or ()), f"must be {','.join(COLUMNS)}")
-    points = tuple(_point(i, row) for i, row in enumerate(rows))
-    if not points:
+    numbered = enumerate(read_text(path).splitlines(), 1)
+    lines = {i: line for i, line in numbered if line.strip() and not line.startswith("#")}
+    rows = csv.DictReader(lines.values())
+    points: list[Point] = []
+    faults: list[Refusal] = []
+    right = tuple(rows.fieldnames or ()) == COLUMNS
+    if not right:
+        faults = [Refusal("header", ",".join(rows.fieldnames or ()), f"must be {','.join(COLUMNS)}")]
+        faults[0].line = next(iter(lines), 1)
+    for row in rows if right else ():
+        try:
+            points.append(_point(row))
+        except Refusal as fault:
+            fault.line = list(lines)[rows.line_num - 1]
+            faults.append(fault)
+    if not points and not faults:
         raise Refusal("FIGURE", source, "has no points")
-    return points
+    for fault in faults:
+        fault.file = str(path)
+    if faults:
+        faults[0].others = tuple(faults[1:])
+        raise faults[0]
+    return tuple(points)
 
 
-def _point(i: int, row: Mapping[str, str | None]) -> Point:
-    where = f"row {i + 1}"
+def _point(row: Mapping[str, str | None]) -> Point:
     if None in row.values() or None in row:
-        raise Refusal(where, "", f"must have {len(COLUMNS)} cells")
+        raise Refusal("row", ",".join(str(cell) for cell in row.values() if cell), f"must have {len(COLUMNS)} cells")
     unit, numbers = (row["unit"] or "").strip(), {}
-    _layers(f"{where}, unit", unit)
+    _layers("unit", unit)
     for name, least, most in (("distance_mm", 0.0, FAR_MM), ("value", 1e-6, 3.0), ("error", 0.0, 3.0)):
         text = (row[name] or "").strip()
         if name == "error" and not text:
@@ -69,10 +85,10 @@ def _point(i: int, row: Mapping[str, str | None]) -> Point:
         try:
             number = float(text)
         except ValueError:
-            raise Refusal(f"{where}, {name}", text, "must be a number") from None
+            raise Refusal(name, text, "must be a number") from None
         if not least <= number <= most:
             hint = "; a fraction of the motor's amplitude, not per cent" if name == "value" and number > most else ""
-            raise Refusal(f"{where}, {name}", number, f"must be from {least:g} to {most:g}{hint}")
+            raise Refusal(name, number, f"must be from {least:g} to {most:g}{hint}")
         numbers[name] = number
     return Point(unit, numbers["distance_mm"], numbers["value"], numbers.get("error"), (row["source"] or "").strip())
 

@@ -22,6 +22,7 @@ import numpy as np
 from manifold3d import Manifold, OpType
 
 from unitcad.designs import design_of, dimensions, inserts
+from unitcad.designs.limits import check_seat
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Tooling
 from unitcad.errors import UNIT_ALONE, Refusal
@@ -65,6 +66,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
             "moulds by complement make up for no shrinkage: draw the unit larger",
         )
         raise Refusal("moulds.shrinkage_percent", value, limit, 0.0)
+    check_seat(spec)
     given, clearance = dimensions(spec), spec.moulds.window_clearance_mm
     segments = segment_count(given.outer_radius, spec.output.tolerance_mm)
     laid, laid_in = [body.shape for body in inserts(spec)], design_of(spec).laid_in
@@ -188,6 +190,8 @@ def _standing(
                 continue
             if not _stands(piece):
                 why = f"a piece of {_place(piece)} would hang in the silicone: it touches neither base nor cup"
+                if bounds(piece)[5] > rim - LEVEL:
+                    why += "; it is open above: draw the unit turned over, and it is a core on the base"
                 raise _refused(spec, i, why)
             above = piece.trim_by_plane((0, 0, 1), 0.0)
             if i == len(rims) - 1:

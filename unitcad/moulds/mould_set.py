@@ -169,7 +169,7 @@ class MouldSet:
     @property
     def across(self) -> str:
         """The part to measure across, if the tooling is not concentric."""
-        return f"Farthest corner from the motor's axis: {self.plan.dimensions.outer_radius:.2f} mm."
+        return f"Farthest corner from the axis: {self.plan.dimensions.outer_radius:.2f} mm."
 
     @property
     def source(self) -> str:

@@ -116,7 +116,9 @@ class Subject:
     @property
     def folder_name(self) -> str:
         """Return <slug>-<hash12>, at most 63 characters; the hash covers neither name nor formats."""
-        slug = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-")[:50].rstrip("-") or "unit"
+        slug = re.sub(r"(?:(?!(?<=[0-9])\.[0-9])[^a-z0-9])+", "-", self.name.lower())  # 1.2 keeps its point
+        slug = slug.strip("-")[:50].rstrip("-.") or "unit"
+        slug = slug.replace(".", "-") if files.names_device(slug) else slug  # on Windows com1.5 is the device com1
         return f"{slug}-{self.hash[:12]}"
 
     @property

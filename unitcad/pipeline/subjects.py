@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from unitcad.errors import Refusal
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.make import Subject
 from unitcad.pipeline.manifest import Manifest
 from unitcad.rooms import load
@@ -72,11 +73,17 @@ def subject(of: Any) -> Subject:
     return Subject(of) if isinstance(of, Spec) else load(of.subject)(of)
 
 
-def load_subject(source: Source | Any, changes: Changes = ()) -> Subject:
-    """Load a subject from a template's name, a file, plain data or a loaded object. Raises Refusal or UnitcadError."""
+def load_subject(source: Source | Any, changes: Changes = (), only: Sequence[str] = ()) -> Subject:
+    """Load the subject of a template's name, a file, plain data or a loaded object.
+
+    Raises Refusal or UnitcadError, also for a unit without moulds if `only` names an output that needs them.
+    """
     kind = compound_kind(source)
     named = kind.subject if kind else getattr(source, "subject", None)
-    return load(named).load(source, changes) if named else Subject(load_spec(source, changes))
+    if named:
+        return load(named).load(source, changes)
+    moulded = {"moulds", "casting"} & set(only)
+    return Subject(load_spec(source, changes, makeable=(lambda spec: MouldSet(spec).plan) if moulded else None))
 
 
 def subject_of_data(data: Mapping[str, Any]) -> Subject:

@@ -25,7 +25,7 @@ from unitcad.pipeline.subjects import subject
 from unitcad.spec import read_toml
 from unitcad.spec.raw import FORMATS, OUTPUTS, Format
 
-LOCK = re.compile(r"\.[a-z0-9-]+-[0-9a-f]{12}\.lock")
+LOCK = re.compile(r"\.[a-z0-9.-]+-[0-9a-f]{12}\.lock")
 PAGE = "report.html"
 """The page of a folder, made on request and kept up by every later build into it."""
 BENCH = "bench.html"

@@ -18,13 +18,21 @@ from unitcad.search.target_file import load_target
 
 
 def design(
-    target: Annotated[str, typer.Argument(metavar="TARGET", help="A target file, or the name of a shipped one.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Parent of the result's folder.")] = Path("out"),
+    target: Annotated[
+        str, typer.Argument(metavar="TARGET", help="Target file, or name of a shipped one (unitcad list targets).")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the result's folder.")] = Path(
+        "out"
+    ),
     explain: Annotated[
         str | None,
-        typer.Option(metavar="NAME|SPEC", help="Say why a unit is not among the proposals; nothing is written."),
+        typer.Option(
+            metavar="NAME|SPEC", help="Explain why a unit is not proposed, and write nothing. Default: propose units."
+        ),
     ] = None,
-    no_check: Annotated[bool, typer.Option("--no-check", help="Draw no moulds: the best may not be castable.")] = False,
+    no_check: Annotated[
+        bool, typer.Option("--no-check", help="Skip the moulds: the best unit may not be castable.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Try all designs at hand for a target, and rank them.

@@ -26,12 +26,13 @@ from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
 from unitcad.designs import shipped as designs
-from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
+from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
 from unitcad.files import read_text
-from unitcad.spec import convert, read_toml
+from unitcad.spec import convert
 from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
 from unitcad.validation.fit_text import lab_fit
 from unitcad.validation.shipped_files import named_file, shipped_files
+from unitcad.validation.typed_files import load_file
 
 Level = Annotated[float, Meta(ge=0.001, le=2, description="of the motor's amplitude, at the unit's edge")]
 Ratio = Annotated[
@@ -189,20 +190,16 @@ def shipped() -> dict[str, Path]:
 def load_target(source: str | os.PathLike[str]) -> Target:
     """Return the target of a shipped name or of a file.
 
-    Raises Refusal or UnitcadError for the first value that is not valid.
+    Raises Refusal with every value that is not valid, and its line, or UnitcadError.
     """
     path = named_file(os.fspath(source), shipped(), "target", WrongArgument)
-    return target_of(read_toml(path), path.stem, path.parent)
+    return load_file(path, "target", lambda data: target_of(data, path.stem, path.parent))
 
 
 def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path()) -> Target:
     """Return the target of a file's data; its relative paths start at `folder`. Raises as `load_target`."""
     _check_percent(data)
-    try:
-        asked = convert(data, TargetFile)
-    except UnknownKey as key:
-        limit = key.limit.replace("`unitcad schema`", "`unitcad schema target`")
-        raise UnknownKey(key.field, key.value, limit, key.nearest) from None
+    asked = convert(data, TargetFile)
     _check_target(asked.target)
     _check_ranges(asked.vary)
     _check_spec(asked.spec)

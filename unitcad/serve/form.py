@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal
@@ -12,7 +13,7 @@ from msgspec.structs import replace
 from unitcad.catalogue import Material, materials, motors, printers, tissue
 from unitcad.designs import shipped
 from unitcad.serve.messages import Field, Group
-from unitcad.spec import Spec, to_data
+from unitcad.spec import MOTOR_SIZES, Spec, to_data
 from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, notes, titled
 from unitcad.spec.raw import (
     CastingTable,
@@ -44,6 +45,25 @@ _OPTIONAL = {"fpcb": "wires", "wires": "fpcb"}
 """Optional tables, each with the one that it replaces."""
 _NEEDS = {"wires": {"diameter_mm": 0.3}}
 """Values of a new table: the wire of a small motor, across its insulation."""
+_USE = {
+    "diameter_mm": (5, 50),
+    "layers.wall_mm": (0.5, 5),
+    "layers.cap_mm": (0.5, 5),
+    "motor.diameter_mm": (4, 15),
+    "motor.thickness_mm": (1.5, 6),
+    "motor.lip_mm": (0, 1.5),
+    "fpcb.thickness_mm": (0.05, 0.3),
+    "fpcb.tail_width_mm": (0.6, 8),
+    "fpcb.tail_length_mm": (2, 50),
+    "fpcb.pad_diameter_mm": (2, 20),
+    "fpcb.tail_end_width_mm": (0.6, 12),
+    "wires.diameter_mm": (0.1, 1),
+    "wires.length_mm": (2, 50),
+    "layout.pitch_mm": (8, 60),
+    "sheet.thickness_mm": (0.5, 5),
+    "sheet.margin_mm": (1, 20),
+}
+"""Ranges of use, which sliders have in place of the possible range; a value beyond widens its own."""
 _UNITS = ("mm", "hz", "um", "g", "c", "kpa")
 """Units that a key ends in."""
 _TEXTS_OF_FILES = ("estimate.fit_source",)
@@ -51,7 +71,7 @@ _TEXTS_OF_FILES = ("estimate.fit_source",)
 
 def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
     """Return the form of a spec's plain data; `spec` is the resolved one, None if the data is refused."""
-    settled = to_data(spec) if spec else {}
+    settled = to_data(spec) if spec else _part(data)
     choices = choices_of(data)
     made = [Group("", "Unit", [*fields(RawSpec, "", data, settled, choices, ("name", "design", "diameter_mm"))])]
     layers = data.get("layers")
@@ -60,6 +80,14 @@ def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
             Group(f"layers.{i}", f"Layer {i + 1}", [*fields(LayerTable, f"layers.{i}", data, settled, choices)])
         )
     return [*made, *table_groups((*_TABLES, *LAST_TABLES), data, settled, choices)]
+
+
+def _part(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the sizes of the named motor, which a refused spec has not settled."""
+    named = at(data, "motor.part")
+    entry = motors().get(named) if isinstance(named, str) else None
+    sizes = {size: float(getattr(entry, size)) for size in MOTOR_SIZES if entry}
+    return {"motor": sizes | ({"drive": entry.drive.value} if entry and entry.drive else {})}
 
 
 def table_groups(
@@ -135,6 +163,9 @@ def _field(path: str, label: str, kind: Any, value: Any, given: bool, choices: l
     limits = [*notes(kind), *notes(entry_in(kind))]
     low = next((float(note.ge) for note in limits if note.ge is not None), None)
     high = next((float(note.le) for note in limits if note.le is not None), None)
+    if (place := re.sub(r"\.\d+$", "", _place(path))) in _USE and low is not None and high is not None:
+        now = [float(value)] if isinstance(value, int | float) else []
+        low, high = max(low, min([_USE[place][0], *now])), min(high, max([_USE[place][1], *now]))
     how: Literal["number", "integer", "word", "words", "text", "switch", "toml"]
     listed = any(typing.get_origin(one) in (tuple, list, dict) for one in members)
     several = _words(entry_in(kind)) if listed and len(members) == 1 else []

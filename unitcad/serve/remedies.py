@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeGuard
+from typing import Any
 
 import tomlkit
 from msgspec.structs import replace
@@ -14,13 +14,7 @@ from unitcad.errors import NEAREST, Refusal, UnitcadError, shown
 from unitcad.serve.messages import Edit, Fault
 from unitcad.validation import put
 from unitcad.validation.dotted import ABSENT, at, drop
-
-_HALVINGS = 60
-_FINEST = 1e-7
-"""Two numbers so near to each other, for their size, are one."""
-_MOST_LIMITS = 5
-"""Limits of one field that are tried out in turn for a value to offer."""
-
+from unitcad.validation.suggestions import followed, is_number, nearest_number, refused
 
 Judge = Callable[[dict[str, Any]], Mapping[str, Any]]
 """Validates plain data and returns it settled; raises UnitcadError for a fault."""
@@ -65,6 +59,8 @@ def _remedied(
         fault = _offering(fault, _tried(fault, data, own, alone, judge, whole))
     elif own and (nearest := _nearest(data, own, judge, whole)) is not None:
         fault = _offering(fault, nearest)
+    if fault.field == "diameter_mm" and own is None and isinstance(fault.nearest, float):
+        fault = _offering(fault, _with_ring(data, blamed, fault.nearest, judge, whole))
     if blamed is not None:
         back = blamed.value if isinstance(blamed.value, str) and not blamed.toml else None
         back = _nearest(data, blamed, judge, whole) if back is None else back
@@ -74,6 +70,24 @@ def _remedied(
         if drop(without, fault.field) and _accepted(without, judge):
             return replace(fault, leave_out=True)
     return fault
+
+
+def _with_ring(data: Mapping[str, Any], blamed: Edit | None, least: float, judge: Judge, whole: Judge) -> float:
+    """Return the diameter at which the ring of air round the motor is as wide as before a change; else the least."""
+    if blamed is None:
+        return least
+    try:
+        before = _ring(judge(_after(data, blamed)))
+        kept = round(least + 2 * (before - _ring(judge(_after(data, Edit(path="diameter_mm", value=least))))), 3)
+    except (UnitcadError, KeyError, TypeError):
+        return least
+    return kept if kept > least and _accepted(_after(data, Edit(path="diameter_mm", value=kept)), whole) else least
+
+
+def _ring(settled: Mapping[str, Any]) -> float:
+    """Return the width of the ring of air of a settled spec."""
+    walls = sum(layer["wall_mm"] for layer in settled["layers"])
+    return settled["diameter_mm"] / 2 - settled["motor"]["diameter_mm"] / 2 - walls
 
 
 def _offering(fault: Fault, nearest: Any) -> Fault:
@@ -98,18 +112,8 @@ def _tried(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool,
 
 def _onwards(data: Mapping[str, Any], path: str, value: Any, judge: Judge) -> Any:
     """Return a value that is accepted at a path: the given one, or the one that its refusals offer in its place."""
-    for _ in range(_MOST_LIMITS):
-        try:
-            judge(_after(data, Edit(path=path, value=value)))
-        except Refusal as refusal:
-            if refusal.field != path or refusal.nearest is None:
-                return None
-            value = refusal.nearest
-        except UnitcadError:
-            return None
-        else:
-            return value
-    return None
+    changes, _ = followed(Refusal(path, None, "", value), data, judge)
+    return changes[path] if set(changes) == {path} else None
 
 
 def _renamed(data: Mapping[str, Any], path: str, right: str) -> dict[str, Any]:
@@ -132,45 +136,18 @@ def _left_out(faults: Sequence[Fault], data: Mapping[str, Any], judge: Judge) ->
 
 def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge, whole: Judge) -> float | None:
     """Return the accepted number nearest to the refused one, on the way from the one that was accepted before."""
-    refused, accepted = at(data, edit.path), edit.value
+    bad, good = at(data, edit.path), edit.value
     if edit.remove:
         try:
-            accepted = at(judge(_after(data, edit)), edit.path)
+            good = at(judge(_after(data, edit)), edit.path)
         except UnitcadError:
             return None
-    if not _is_float(refused) or not _is_float(accepted):
+    if not is_number(bad) or not is_number(good):
         return None
-
-    def taken(value: float) -> bool:
-        return _accepted(_after(data, Edit(path=edit.path, value=value)), judge)
-
-    if _accepted(_after(data, Edit(path=edit.path, value=accepted)), whole):
-        judge = whole
-    elif not taken(accepted):
-        return None
-    if isinstance(refused, int) and isinstance(accepted, int) and not taken(accepted + (refused > accepted) - 0.5):
-        return _last(taken, accepted, refused)
-    least, most = sorted((accepted, refused))
-    low, high = float(accepted), float(refused)
-    for _ in range(_HALVINGS):
-        if abs(high - low) <= _FINEST * max(1.0, abs(low)):
-            break
-        middle = (low + high) / 2
-        low, high = (middle, high) if taken(middle) else (low, middle)
-    rounded = (round(low + shift, digits) for digits in (2, 3, 4) for shift in (0.0, -(10.0**-digits), 10.0**-digits))
-    return next((value for value in rounded if least <= value <= most and taken(value)), low)
-
-
-def _last(taken: Callable[[float], bool], accepted: int, refused: int) -> int:
-    """Return the last whole number that is taken on the way from an accepted to a refused one."""
-    while abs(refused - accepted) > 1:
-        middle = (accepted + refused) // 2
-        accepted, refused = (middle, refused) if taken(middle) else (accepted, middle)
-    return accepted
-
-
-def _is_float(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    for strict in (whole, judge):
+        if refused(data, {edit.path: good}, strict) is None:
+            return nearest_number(data, edit.path, good, bad, strict)
+    return None
 
 
 def _after(data: Mapping[str, Any], edit: Edit) -> dict[str, Any]:
@@ -186,9 +163,5 @@ def _after(data: Mapping[str, Any], edit: Edit) -> dict[str, Any]:
     return changed
 
 
-def _accepted(data: dict[str, Any], judge: Judge) -> bool:
-    try:
-        judge(data)
-    except UnitcadError:
-        return False
-    return True
+def _accepted(data: Mapping[str, Any], judge: Judge) -> bool:
+    return refused(data, {}, judge) is None

@@ -18,12 +18,19 @@ from unitcad.serve.addresses import TOKEN
 def serve(
     source: Annotated[
         str | None,
-        typer.Argument(metavar="SPEC", help="A spec, array or campaign file, a template, or a folder of results."),
+        typer.Argument(
+            metavar="[SPEC]",
+            help="Spec, array or campaign file, template, or folder of results. Default: the default template.",
+        ),
     ] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder of builds and sweeps from the page.")] = Path("out"),
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = 0,
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="Folder of builds and sweeps from the page.")
+    ] = Path("out"),
+    port: Annotated[
+        int, typer.Option(metavar="PORT", min=0, max=65535, help="Port of the page; 0 takes a free one.")
+    ] = 0,
     host: Annotated[
-        str, typer.Option(help="The address that it binds to; another one than the loopback needs UNITCAD_TOKEN.")
+        str, typer.Option(metavar="ADDRESS", help="Address to bind to; other than the loopback needs UNITCAD_TOKEN.")
     ] = "127.0.0.1",
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
     code: AllowCode = False,

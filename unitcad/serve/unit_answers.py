@@ -27,6 +27,7 @@ from unitcad.spec.raw import RawSpec
 from unitcad.validation import from_data, warnings
 from unitcad.validation.defaults import resolve
 from unitcad.validation.load import all_faults
+from unitcad.validation.load import judge as judge
 
 form = groups
 as_data = to_data
@@ -43,11 +44,6 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
     """Return plain data with the texts of the files that it may name."""
     folder = folder_for(data, trusted)
     return with_source(dict(data), folder) if folder else dict(data)
-
-
-def judge(data: dict[str, Any]) -> Mapping[str, Any]:
-    """Return plain data that has its files' texts, settled. Raises UnitcadError."""
-    return to_data(resolve(convert(data, RawSpec)))
 
 
 def makeable(data: dict[str, Any]) -> Mapping[str, Any]:

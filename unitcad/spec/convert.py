@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
-from unitcad.errors import Refusal, unknown_key, unknown_name
+from unitcad.errors import Refusal, UnknownKey, unknown_key, unknown_name
 from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, named_in, notes, table_in
 from unitcad.text import invisible, printable, without_invisible
 
@@ -27,6 +27,9 @@ _NAMES: dict[type, str] = {
 """Kinds of plain data in words, in the order in which a refusal lists them."""
 _HALF_PAIR = re.compile(r"[\ud800-\udfff]")
 """Replacement of a byte that is not UTF-8."""
+_MEASURE = re.compile(r"\s*([-+]?\d*[.,]?\d+)\s*([A-Za-z%]*)\s*")
+_MM = {"mm": 1, "cm": 10, "m": 1000, "um": 0.001, "in": 25.4}
+"""Millimetres in a unit of length."""
 _MOST_KEYS = 5
 """Keys of a table that a refusal names."""
 _LARGEST_INT = 2**63 - 1
@@ -100,7 +103,10 @@ def _refusals(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
             if key in fields:
                 yield from _refusals(below, fields[key].type, _below(field, key))
             else:
-                yield unknown_key(_below(field, key), below, fields, "`unitcad schema`")
+                unknown = unknown_key(_below(field, key), below, fields, "`unitcad schema`")
+                homes = [] if field or unknown.nearest else _homes(key, fields)
+                moved = UnknownKey(key, below, f"unknown key at the top; known: {' or '.join(homes)}")
+                yield moved if homes else unknown
         missing = (name for name, entry in fields.items() if entry.required and name not in node)
         yield from (Refusal(_below(field, name), None, "is required") for name in missing)
         return
@@ -114,6 +120,13 @@ def _refusals(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
     yield _refusal(node, kind, field)
 
 
+def _homes(key: str, fields: Mapping[str, Any]) -> list[str]:
+    """Return the paths of a key in the tables of a file, each list by its first entry."""
+    tables = {name: table_in(field.type) for name, field in fields.items()}
+    tables |= {f"{name}.0": table_in(entry) for name, field in fields.items() if (entry := entry_in(field.type))}
+    return [f"{name}.{key}" for name, table in tables.items() if table and key in fields_of(table)]
+
+
 def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     """Return why a value itself can't be a `kind`: its type, its word, its size or its length."""
     table, known, words = table_in(kind), _plain_kinds(kind), _words(kind)
@@ -123,7 +136,8 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     if not (given in known or (given is int and float in known)):
         names = [_name(plain, kind) for plain in _NAMES if plain in known]
         limit = f"takes {', or '.join(names) if table else ' or '.join(names)}"
-        return Refusal(field, value, limit, _in_list(value, kind) if list in known else None)
+        meant = _in_list(value, kind) if list in known else _number(value, field) if known & {int, float} else None
+        return Refusal(field, value, limit, meant if _fits(meant, kind) else None)
     if isinstance(value, int | float):
         return next(_out_of_range(value, kind, field))
     tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
@@ -184,13 +198,13 @@ def _name(plain: type, kind: Any) -> str:
 
 
 def _list_of(kind: Any) -> str:
-    """Describe the entries of a list, by an example if they are short."""
+    """Describe a list of tables by its meaning or their keys, another list by an example."""
     entry = entry_in(kind)
-    if meaning(kind) and _plain_kinds(entry) & {list, dict}:
-        return f": {meaning(kind)}"
     if table_in(entry):
-        return f", each entry {_name(dict, entry)}"
-    examples = {str: '"a"', int: "1", float: "1.5", bool: "true", dict: "{}", list: "[]"}
+        return f": {meaning(kind)}" if meaning(kind) else f", each entry {_name(dict, entry)}"
+    examples = {str: '"a"', int: "1", float: "1.5", bool: "true", dict: "{}"}
+    if list in _plain_kinds(entry):
+        return f" such as [{_list_of(entry).removeprefix(' such as ')}]"
     one = f'"{_words(entry)[0]}"' if _words(entry) else next(examples[k] for k in examples if k in _plain_kinds(entry))
     return f" such as [{', '.join([one] * _length(kind))}]"
 
@@ -199,6 +213,18 @@ def _length(kind: Any) -> int:
     """Return how many entries a list has: as many as are fixed, else one."""
     tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
     return next((len(entries) for entries in tuples if Ellipsis not in entries), 1)
+
+
+def _number(value: Any, field: str) -> float | None:
+    """Return the number that a text means, in the unit of its field: 14.5 for "14,5", "14.5 mm" or "1.45 cm"."""
+    parts = _MEASURE.fullmatch(value) if isinstance(value, str) else None
+    if not parts:
+        return None
+    unit, own = parts[2].lower(), field.rpartition("_")[2]
+    if unit not in ("", own) and not (own == "mm" and unit in _MM):
+        return None
+    number = float(parts[1].replace(",", ".")) * (_MM.get(unit, 1) if own == "mm" else 1)
+    return int(number) if number.is_integer() else number if math.isfinite(number) else None
 
 
 def _in_list(value: Any, kind: Any) -> list[Any] | None:

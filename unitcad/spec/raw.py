@@ -292,7 +292,9 @@ class RawSpec(Table, frozen=True, kw_only=True):
         float,
         Meta(ge=0, le=20, description="thickness of a film of the last layer's silicone over the skin side; 0: none"),
     ] = 0.0
-    motor: MotorTable = MotorTable(part=DEFAULT_MOTOR)
+    motor: Annotated[MotorTable | bool, Meta(description="the motor; false: none, for a custom design")] = MotorTable(
+        part=DEFAULT_MOTOR
+    )
     fpcb: FpcbTable | None = None
     wires: WiresTable | None = None
     layers: Annotated[tuple[LayerTable, ...], Meta(min_length=1, max_length=15, description=_LAYERS)]

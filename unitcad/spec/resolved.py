@@ -38,15 +38,19 @@ _MOST_LAYERS = 3
 """Layers that a spec's summary lists."""
 
 
-class MotorSize(Table, frozen=True, kw_only=True):
-    """The motor's size and drive; `part` names its catalogue entry, or None. With `fill` Layer 1 reaches it."""
+class MotorSize(Table, frozen=True, kw_only=True, omit_defaults=True):
+    """The motor's size and drive; `part` names its catalogue entry, or None. With `fill` Layer 1 reaches it.
+
+    `absent`: a custom design has none, and nothing is drawn for it. The sizes only fill their place.
+    """
 
     part: str | None
     diameter_mm: float
     thickness_mm: float
     drive: Drive
     fill: bool
-    lip_mm: float = 0.0
+    lip_mm: float
+    absent: bool = False
 
 
 class Circuit(Table, frozen=True, kw_only=True):
@@ -219,7 +223,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
             diameter_mm: float,
             layers: Sequence[LayerTable | CastLayer | _Keys],
             skin_mm: float = 0.0,
-            motor: MotorTable | MotorSize | _Keys = ...,
+            motor: MotorTable | MotorSize | _Keys | bool = ...,
             fpcb: FpcbTable | Circuit | _Keys | None = None,
             wires: WiresTable | _Keys | None = None,
             moulds: MouldsTable | Moulds | _Keys = ...,
@@ -254,7 +258,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
         rows = [
             ("design", self.design),
             ("diameter_mm", self.diameter_mm),
-            ("motor", f"{self.motor.diameter_mm:g} x {self.motor.thickness_mm:g} mm"),
+            ("motor", None if self.motor.absent else f"{self.motor.diameter_mm:g} x {self.motor.thickness_mm:g} mm"),
             ("circuit", self.fpcb and f"tail {self.fpcb.tail}, {self.fpcb.tail_width_mm:g} mm wide"),
             *(
                 (f"layers.{i}", f"{layer.material}, wall {layer.wall_mm:g} mm, cap {layer.cap_mm:g} mm")

@@ -18,6 +18,7 @@ from unitcad.files import read_text
 from unitcad.spec.resolved import Spec, with_formats
 from unitcad.spec.toml_lines import has_more
 
+_PLACE = re.compile(r" \(at line (\d+), column (\d+)\)")
 MOST = 20_000
 """Keys, tables and list entries that a TOML file may have, together."""
 
@@ -41,23 +42,35 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise UnitcadError(f"{name}: not TOML: {error}{_unquoted(text, str(error))}") from None
+        place = _PLACE.search(str(error))
+        line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
+        advice = _advice(text, line, column)
+        why = _PLACE.sub("", str(error)).replace(" (at end of document)", ": the file ends too early")
+        why = why.replace("Illegal character '\\n'", "the quotes do not end in their line")
+        why = re.sub(r"Cannot (declare|overwrite) .*", "the line sets a key or table for the second time", why)
+        raise UnitcadError(f"{name}:{line}:{column}: not TOML: {why}{advice}") from None
     except RecursionError:
         raise UnitcadError(f"{name}: nests too deeply") from None
     except ValueError:
         raise UnitcadError(f"{name}: has a number of thousands of digits") from None
 
 
-def _unquoted(text: str, error: str) -> str:
-    """Return the advice for a word without quotes at the place of a parser's error; "" for another cause."""
-    place = re.search(r"Invalid value \(at line (\d+), column (\d+)\)", error)
-    line = text.split("\n")[int(place[1]) - 1] if place else ""
-    word = re.match(r"[^\W\d][\w./-]*", line[int(place[2]) - 1 :]) if place else None
-    if not word:
-        return ""
-    if word[0].lower() in ("true", "false"):
+def _advice(text: str, line: int, column: int) -> str:
+    """Return the advice for a usual mistake at the place of a parser's error; "" for another one."""
+    statement = text.split("\n")[line - 1]
+    before, after = statement[: column - 1], statement[column - 1 :]
+    word = re.match(r"[^\W\d][\w./ -]*", after)
+    if word and word[0].lower() in ("true", "false"):
         return f"; write {word[0].lower()} in small letters"
-    return f'; put quotes round a text: "{word[0]}"'
+    if word and before.rstrip().endswith(("=", "[", ",")):
+        return f'; put quotes round a text: "{word[0].strip()}"'
+    if (number := re.search(r"([-+]?\d+)$", before)) and (decimals := re.match(r",(\d+)", after)):
+        return f"; write a point in a number: {number[1]}.{decimals[1]}"
+    if (number := re.search(r"[-+]?\d[\d.]*\s*$", before)) and word:
+        return f"; write a number without its unit: {number[0].strip()}"
+    if key := re.match(r"\s*([\w-]+)\s*:", statement):
+        return f"; write {key[1]} = ..."
+    return '; this is JSON: write name = "value"' if text.lstrip().startswith("{") else ""
 
 
 def to_data(spec: Spec) -> dict[str, Any]:
@@ -66,6 +79,8 @@ def to_data(spec: Spec) -> dict[str, Any]:
     for layer in data["layers"]:
         if not layer["cap_mm"]:
             del layer["cap_mm"]
+    if spec.motor.absent:
+        data["motor"] = False
     return data
 
 

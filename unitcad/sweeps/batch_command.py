@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +17,6 @@ from unitcad.cli.shared_options import (
     Formats,
     NoCheck,
     Only,
-    Page,
     Sets,
     allow_code,
     finite,
@@ -38,36 +38,42 @@ from unitcad.sweeps.merging import merge
 from unitcad.sweeps.preview import preview
 from unitcad.sweeps.shards import shard_folders, shard_of
 
+PAGE_UP_TO = 100
+"""Variants to which a batch has a page unless asked otherwise: a page of 100 takes about 10 s."""
+
 
 def batch(
     ctx: typer.Context,
     sweep: Annotated[
-        str, typer.Argument(metavar="SWEEP", help="A sweep file, or the name of a shipped one; or merge, and shards.")
+        str, typer.Argument(metavar="SWEEP", help="Sweep file, or name of a shipped one; or merge, and shards.")
     ],
     shards: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[SHARD]...", help="After merge: the shards' folders, or their common parent."),
+        typer.Argument(metavar="[SHARD]...", help="Folders of shards to merge, or their common parent."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="The batch's own folder; else out/<the sweep's name>.")
+        Path | None,
+        typer.Option("-o", "--out", metavar="DIR", help="Folder of the batch. Default: out/NAME-OF-THE-SWEEP."),
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option("-j", "--jobs", min=0, max=1024, help="Worker processes; else one a core. 0: in this process."),
+        typer.Option(
+            "-j", "--jobs", metavar="N", min=0, max=1024, help="Worker processes; 0: this process. Default: one a core."
+        ),
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tls://host:8786.")
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, such as tls://host:8786. Default: none.")
     ] = None,
     tls_ca_file: Annotated[
         Path | None,
-        typer.Option(metavar="PEM", help="For tls://, the certificate authority; else from Dask's configuration."),
+        typer.Option(metavar="PEM", help="Certificate authority for tls://. Default: Dask's configuration."),
     ] = None,
     tls_cert: Annotated[
         Path | None,
-        typer.Option(metavar="PEM", help="For tls://, the client certificate; else from Dask's configuration."),
+        typer.Option(metavar="PEM", help="Client certificate for tls://. Default: Dask's configuration."),
     ] = None,
     tls_key: Annotated[
-        Path | None, typer.Option(metavar="PEM", help="For tls://, the client's key; else from Dask's configuration.")
+        Path | None, typer.Option(metavar="PEM", help="Client key for tls://. Default: Dask's configuration.")
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the number of variants, parts and files; make nothing.")
@@ -76,52 +82,74 @@ def batch(
         bool,
         typer.Option("--verify", help="Compare hashes of finished variants, not only sizes."),
     ] = False,
-    keep_going: Annotated[bool, typer.Option("--keep-going", help="Go on after a variant that fails.")] = False,
+    keep_going: Annotated[bool, typer.Option("--keep-going", help="Continue after a variant that fails.")] = False,
     timeout: Annotated[
         float | None,
-        typer.Option(metavar="S", min=0.001, max=1e7, callback=finite, help="Seconds that a variant may take."),
-    ] = (None),
-    limit: Annotated[int | None, typer.Option(metavar="N", help="The first N variants only.")] = None,
-    cache: Annotated[Path | None, typer.Option(help="Cache of distinct parts. Default: the user's cache.")] = None,
+        typer.Option(
+            metavar="SECONDS", min=0.001, max=1e7, callback=finite, help="Time limit for a variant. Default: none."
+        ),
+    ] = None,
+    limit: Annotated[
+        int | None, typer.Option(metavar="N", help="Make only the first N variants. Default: all.")
+    ] = None,
+    cache: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Cache of distinct parts. Default: the user's cache.")
+    ] = None,
     cache_limit: Annotated[
-        float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="Largest cache after the batch.")
+        float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="Maximum cache size after the batch.")
     ] = 4096,
     store: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="Workers put content there: a folder, s3://bucket/path."),
+        typer.Option(
+            metavar="ADDRESS", help="Store for content: a folder, s3://bucket/path. Default: the batch's folder."
+        ),
     ] = None,
     folders: Annotated[
-        bool | None, typer.Option("--folders/--no-folders", help="A folder a variant; else below 1,000 variants.")
+        bool | None,
+        typer.Option("--folders/--no-folders", help="Write a folder for each variant. Default: below 1,000 variants."),
     ] = None,
     table: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="csv,json,parquet; else the first two below 10,000 variants.")
+        str | None,
+        typer.Option(metavar="NAMES", help="Tables: csv,json,parquet. Default: csv,json below 10,000 variants."),
     ] = None,
     shard: Annotated[
-        str | None, typer.Option(metavar="K/N", help="Make part K of N of the sweep; unitcad batch merge joins them.")
+        str | None,
+        typer.Option(metavar="K/N", help="Make part K of N of the sweep; batch merge joins the parts. Default: all."),
     ] = None,
     sets: Sets = None,
     formats: Formats = None,
     only: Only = None,
-    page: Page = False,
+    page: Annotated[
+        bool | None,
+        typer.Option(
+            "--report/--no-report",
+            help=f"Write report.html, one offline page. Default: on without --only, for at most {PAGE_UP_TO} variants.",
+        ),
+    ] = None,
     no_check: NoCheck = False,
     code: AllowCode = False,
     as_json: AsJson = False,
-    json_lines: Annotated[bool, typer.Option("--json-lines", help="One JSON object a line as variants end.")] = False,
+    json_lines: Annotated[
+        bool, typer.Option("--json-lines", help="Print one JSON object a line as variants end.")
+    ] = False,
 ) -> None:
     """Make every variant of a sweep, each distinct part once. The last line printed is the folder."""
 
     named = listed(table) if table is not None else None
     if sweep == "merge":
         _confirm_merges(ctx)
-        options = BatchOptions(folders=folders_for(page, folders), cache=cache, tables=checked_tables(named, page))
-        _merge(shards or [], out, options, page, as_json)
+        paged = bool(page)
+        options = BatchOptions(folders=folders_for(paged, folders), cache=cache, tables=checked_tables(named, paged))
+        _merge(shards or [], out, options, paged, as_json)
         return
     if shards:
-        raise typer.BadParameter(f"one sweep a batch; {shards[0]} is one too many.", param_hint="SWEEP")
+        raise Refusal("SWEEP", str(shards[0]), "a batch takes one sweep; build this one by another command")
     chosen = outputs(only)
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
     part = None if shard is None else shard_of(shard)
+    usual = only is None and not (folders is False or table or store or part or scheduler)
+    page = usual and wanted.count <= PAGE_UP_TO if page is None else page
     options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, store,
         folders_for(page, folders, chosen), checked_tables(named, page), part)  # fmt: skip
     if dry_run:
@@ -214,6 +242,8 @@ def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> N
         f"{summary.seconds:.1f} s",
     ]
     typer.echo("; ".join(parts))
+    there = (folder / PAGE).is_file()
+    typer.echo(f"open {folder / PAGE}" if there else f"unitcad report {shlex.quote(str(folder))} writes its page")
     typer.echo(str(folder))
 
 

@@ -45,7 +45,7 @@ def check_certificates(certificates: Certificates, scheduler: str | None) -> Non
         if scheduler is None or not scheduler.startswith(ENCRYPTED):
             raise Refusal(option, str(path), "needs a --scheduler at tls://")
         if not path.is_file():
-            raise Refusal(option, str(path), "there is no such file")
+            raise Refusal(option, str(path), "no such file")
 
 
 def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple[Executor, int]:

@@ -16,12 +16,19 @@ from unitcad.sweeps.result_folders import export_variants
 def export(
     hashes: Annotated[
         list[str],
-        typer.Argument(metavar="HASH...", help="The hash at the end of a variant's folder, or how it begins."),
+        typer.Argument(metavar="HASH...", help="Hash at the end of a variant's folder, or its beginning."),
     ],
-    batch: Annotated[Path, typer.Option("--batch", help="The batch's folder.")] = Path(),
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Default: the batch's folder.")] = None,
-    store: Annotated[str | None, typer.Option(metavar="ADDRESS", help="The store; else the batch's.")] = None,
-    where: Annotated[Path | None, typer.Option("--cache", help="The cache's folder; else the user's.")] = None,
+    batch: Annotated[Path, typer.Option("--batch", metavar="DIR", help="Folder of the batch.")] = Path(),
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", metavar="DIR", help="Parent of the folders. Default: the batch's folder."),
+    ] = None,
+    store: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Store of the content. Default: the batch's.")
+    ] = None,
+    where: Annotated[
+        Path | None, typer.Option("--cache", metavar="DIR", help="Folder of the cache. Default: the user's.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Make the folders of some variants of a batch, from its store. Each is a line printed."""

@@ -153,7 +153,7 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
         try:
             record = _read(folder)
         except files.NotThere:
-            why = f"is not a shard of a batch (no {RECORD})" if folder.is_dir() else "there is no such folder"
+            why = f"is not a shard of a batch (no {RECORD})" if folder.is_dir() else "no such folder"
             raise UnitcadError(f"{folder}: {why}") from None
         except msgspec.MsgspecError as error:
             raise UnitcadError(

@@ -28,13 +28,14 @@ from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import names_device, read_text
 from unitcad.pipeline.subjects import subject_of_data
 from unitcad.rooms import load
-from unitcad.spec import check_plain, convert, read_toml
+from unitcad.spec import check_plain, convert
 from unitcad.spec.fields import fields_of
-from unitcad.sweeps.paths import check_path
+from unitcad.sweeps.paths import check_path, label
 from unitcad.text import some
 from unitcad.validation import compound_kind, confirm_known, every_template, override, put, read
 from unitcad.validation.load import all_faults
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files
+from unitcad.validation.typed_files import load_file
 
 T = TypeVar("T", bound=Struct)
 Mode = Literal["product", "zip", "cases"]
@@ -215,6 +216,9 @@ class Sweep:
         data = self.base_data(base)
         for path, value in values.items():
             put(data, path, value)
+        swept = {path: value for path, value in values.items() if path not in self._alone}
+        if "name" not in values and isinstance(data.get("name"), str) and (named := label(swept)):
+            data["name"] = f"{data['name'][: 49 - len(named)]}-{named}"
         return data
 
     def base_data(self, base: str) -> dict[str, Any]:
@@ -223,6 +227,11 @@ class Sweep:
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, Any]]]:
         return ((index, self.values(index)[1]) for index in range(self.count))
+
+    @cached_property
+    def _alone(self) -> set[str]:
+        """Paths of one value."""
+        return {axis.path for axis in self.axes if len(axis) == 1}
 
     @cached_property
     def _texts(self) -> dict[str, str]:
@@ -245,7 +254,7 @@ def load_sweep(source: str | os.PathLike[str]) -> Sweep:
     Raises Refusal or UnitcadError for an unknown base or path, lists of unequal lengths in a zip, an empty sweep.
     """
     path = named_file(os.fspath(source), shipped(), "sweep", WrongArgument)
-    return from_file(read_toml(path), path.parent, path.stem)
+    return load_file(path, "sweep", lambda data: from_file(data, path.parent, path.stem))
 
 
 def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:

@@ -38,7 +38,7 @@ def _thin_layers(spec: Spec) -> list[str]:
 
 
 def _leads(spec: Spec) -> list[str]:
-    if spec.fpcb or spec.wires or not design_of(spec).caps:
+    if spec.fpcb or spec.wires or spec.motor.absent or not design_of(spec).caps:
         return []
     offer = "add a table [wires] with diameter_mm, or [fpcb]"
     return [f"no way out for the motor's leads: they lie between unit and skin; {offer}"]
@@ -53,7 +53,7 @@ def _not_estimated(spec: Spec) -> list[str]:
 
 def _roof(spec: Spec) -> list[str]:
     """Warn of a roof that spans too much air, and of too wide a ring of it round the motor."""
-    if not design_of(spec).caps or spec.motor.fill:
+    if not design_of(spec).caps or spec.motor.fill or spec.motor.absent:
         return []
     dims, close, found = design_of(spec).dimensions(spec), "motor.fill = true closes the ring", list[str]()
     sag, hertz = roof(spec)

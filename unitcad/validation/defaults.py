@@ -86,6 +86,8 @@ def _with_defaults(raw: RawSpec, design: Design) -> Spec:
 
 def _motor(raw: RawSpec) -> tuple[catalogue.Motor | None, MotorSize]:
     """Return the motor's catalogue entry, and its size and drive; what is given beside a part overrides the entry's."""
+    if isinstance(raw.motor, bool):
+        return None, _no_motor(raw)
     given, part = raw.motor, None
     sizes = {"diameter_mm": given.diameter_mm, "thickness_mm": given.thickness_mm}
     name = DEFAULT_MOTOR if given.part is None and set(sizes.values()) == {None} else given.part
@@ -95,9 +97,31 @@ def _motor(raw: RawSpec) -> tuple[catalogue.Motor | None, MotorSize]:
     for field, size in sizes.items():
         if size is None:
             raise Refusal(f"motor.{field}", None, "is required where no part is named")
-    known = {field: size for field, size in sizes.items() if size is not None}
+    known: dict[str, Any] = {field: size for field, size in sizes.items() if size is not None}
     drive = given.drive or (part.drive.value if part and part.drive else UNKNOWN_DRIVE)
     return part, MotorSize(part=name, drive=drive, fill=given.fill, lip_mm=given.lip_mm, **known)
+
+
+def _no_motor(raw: RawSpec) -> MotorSize:
+    """Return the motor of a spec without one. Raises Refusal if its design or its circuit needs one."""
+    if raw.motor:
+        raise Refusal("motor", raw.motor, "takes a table, or false for none", False)
+    if not is_custom(raw.design):
+        raise Refusal("motor", False, f"the design {raw.design} is drawn round one; a custom design may have none")
+    for field in ("fpcb", "wires"):
+        if getattr(raw, field):
+            raise Refusal(field, None, "leads to a motor, and motor = false: leave one of them out")
+    entry = catalogue.motors()[DEFAULT_MOTOR]
+    diameter, thickness = float(entry.diameter_mm), float(entry.thickness_mm)
+    return MotorSize(
+        part=None,
+        diameter_mm=diameter,
+        thickness_mm=thickness,
+        drive=UNKNOWN_DRIVE,
+        fill=False,
+        lip_mm=0.0,
+        absent=True,
+    )
 
 
 def _moulds(raw: RawSpec, design: Design) -> Moulds:

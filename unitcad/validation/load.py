@@ -5,7 +5,8 @@ from __future__ import annotations
 import copy
 import os
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +14,14 @@ from unitcad.designs import default_design
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
 from unitcad.files import read_text
 from unitcad.rooms import FileKind, file_kinds
-from unitcad.spec import Spec, check_plain, convert, read_toml
+from unitcad.spec import Spec, check_plain, convert, read_toml, to_data
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml_lines import line_of
 from unitcad.validation.defaults import resolve
 from unitcad.validation.dotted import ABSENT, at, put
-from unitcad.validation.faults import every_fault, settled
-from unitcad.validation.shipped_files import is_path, named_file, shipped_files, shipped_of
+from unitcad.validation.shipped_files import expect_kind, is_path, named_file, shipped_files, shipped_of, spelled
+from unitcad.validation.suggestions import every_fault, suggested
 from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
 
 
@@ -62,7 +63,7 @@ def compound_kind(source: object) -> FileKind | None:
         return next((kind for kind in _compounds() if all(key in source for key in kind.keys)), None)
     if not isinstance(source, str | os.PathLike):
         return None
-    text = os.fspath(source)
+    text = spelled(os.fspath(source), every_template())
     if text in templates():
         return None
     if not is_path(text):
@@ -73,17 +74,18 @@ def compound_kind(source: object) -> FileKind | None:
         return None
 
 
-def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArgument) -> None:
-    """Raise `kind`, of that field, for a name of no template and no file's path."""
+def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArgument) -> str:
+    """Return a name as `spelled` does. Raises `kind`, of that field, for a name of no template and no file's path."""
     named_file(name, every_template(), field, kind)
+    return spelled(name, every_template())
 
 
 def default_template() -> str:
-    """Return the template to start from where none is named: the one with the default design's name."""
+    """Return the template to start from if none is named: the one with the default design's name."""
     return default_design().name
 
 
-def load(source: Source, set: Changes = ()) -> Spec:
+def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] | None = None) -> Spec:
     """Return the resolved spec of a template, a file, plain data, or another spec or variant.
 
     Parameters
@@ -93,6 +95,8 @@ def load(source: Source, set: Changes = ()) -> Spec:
     set : dict or sequence of str, optional
         Changes by dotted path: ``{"layers.0.wall_mm": 1.2}`` or ``["layers.0.wall_mm=1.2"]``. Lengths in mm.
         Values that follow from others follow the changed ones.
+    makeable : callable, optional
+        Raises Refusal for a spec that can't be made. Suggested values then pass it too.
 
     Returns
     -------
@@ -126,14 +130,23 @@ def load(source: Source, set: Changes = ()) -> Spec:
         if not isinstance(spec, Spec):
             given = type(source).__name__
             raise UnitcadError(f"{given} is no spec: name a template or a file, or give a dict, a Spec or a Variant")
-        if not changes:
+        if not changes and not makeable:
             return spec
         data = asked_of(spec, from_data)
     data = changed(data, changes)
+    whole = with_source(data, Path())
+
+    def settled(data: dict[str, Any]) -> Spec:
+        spec = resolve(convert(data, RawSpec))
+        if makeable:
+            makeable(spec)
+        return spec
+
     try:
-        return from_data(data, Path())
-    except Refusal as refusal:
-        raise _explained(refusal, data, source) from None
+        return settled(whole)
+    except Refusal as first:
+        every = every_fault(first, whole, lambda data: to_data(settled(data)), _sound(whole))
+        raise _located(every, data, source) from None
 
 
 def changed(data: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]) -> dict[str, Any]:
@@ -168,7 +181,9 @@ def read(source: str | os.PathLike[str]) -> dict[str, Any]:
     The code of a design that the file names may run from now on: see `unitcad.spec.custom_code`.
     """
     path = named_file(os.fspath(source), templates() | custom_templates(), "spec", WrongArgument)
-    return with_source(read_toml(path), path.parent)
+    data = read_toml(path)
+    expect_kind(data, str(path), "spec")
+    return with_source(data, path.parent)
 
 
 def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
@@ -195,23 +210,27 @@ def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
     except UnknownKey:
         raise
     except Refusal as refusal:
-        raise settled(refusal, plain, _judge, _sound(plain)) from None
+        raise suggested(refusal, plain, judge, _sound(plain)) from None
 
 
-def _judge(data: dict[str, Any]) -> None:
-    resolve(convert(data, RawSpec))
+def judge(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a spec's plain data, everything settled. Raises Refusal."""
+    return to_data(resolve(convert(data, RawSpec)))
 
 
 def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the data of the template of a spec's design, or of the default one."""
-    design, known = data.get("design"), templates()
-    return read_toml(known[design if isinstance(design, str) and design in known else default_template()])
+    """Return the settled data of the template of a spec's design, or of the default one."""
+    design = data.get("design")
+    return _template_data(design if isinstance(design, str) and design in templates() else default_template())
 
 
-def _explained(first: Refusal, data: dict[str, Any], source: Source) -> Refusal:
-    """Return the refusal with the spec's other faults, each with its file and line where it stands in one."""
-    whole = with_source(dict(data), Path())
-    every = every_fault(first, whole, _judge, _sound(whole))
+@cache
+def _template_data(name: str) -> dict[str, Any]:
+    return judge(read_toml(templates()[name]))
+
+
+def _located(every: list[Refusal], data: dict[str, Any], source: Source) -> Refusal:
+    """Return the first of a spec's faults with the others, each with its file and line if it is in one."""
     path = _file(source)
     if path is not None:
         text = read_text(path)
@@ -234,7 +253,7 @@ def _same(written: object, asked: object) -> bool:
 
 def all_faults(first: Refusal, data: Mapping[str, Any], text: str) -> list[Refusal]:
     """Return every fault of a text's plain data, `first` among them, each with its line; no file is read for it."""
-    every = every_fault(first, dict(data), _judge, _sound(data))
+    every = every_fault(first, dict(data), judge, _sound(data))
     for one in every:
         one.line = line_of(text, one.field)
     return every
@@ -242,7 +261,9 @@ def all_faults(first: Refusal, data: Mapping[str, Any], text: str) -> list[Refus
 
 def _file(source: Source) -> Path | None:
     """Return the file that a text names by its path."""
-    return Path(source) if isinstance(source, str | os.PathLike) and is_path(os.fspath(source)) else None
+    known = every_template()
+    text = spelled(os.fspath(source), known) if isinstance(source, str | os.PathLike) else ""
+    return Path(text) if is_path(text) and text not in known else None
 
 
 def _parsed(raw: str) -> Any:

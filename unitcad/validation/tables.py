@@ -14,7 +14,7 @@ from msgspec import Struct
 from unitcad.catalogue import Printer
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import Spec, to_data
-from unitcad.spec.resolved import CastLayer, Moulds
+from unitcad.spec.resolved import CastLayer, MotorSize, Moulds
 
 
 class HasSpec(Protocol):
@@ -44,6 +44,8 @@ def plain(node: object, field: str = "") -> Any:
 
     Raises Refusal for a value of a class that no key takes.
     """
+    if isinstance(node, MotorSize) and node.absent:
+        return False
     if isinstance(node, Struct):
         named = {name: getattr(node, name) for name in node.__struct_fields__}
         if isinstance(node, CastLayer) and not node.cap_mm:  # an open ring, whose cap a file leaves out

@@ -18,8 +18,9 @@ from unitcad.attenuation.layered import FractionalKelvinVoigt
 from unitcad.catalogue import Material, materials
 from unitcad.catalogue import entries as kinds
 from unitcad.errors import Refusal, WrongArgument, unknown_name
-from unitcad.spec import convert, read_toml
+from unitcad.spec import convert
 from unitcad.validation.shipped_files import named_file, shipped_files
+from unitcad.validation.typed_files import load_file
 
 LEAST_LAYER, MOST_DEPTH = 0.5, 100.0
 _LAYER_NAME = "small letters a to z, digits and -, the first a letter"
@@ -77,7 +78,7 @@ def phantoms() -> dict[str, Path]:
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
     """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for an invalid one."""
     path = named_file(os.fspath(source), phantoms(), "phantom", WrongArgument)
-    return convert(read_toml(path), PhantomTable)
+    return load_file(path, "phantom", lambda data: convert(data, PhantomTable))
 
 
 THINNER_DENSITY = 0.97

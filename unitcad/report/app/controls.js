@@ -15,6 +15,35 @@
     return `#${colour.map(channel).join("")}`;
   }
 
+  // Parts with the offsets that lay the pieces of each name side by side, in rows on one level.
+  function beside(parts) {
+    const GAP = 7;
+    const boxes = new Map();
+    for (const { name, mesh, place: [x, y, turns] } of parts) {
+      const box = boxes.get(name) || { low: [Infinity, Infinity, Infinity], high: [-Infinity, -Infinity, -Infinity] };
+      const [cos, sin] = [[1, 0, -1, 0][turns % 4], [0, 1, 0, -1][turns % 4]];
+      for (let i = 0; i < mesh.position.length; i += 3) {
+        const [a, b, c] = [mesh.position[i], mesh.position[i + 1], mesh.position[i + 2]];
+        [x + cos * a - sin * b, y + sin * a + cos * b, c].forEach((value, k) => {
+          if (value < box.low[k]) box.low[k] = value;
+          if (value > box.high[k]) box.high[k] = value;
+        });
+      }
+      boxes.set(name, box);
+    }
+    const sizes = [...boxes.values()].map(({ low, high }) => [high[0] - low[0] + GAP, high[1] - low[1] + GAP]);
+    const across = Math.max(...sizes.map(([w]) => w), 1.4 * Math.sqrt(sizes.reduce((sum, [w, d]) => sum + w * d, 0)));
+    let [x, y, deep] = [0, 0, 0];
+    const offsets = new Map([...boxes].map(([name, { low }], i) => {
+      const [w, d] = sizes[i];
+      if (x + w > across && x) [x, y, deep] = [0, y - deep, 0];
+      const offset = [x - low[0], y - d - low[1], -low[2]];
+      [x, deep] = [x + w, Math.max(deep, d)];
+      return [name, offset];
+    }));
+    return parts.map((part) => ({ ...part, offset: offsets.get(part.name) }));
+  }
+
   // The scenes of a model: the unit, the whole set of moulds with the layers, and each moment of casting. A model
   // whose moulds are not there yet has the unit alone.
   function scenes(model, unit, tools) {
@@ -33,7 +62,7 @@
     });
     return {
       unit: ofUnit,
-      moulds: [{ title: "The whole set", parts: inMoulds, names: names(inMoulds) }, ...moments],
+      moulds: [{ title: "The pieces", parts: beside(inMoulds), names: names(inMoulds) }, ...moments],
     };
   }
 
@@ -123,8 +152,19 @@
       update(true);
     }
 
+    // The pieces of a set lie side by side, whole; all else opens assembled and cut open.
+    function lay(aside) {
+      if (aside === state.aside) return;
+      state.aside = aside;
+      cutOn.checked = !aside;
+      apart.input.value = aside ? 100 : 0;
+      apart.output.textContent = `${apart.input.value} %`;
+      viewer.apart(aside ? 1 : 0);
+    }
+
     function update(lookAgain) {
       const scene = current();
+      lay(state.kind === "moulds" && !state.step);
       if (state.parts !== scene.parts) {
         state.parts = scene.parts;
         viewer.show(scene.parts.map((part) => ({ ...part, shown: true })));

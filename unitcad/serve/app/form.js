@@ -11,10 +11,15 @@
   const unitOf = (path) => UNITS[keyOf(path).split(".").pop().split("_").pop()] || "";
   const STEPS = 200;
 
-  // A slider's track over a documented range of decades: fine about `middle`, the value that was there first, and coarse
-  // towards the ends. `at` gives the value at a place from 0 to 1, `place` the place of a value. Whole numbers are evenly spaced.
+  // A slider's track over a range: evenly spaced if it is whole numbers or a range of use, and over many decades fine about
+  // `middle`, the value that was there first, and coarse towards the ends. `at` gives the value at a place from 0 to 1, `place`
+  // the place of a value.
   function track(low, high, middle, whole) {
-    if (whole) return { at: (place) => Math.round(low + place * (high - low)), place: (value) => (value - low) / (high - low) };
+    if (whole || high <= 20 * low || high <= 2) {
+      const grain = whole ? 1 : 10 ** Math.floor(Math.log10((high - low) / STEPS));
+      const at = (place) => Number((Math.round((low + place * (high - low)) / grain) * grain).toPrecision(6));
+      return { at: (place) => Math.min(high, Math.max(low, at(place))), place: (value) => (value - low) / (high - low) };
+    }
     const ratio = low > 0;
     const onto = (value) => (ratio ? Math.log(value) : value);
     const [from, centre, to] = [low, Math.min(high, Math.max(low, middle)), high].map(onto);

@@ -121,8 +121,10 @@
       }
     }
 
+    // In the page's head, in sight from everywhere; what it tells stands in this section.
     const build = async () => {
       clear(said);
+      node.scrollIntoView({ block: "nearest" });
       follow(await server.send("/build", { text: text() }));
     };
     const sweep = async () => {
@@ -142,11 +144,10 @@
     const field = (label, control) => el("label", {}, `${label} `, control);
     const node = section("do", "Save, build, sweep",
       el("div", { className: "tools" }, field(`Spec file in ${folder}`, file), el("button", { type: "button", onclick: () => save(false) }, "Save spec")), said,
-      el("div", { className: "tools" }, el("button", { type: "button", className: "main", onclick: build }, "Build this")),
       el("details", {}, el("summary", {}, "Sweep this"), el("div", { className: "tools" }, field("Key", key), field("from", low), field("to", high), field("values", count),
         el("button", { type: "button", onclick: sweep }, "Run the sweep"))),
       progress, cancel, log);
-    return { node, keys, suggest };
+    return { node, keys, suggest, button: el("button", { type: "button", className: "main", onclick: build }, "Build this") };
   }
 
   Object.assign(window.unitcad, { createJobs });

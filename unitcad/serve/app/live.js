@@ -17,7 +17,7 @@
     window.unitcad.timings = [];
 
     const form = U.createForm({
-      change: (path, value, how = {}) => edit({ path, value, ...(how.toml ? { toml: true } : {}) }, how.coalesce),
+      change: (path, value, how = {}) => edit([...sizes(path), { path, value, ...(how.toml ? { toml: true } : {}) }], how.coalesce),
       remove: (...paths) => edit(paths.map((path) => ({ path, remove: true }))),
       rename: (from, to, value) => edit([{ path: from, remove: true }, { path: to, value }]),
       unread: (path, why) => form.unread(path, why),
@@ -56,7 +56,7 @@
     const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers });
     const tabs = el("details", { className: "as-text" }, el("summary", {}, "As TOML text"), el("label", { for: "text", className: "hidden" }, "The spec as TOML"), text, textFault);
     clear(page,
-      el("header", { className: "top" }, el("div", {}, title, opened), el("div", { className: "chips" }, chip, theme.button())),
+      el("header", { className: "top" }, el("div", {}, title, opened), el("div", { className: "chips" }, chip, jobs.button, theme.button())),
       kept.back && el("p", { className: "note", id: "kept" }, "Your changes from before the page was loaded again are back. ", el("button", { type: "button", onclick: () => startFrom(data.text) }, `Start from ${data.name} again`)),
       batch && batch.node,
       el("div", { className: "columns" },
@@ -79,6 +79,13 @@
 
     function numbers() {
       return state.groups.flatMap((group) => group.fields).filter((field) => ["number", "integer"].includes(field.kind) && typeof field.value === "number");
+    }
+
+    // Another motor brings its own size and drive: those of the text go.
+    function sizes(path) {
+      const own = ["motor.diameter_mm", "motor.thickness_mm", "motor.drive"];
+      const given = state.groups.flatMap((group) => group.fields).filter((field) => field.given && own.includes(field.path));
+      return path === "motor.part" ? given.map((field) => ({ path: field.path, remove: true })) : [];
     }
 
     // What is shown, each with the spec that it is of: of a refused text the last unit that could be made.
