@@ -87,7 +87,6 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
 
     from unitcad.meshcheck.geometry import crossings
     from unitcad.meshcheck.geometry.mesh import Mesh
-    from unitcad.meshcheck.geometry.sieves import arranged, stars_of
     from unitcad.meshcheck.geometry.topology import topology_of
     from unitcad.meshcheck.rules.f_file import Deadline
 
@@ -100,7 +99,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     times: dict[str, list[float]] = {"ours": [], "pymeshlab": [], "meshlib": []}
     for _ in range(rounds):
         start = time.process_time()
-        crossings.crossings_of(found, arranged(found), stars_of(found), Deadline(600).tick)
+        crossings.crossings_of(found, Deadline(600).tick)
         times["ours"].append(time.process_time() - start)
         for name in ("pymeshlab", "meshlib"):
             other.stdin.write(f"{name}\n")

@@ -207,10 +207,3 @@ def test_init_writes_no_python_and_names_the_schema_that_schema_writes(tmp_path:
     assert json.loads(Path(named).read_text()) == json.loads(run(app, ["schema"]).output)
     assert "None" not in Path(named).read_text()
     assert load("./mine.toml") == load("encapsulating", ["name=mine"])
-
-
-def test_the_shipped_sweeps_are_listed() -> None:
-    done = CliRunner().invoke(app, ["list", "sweeps"])
-    assert [line.split("\t")[0] for line in done.output.splitlines()] == ["all-materials", "published", "thickness"]
-    assert all(len(line.split("\t")[1]) > 20 for line in done.output.splitlines())
-    assert all(line.endswith(".") for line in done.output.splitlines())

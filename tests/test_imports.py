@@ -137,7 +137,6 @@ def test_the_rooms_of_check_import_one_way() -> None:
         {"file_checks"},
         {"builds"},
         {"readers", "one_mesh", "output"},
-        {"options"},
         {"rules"},
         {"findings"},
         {"geometry"},

@@ -165,12 +165,12 @@ def test_a_key_is_named_whatever_it_looks_like(key: str) -> None:
 
 
 def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are() -> None:
-    with pytest.raises(
-        Refusal, match=r"known here: diameter_mm, (\w+, ){3}\w+ and 13 more \(`unitcad schema` lists all\)"
-    ):
-        load("encapsulating", ["diametre_mm=1"])
-    with pytest.raises(Refusal, match=r"known here: wall_mm, cap_mm, material; nearest"):
+    with pytest.raises(Refusal, match=r"known here: (\w+, ){4}\w+ and 13 more \(`unitcad schema` lists all\)"):
+        load("encapsulating", ["xyz=1"])
+    with pytest.raises(Refusal, match=r"unknown key; closest: wall_mm; nearest"):
         load("encapsulating", ["layers.0.walls_mm=1"])
+    with pytest.raises(Refusal, match=r"unknown key at the top; known: layers\.0\.wall_mm$"):
+        load("encapsulating", ["wall_mm=1"])
 
 
 def test_a_custom_design_without_its_text_is_refused() -> None:
@@ -205,7 +205,7 @@ def test_embedded_layers_have_no_cap_and_encapsulating_ones_do() -> None:
 def test_toml_that_does_not_parse_names_line_and_column(tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text('name = "x"\ndesign = \n')
-    with pytest.raises(UnitcadError, match=r"line 2, column"):
+    with pytest.raises(UnitcadError, match=r"bad.toml:2:10: not TOML"):
         load(str(bad))
     bad.write_bytes(b"\xff\xfe")
     with pytest.raises(UnitcadError, match="UTF-8"):
@@ -282,4 +282,4 @@ def test_a_name_has_at_most_120_characters() -> None:
 def test_a_word_without_quotes_is_told_of_them(line: str, advice: str) -> None:
     with pytest.raises(UnitcadError) as refused:
         parse_toml(f"diameter_mm = 14.0\n{line}\n", "mine.toml")
-    assert str(refused.value).partition(")")[2] == advice
+    assert str(refused.value).partition("Invalid value")[2] == advice

@@ -167,7 +167,8 @@ def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusa
     """Return a refusal, of class `kind`, of a name that is not in `known`, with the closest names that are."""
 
     known = sorted(known)
-    close = get_close_matches(value, known, n=3, cutoff=0.6)
+    folded = {name.lower(): name for name in known}
+    close = [folded[name] for name in get_close_matches(value.lower(), folded, n=3, cutoff=0.6)]
     names = f"closest: {', '.join(close)}" if close else f"known: {some(known)}"
     return kind(field, value, f"unknown name; {names}", close[0] if close else None)
 
@@ -190,7 +191,12 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
     nearest = f"{table}.{best}" if table and best else best
     alike = sorted(known, key=lambda name: -SequenceMatcher(None, key, name).ratio())
     rest = f" ({lists} lists all)" if lists and len(known) > _MOST_KEYS + 1 else ""
-    return UnknownKey(field, value, f"unknown key; known here: {some(alike, _MOST_KEYS)}{rest}", nearest)
+    names = (
+        f"closest: {', '.join(alike[: min(len(close), 3)])}"
+        if close
+        else f"known here: {some(alike, _MOST_KEYS)}{rest}"
+    )
+    return UnknownKey(field, value, f"unknown key; {names}", nearest)
 
 
 def misfit(error: Exception) -> str:

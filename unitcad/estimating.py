@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from msgspec.structs import replace
@@ -131,7 +131,22 @@ def drawn_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
         amplitude=spec.estimate.amplitude_um * 1e-6,
         drive=spec.motor.drive,
         moduli=spec.estimate.moduli,
+        unread=tuple(_unread(spec)),
     )
+
+
+def _unread(spec: Spec) -> Iterator[str]:
+    """Yield the features of a spec that no model reads and no measured unit had."""
+    if spec.skin_mm:
+        yield "film on the skin side"
+    if spec.motor.fill:
+        yield "silicone round the motor"
+    if spec.motor.lip_mm:
+        yield "lip"
+    if spec.moulds.draft_deg:
+        yield "draft"
+    if spec.fpcb is None:
+        yield "wires in place of a circuit" if spec.wires else "no circuit"
 
 
 def _geometry(spec: Spec, motor_mass: Quantity) -> Geometry:

@@ -83,8 +83,8 @@ def _fem(result: Result) -> str:
 
 
 def _skin(result: Result) -> str:
-    inside = _column(_table(result, "Published measurements"), "in range")
-    return f"{inside.count('yes')} of {len(inside)} published figures lie in the range of the forearm template."
+    inside = _column(_table(result, "Published measurements"), "ranges overlap")
+    return f"{inside.count('yes')} of {len(inside)} published figures overlap the range of the forearm template."
 
 
 def _design(result: Result) -> str:

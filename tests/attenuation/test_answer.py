@@ -52,8 +52,8 @@ def test_the_second_line_is_the_papers_model_with_its_error_and_the_baselines() 
         assert found["analytic"][name]["value"] == level
         assert f"{100 * level:.2g} %" in found["lines"][1]
     published, baseline = (scores[name].left_out.geometric_mean for name in ("published", "baseline"))
-    assert f"left out: x {published:.2g}; of four class means x {baseline:.2g}." in found["lines"][1]
-    assert "normal motion of the skin" in found["lines"][1]
+    assert f"left out: x {published:.2f}; of four class means x {baseline:.2f}." in found["lines"][1]
+    assert "its path of u_z through the walls" in found["lines"][1]
 
 
 def test_the_answer_does_not_depend_on_the_models_that_are_asked_for() -> None:
@@ -111,7 +111,7 @@ def test_a_modulus_that_is_a_range_gives_a_range_alone() -> None:
 def test_a_range_above_every_measured_level_says_so() -> None:
     found = lead("embedded", "layers.0.material=dragon-skin-30", "layers.1.material=ecoflex-00-10")
     assert found["p90"] > 0.671
-    assert "(no measured level is above 67 %)" in found["headline"]
+    assert "(above the highest level that the paper prints as a number, 67 %)" in found["headline"]
     assert "no measured level" not in lead("embedded")["headline"]
 
 
@@ -165,3 +165,25 @@ def test_a_build_ends_with_the_two_lines(tmp_path: Any) -> None:
     for line in found["lines"]:
         assert any(line in one for one in shown.splitlines())
     assert found["lines"] == lead("embedded")["lines"]
+
+
+def test_a_unit_too_far_from_the_measured_ones_gets_no_level() -> None:
+    far = lead("embedded", "diameter_mm=300")
+    assert far["too_far"]
+    assert far["level"] is None
+    assert far["headline"].startswith("No level: this unit is too far from the measured ones")
+    assert lead("three-layer")["level"] is not None
+
+
+def test_what_the_paper_prints_of_a_unit_without_a_level_is_in_the_first_line() -> None:
+    """187.7 % of one of the controls, 39.5 to 60.2 %."""
+    stiff = lead("embedded", "layers.0.material=dragon-skin-30", "layers.1.material=dragon-skin-10-medium")
+    assert "187.7 % of a control that it does not name for this unit: 74 to 110 %." in stiff["lines"][0]
+    soft = lead("embedded", "layers.0.material=dragon-skin-30", "layers.1.material=ecoflex-00-10")
+    assert "The paper states of this unit: amplifies slightly more than D30/D10." in soft["lines"][0]
+
+
+def test_the_nearest_unit_is_of_the_same_class() -> None:
+    """Stiff inside is not compared with soft inside, however close the moduli are."""
+    stiff = lead("embedded", "layers.0.material=dragon-skin-30", "layers.1.material=dragon-skin-10-medium")
+    assert stiff["nearest"]["unit"] == "embedded D10/E10"

@@ -13,7 +13,7 @@ from scipy import integrate, stats
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.edge.models import left_out_logs, stored
 from unitcad.attenuation.edge.nearest import LENGTHS, coordinates_of, nearest
-from unitcad.attenuation.edge.ranges import LENGTH_SLOPE, OF_THE_KIND, Predictive, lead_of, predictive_of
+from unitcad.attenuation.edge.ranges import OF_THE_KIND, Predictive, lead_of, predictive_of
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.estimating import estimate_input
 from unitcad.validation import load
@@ -68,20 +68,22 @@ def test_neighbours_of_a_measured_unit_are_drawn_towards_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "far"),
+    ("changes", "far", "slope"),
     [
-        (("diameter_mm=300",), math.log(300 / 14)),
-        (("diameter_mm=20",), math.log(20 / 14)),
-        (("estimate.frequency_hz=300",), math.log(300 / 150)),
-        (("estimate.frequency_hz=110",), 0.0),
-        (("motor.drive=axial",), 0.0),
+        (("diameter_mm=300",), math.log(300 / 14), 1.2),
+        (("diameter_mm=20",), math.log(20 / 14), 1.2),
+        (("estimate.frequency_hz=300",), math.log(300 / 150), 1.0),
+        (("estimate.frequency_hz=110",), 0.0, 0.0),
+        (("motor.drive=axial",), 0.0, 0.0),
     ],
 )
-def test_a_range_widens_with_the_distance_from_what_was_measured(changes: tuple[str, ...], far: float) -> None:
+def test_a_range_widens_with_the_distance_from_what_was_measured(
+    changes: tuple[str, ...], far: float, slope: float
+) -> None:
     base, found = predictive_of([unit()]), predictive_of([unit("embedded", *changes)])
     kind = OF_THE_KIND * math.exp(-(far**2) / 2)
     sigma2 = base.below[0] ** 2 / 0.75
-    assert found.below[0] ** 2 == pytest.approx(sigma2 * (1 - kind**2) + (LENGTH_SLOPE * far) ** 2, rel=1e-4)
+    assert found.below[0] ** 2 == pytest.approx(sigma2 * (1 - kind**2) + (slope * far) ** 2, rel=1e-4)
 
 
 def test_moduli_outside_the_measured_ones_widen_it() -> None:
@@ -114,7 +116,7 @@ def test_the_measured_units_lie_at_the_origin_of_the_lengths() -> None:
         assert np.abs(coordinates_of(unit(design))[:LENGTHS]).max() < 1e-4
     single = unit("single-embedded")
     assert np.abs(coordinates_of(single)[:LENGTHS]).max() < 1e-4
-    assert nearest(single) == {"unit": "single D10", "level": 0.395, "differs_in": []}
+    assert nearest(single) == {"unit": "single D10", "level": 0.395, "differs_in": [], "not_read": []}
 
 
 @pytest.mark.parametrize(
@@ -131,7 +133,7 @@ def test_the_nearest_measured_unit_and_what_differs(
     template: str, changes: tuple[str, ...], unit_name: str, differs: list[str]
 ) -> None:
     found = nearest(unit(template, *changes))
-    assert (found["unit"], found["differs_in"]) == (unit_name, differs)
+    assert (found["unit"], [*found["differs_in"], *found["not_read"]]) == (unit_name, differs)
 
 
 def test_a_silicone_without_a_modulus_has_no_range_and_leaves_the_others_alone() -> None:

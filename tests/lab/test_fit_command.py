@@ -198,7 +198,7 @@ def test_a_lab_where_thickness_matters_overturns_the_rule(tmp_path: Path) -> Non
         assert judged["published"].mean() < judged[other].mean()
         assert stats.wilcoxon(judged["published"], judged[other]).pvalue < 0.05
     assert result.chosen.order[0] == "published"
-    assert "published leads." in contents(result)["fit.md"]
+    assert "published leads: x " in contents(result)["fit.md"]
     (tmp_path / "lab-fit.toml").write_text(contents(result)["lab-fit.toml"])
     lossy = {"materials.lossy": {"like": "ecoflex-00-10", "youngs_modulus_kpa": 15, "loss_factor": 1.0}}
     common = {
@@ -233,3 +233,36 @@ def test_a_lab_s_own_units_draw_the_range_of_their_neighbours(tmp_path: Path) ->
     assert at.centre[0] == pytest.approx(plain + 0.5 * residual, abs=1e-3)
     assert abs(far.centre[0] - plain) < abs(near.centre[0] - plain) < abs(at.centre[0] - plain)
     assert at.below[0] < near.below[0] < far.below[0]
+
+
+def one_kind(folder: Path) -> str:
+    """Write a lab of eight made-up units of one design and one pair of silicones, which differ in the walls."""
+    units = []
+    for i, wall in enumerate(np.linspace(1.0, 4.0, 8)):
+        changes = {"layers.0.wall_mm": wall, "layers.1.wall_mm": wall, "diameter_mm": 9.0 + 4 * wall}
+        units.append({"name": f"u{i}", "spec": "embedded", "set": changes, "level": {"value": 0.2 / wall}})
+    return _written(folder, unit=units, with_paper=False)
+
+
+def test_a_lab_of_one_kind_of_unit_gives_a_fit_that_is_taken(tmp_path: Path) -> None:
+    """No unit tells s from q: that is said, and the file of the fit is still one."""
+    result = fit_lab(load_fit_lab(one_kind(tmp_path)))
+    assert "rule: the units do not determine q" in contents(result)["fit.md"]
+    (tmp_path / "lab-fit.toml").write_text(contents(result)["lab-fit.toml"])
+    answer = estimate_spec(load("embedded", {"estimate.fit": str(tmp_path / "lab-fit.toml"), "diameter_mm": 13.0}))[
+        "answer"
+    ]
+    assert answer["nearest"]["unit"] == "u1"
+
+
+def test_with_a_fit_the_lab_s_own_measurement_leads(tmp_path: Path) -> None:
+    """The paper's level of this unit is in the details only, and the highest level is the lab's."""
+    (tmp_path / "lab-fit.toml").write_text(contents(fit_lab(load_fit_lab(one_kind(tmp_path))))["lab-fit.toml"])
+    fit = {"estimate.fit": str(tmp_path / "lab-fit.toml")}
+    found = estimate_spec(load("embedded", fit))["answer"]
+    assert found["measured"] == []
+    assert found["level"] == found["p50"] != 0.156
+    assert found["highest"] == pytest.approx(0.2)
+    assert "The paper measured 16 % for this unit, in its own lab." in found["details"]
+    own = estimate_spec(load("embedded", {**fit, "layers.0.wall_mm": 1, "layers.1.wall_mm": 1, "diameter_mm": 13}))
+    assert own["answer"]["lines"][0].startswith("20 % of the motor's amplitude at the edge (measured on u0).")

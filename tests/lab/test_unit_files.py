@@ -80,7 +80,7 @@ def test_measured_walls_stand_in_for_the_spec_s(tmp_path: Path) -> None:
     ("unit", "change", "field", "part"),
     [
         ({}, None, "unit.0.cavity", "is required: u.cast.json has the cavities 1, 2, 3"),
-        ({"cavity": 9}, None, "unit.0.cavity", "has no such unit; it has 1, 2, 3; nearest accepted: 3"),
+        ({"cavity": 9}, None, "unit.0.cavity", "has no such unit; it has 1, 2, 3; nearest accepted: 2"),
         ({"cavity": 3}, None, "unit.0.cavity", "not usable"),
         ({"cavity": 2, "cast": "gone.cast.json"}, None, "unit.0.cast", "no such file"),
         ({"cavity": 2, "spec": "encapsulating"}, None, "unit.0.cast", "excludes spec"),

@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from tests.pages.page_examples import ROOT, run_console
+from tests.whole.page_examples import ROOT, run_console
 
 PAGE = ROOT / "docs" / "tutorials" / "lab-data-to-estimate.md"
 

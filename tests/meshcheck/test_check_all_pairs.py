@@ -8,9 +8,8 @@ from exact_pairs import counts
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.geometry import boxes
-from unitcad.meshcheck.geometry import crossings, sieves
+from unitcad.meshcheck.geometry import crossings
 from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
-from unitcad.meshcheck.geometry.sieves import arranged, stars_of
 from unitcad.meshcheck.geometry.topology import topology_of
 from unitcad.meshcheck.rules.f_file import Deadline
 
@@ -68,15 +67,9 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
         return 0, 0, 0
     crossing, overlaps, touching = counts(vertices, faces)
     shells = {tuple(sorted((int(labels[i]), int(labels[j])))) for i, j in touching if labels[i] != labels[j]}
-    for least in (crossings.LEAST_SHELLS, 1):  # by a tree over all faces, and shell by shell
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(crossings, "LEAST_SHELLS", least)
-            patch.setattr(sieves, "_MOST_FACES", 100)
-            patch.setattr(sieves, "_MOST_PAIRS", 1000)
-            found = crossings.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick)
-        assert (found.meeting is not None) == (least == 1)
-        _agree(found, kind, crossing, overlaps)
-        assert {tuple(pair) for pair in found.touching().tolist()} == shells
+    found = crossings.crossings_of(top, Deadline(60).tick)
+    _agree(found, kind, crossing, overlaps)
+    assert {tuple(pair) for pair in found.touching().tolist()} == shells
     return crossing, len(crossings.joined(found.covering)), len(shells)
 
 

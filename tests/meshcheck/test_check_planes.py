@@ -5,22 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from unitcad.geometry.boxes import frame_of, ranks_of, slabs_of
-from unitcad.meshcheck.geometry import crossings
-from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors
+from unitcad.meshcheck.geometry.crossings import _flush
+from unitcad.meshcheck.geometry.mesh import area_vectors
 from unitcad.meshcheck.geometry.predicates import meet
-from unitcad.meshcheck.geometry.sieves import (
-    MOST_RANK,
-    Contacts,
-    Planes,
-    arranged,
-    face_boxes,
-    planes_of,
-    ranked_boxes,
-    stars_of,
-)
-from unitcad.meshcheck.geometry.topology import topology_of
-from unitcad.meshcheck.rules.f_file import Deadline
+from unitcad.meshcheck.geometry.sieves import Contacts, Planes, planes_of
 
 N = 4000
 
@@ -95,106 +83,35 @@ def test_faces_that_share_corners_have_no_more_in_common(kind: str, shared: int)
         assert ((exact.side_b != 0).sum(axis=1) <= 1).all()
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_slabs_keep_faces_that_touch(seed: int) -> None:
-    """Pairs that share a corner, in a frame whose axes differ much in length."""
-    rng = np.random.default_rng(seed)
-    points = rng.normal(size=(300, 3)) * [1, 10.0**-seed, 1000]
-    faces = rng.integers(0, len(points), (2000, 3)).astype(np.int32)
-    i, j = np.triu_indices(len(faces), 1)
-    touch = (faces[i][:, :, None] == faces[j][:, None, :]).any(axis=(1, 2))
-    slabs = slabs_of(frame_of(points).steps(points), *np.ascontiguousarray(faces.T))
-    kept = slabs.meeting(i[touch], j[touch])
-    assert len(kept[0]) == touch.sum()
-    assert len(slabs.meeting(i[~touch], j[~touch])[0]) < (~touch).sum()
-
-
-def test_boxes_that_touch_hold_faces_that_do_no_more() -> None:
+def test_faces_on_both_sides_of_a_level_plane_do_no_more_than_touch() -> None:
     """On a lattice, where most boxes have sides in common."""
     a, b = _pairs("lattice", np.random.default_rng(7))
-    points = np.ascontiguousarray(np.concatenate([a, b]).reshape(-1, 3).T)
-    faces = np.ascontiguousarray(np.arange(6 * N).reshape(-1, 3).T)
-    i, j = np.arange(N), np.arange(N, 2 * N)
+    found = _flush(a.transpose(1, 2, 0), b.transpose(1, 2, 0))
     solid = [(area_vectors(c.reshape(-1, 3), np.arange(3 * N).reshape(-1, 3)) != 0).any(axis=1) for c in (a, b)]
-    exact = meet(a, b)
-    apart = ((a.min(axis=1) > b.max(axis=1)) | (b.min(axis=1) > a.max(axis=1))).any(axis=1)
-    touch = np.zeros(N, bool)  # in a plane that does not hold a side of one and all of the other
-    for one, other in ((a, b), (b, a)):
-        plane = one.max(axis=1)
-        held = (one == plane[:, None]).sum(axis=1) + (other == plane[:, None]).sum(axis=1)
-        touch |= ((plane == other.min(axis=1)) & (held < 5)).any(axis=1)
-    ranks = ranks_of(frame_of(points.T).steps(points.T), points.T, MOST_RANK)
-    assert ranks is not None
-    # Single precision, negative zeros among it; double; all vertices, and only those of some faces; by ranks.
-    signed = np.where((points == 0) & (np.arange(6 * N) % 2 == 0), -0.0, points)
-    more = np.concatenate([points * 0.1, np.zeros((3, 18 * N))], axis=1)
-    for boxes in (
-        *(face_boxes(columns, faces) for columns in (points, points - 3, signed, points * 0.1, more)),
-        ranked_boxes(ranks, faces),
-    ):
-        found = boxes.touching(i, j)
-        assert (found == (touch | apart)).all()
-        rows = found & solid[0] & solid[1]
-        assert (rows & exact.touches).sum() > 20
-        assert not (rows & (exact.crosses | exact.overlaps)).any()
-
-
-def test_ranks_tell_all_coordinates_apart_or_are_none() -> None:
-    rng = np.random.default_rng(2)
-    points = rng.integers(0, 200, (5000, 3)) * [0.1, 3.0, 1000.0] - 7
-    steps = frame_of(points).steps(points)
-    ranks = ranks_of(steps, points, 199)
-    assert ranks is not None
-    for axis in range(3):
-        assert (np.unique(points[:, axis])[ranks[axis]] == points[:, axis]).all()
-    assert ranks_of(steps, points, 198) is None
-    points[5, 1] += 1e-9
-    assert ranks_of(frame_of(points).steps(points), points, MOST_RANK) is None
-    few = points[:50]  # are sorted, however near they are
-    ranks = ranks_of(frame_of(few).steps(few), few, MOST_RANK)
-    assert ranks is not None
-    for axis in range(3):
-        assert (np.unique(few[:, axis])[ranks[axis]] == few[:, axis]).all()
+    exact, rows = meet(a, b), found & solid[0] & solid[1]
+    assert (rows & exact.touches).sum() > 20
+    assert not (rows & (exact.crosses | exact.overlaps)).any()
 
 
 @pytest.mark.parametrize("every", [False, True])
 @pytest.mark.parametrize("shells", [3, 40, 1_000_000])
 def test_contacts_keep_the_first_pair_of_two_shells(shells: int, every: bool) -> None:
-    """Also of shells that share a slot, in one block and over several."""
+    """In one block and over several."""
     rng = np.random.default_rng(shells)
+    shell = rng.integers(0, shells, 5000)
     contacts = Contacts(shells, every)
     expected: dict[int, list[tuple[int, int]]] = {}
-    for block in range(5):
-        one, other = (
-            rng.integers(0, shells, (2, 3000)) // 1000 * 1000 if shells > 40 else rng.integers(0, shells, (2, 90))
-        )
-        keys = contacts.keys(one, other)
-        pairs = np.stack([np.arange(len(keys)) + block * 5000, rng.integers(0, 99, len(keys))], axis=1)
-        for key, pair in zip(keys.tolist(), pairs.tolist(), strict=True):
-            expected.setdefault(key, []).append(tuple(pair))
-        open_ = contacts.open(keys)
-        contacts.add(keys[open_], pairs[open_])
-    for _ in range(2):
-        keys, pairs = contacts.pairs()
-        wanted = [(key, pair) for key in sorted(expected) for pair in expected[key][: None if every else 1]]
-        assert list(zip(keys.tolist(), map(tuple, pairs.tolist()), strict=True)) == wanted
+    for _ in range(5):
+        i, j = rng.integers(0, 5000, (2, 3000))
+        known = set(expected) if not every else set()
+        apart = np.flatnonzero(shell[i] != shell[j])
+        keys = contacts.keys(shell[i], shell[j])
+        assert contacts.unknown(shell, i, j).tolist() == [k for k in apart.tolist() if keys[k] not in known]
+        contacts.add(shell, i, j)
+        for k in apart.tolist():
+            expected.setdefault(int(keys[k]), []).append((int(i[k]), int(j[k])))
+    keys, pairs = contacts.pairs()
+    wanted = [(key, pair) for key in sorted(expected) for pair in expected[key][: None if every else 1]]
+    assert list(zip(keys.tolist(), map(tuple, pairs.tolist()), strict=True)) == wanted
     low, high = contacts.shells_of(keys).T
     assert (contacts.keys(high, low) == keys).all()
-
-
-def test_few_pairs_and_many_are_sieved_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The sieve of the faces in some pairs says what that of all faces does."""
-    rng = np.random.default_rng(4)
-    points = np.concatenate([rng.normal(size=(900, 3)), rng.integers(-2, 3, (900, 3)) + 0.1])
-    faces = np.arange(1800, dtype=np.int32).reshape(-1, 3)
-    found = []
-    for sparse in (0, 10**9):
-        monkeypatch.setattr(crossings, "_SPARSE", sparse)
-        top = topology_of(Mesh(points, faces), Deadline(60).tick)
-        meeting = crossings.crossings_of(top, arranged(top), stars_of(top), Deadline(60).tick, every=True)
-        assert meeting.faces is not None
-        assert ("sieve" in vars(meeting.faces)) == (sparse > 0)
-        found.append((joined := crossings.joined)(meeting.crossing).tolist() + joined(meeting.covering).tolist())
-        found[-1] += meeting.contact.pairs()[1].tolist()
-    assert sum(map(len, found[0])) > 100
-    assert found[0] == found[1]

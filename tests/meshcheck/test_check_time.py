@@ -11,8 +11,8 @@ from unitcad.geometry import boxes
 from unitcad.meshcheck import check_bytes
 from unitcad.meshcheck.findings import Facts, FileReport
 from unitcad.meshcheck.geometry import crossings
-from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.rules.f_file import Deadline, OutOfTime, Unreadable
+from unitcad.meshcheck.rules.inspection import Options
 
 
 def _open_and_crossing() -> tuple[np.ndarray, np.ndarray]:

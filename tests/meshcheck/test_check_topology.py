@@ -13,8 +13,7 @@ from unitcad.geometry.components import components
 from unitcad.meshcheck import check_mesh
 from unitcad.meshcheck.geometry import topology
 from unitcad.meshcheck.geometry.mesh import weld_exact
-from unitcad.meshcheck.geometry.rays import winding_number
-from unitcad.meshcheck.geometry.topology import _order_within
+from unitcad.meshcheck.geometry.rays import winding_numbers
 
 
 def _random_faces(seed: int, n_vertices: int, n_faces: int) -> np.ndarray:
@@ -95,13 +94,11 @@ def test_weld_survives_a_hash_collision(monkeypatch: pytest.MonkeyPatch) -> None
     assert (vertices[faces] == corners).all()
 
 
-def test_pinch_by_both_ways() -> None:
+def test_two_cubes_at_a_vertex_are_pinched_there() -> None:
     faces = np.concatenate([CUBE_FACES, np.where(CUBE_FACES == 0, 7, CUBE_FACES + 8)]).astype(np.int32)
     edges = topology.edges_of(faces, 16)
     assert edges.closed
-    across = topology.opposite(edges, 3 * len(faces))
-    assert topology.pinched_closed(faces, across, 16).tolist() == [7]
-    assert topology.pinched_open(faces, edges, 16).tolist() == [7]
+    assert topology.pinched_vertices(faces, edges, 16).tolist() == [7]
     assert topology.shells_of(faces, edges, topology.turns_of(np.zeros((16, 3)), faces, edges)).max() == 1
 
 
@@ -138,7 +135,7 @@ def test_pinches_of_open_meshes_as_a_search_finds_them(seed: int) -> None:
     faces[flipped] = faces[flipped, ::-1]
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     faces = faces[whole].astype(np.int32)
-    found = topology.pinched_open(faces, topology.edges_of(faces, 40), 40)
+    found = topology.pinched_vertices(faces, topology.edges_of(faces, 40), 40)
     assert found.tolist() == _pinched_by_search(faces.tolist())
 
 
@@ -146,9 +143,10 @@ def test_pinches_of_open_meshes_as_a_search_finds_them(seed: int) -> None:
     ("point", "expected"), [((5, 5, 5), 1), ((0.1, 9.9, 5), 1), ((-1, 5, 5), 0), ((5, 5, 10.5), 0)]
 )
 def test_winding_number(point: tuple[float, float, float], expected: int) -> None:
-    corners = CUBE_CORNERS * 10
-    assert winding_number(corners, CUBE_FACES, np.array(point)) == expected
-    assert winding_number(corners, CUBE_FACES[:, ::-1], np.array(point)) == -expected
+    for faces, sign in ((CUBE_FACES, 1), (CUBE_FACES[:, ::-1], -1)):
+        span = np.array([0]), np.array([len(faces)])
+        found = winding_numbers(CUBE_CORNERS * 10, faces, *span, np.array([point]), lambda: None)
+        assert found.tolist() == [sign * expected]
 
 
 def test_counts_of_a_cube_with_a_missing_face() -> None:
@@ -284,12 +282,3 @@ def test_closed_shells_side_by_side_share_no_duplicates(parts: list[np.ndarray],
     report = judge(stl(np.concatenate(parts)))
     assert sum(found.count for found in report.findings if found.code == "T009") == duplicates
     assert report.has("G003") or duplicates
-
-
-def test_values_are_put_in_order_within_groups_as_one_sort_of_all_would() -> None:
-    """Groups of few and of many, with equal values, which keep their order."""
-    rng = np.random.default_rng(3)
-    size = rng.choice([4, 6, 8, 10, 30], 400)
-    starts, group = np.cumsum(size) - size, np.repeat(np.arange(400), size)
-    values = rng.integers(0, 5, len(group)).astype(float)
-    assert (_order_within(size, starts, values) == np.lexsort((values, group))).all()

@@ -205,7 +205,7 @@ def test_a_campaign_that_is_refused_says_why_and_is_measured_again(running, tmp_
         page.set_default_timeout(120_000)
         for broken, why in (
             (text.replace("motor-off.wav", "gone.wav"), "'gone.wav': no such file"),
-            (text.replace("[sensor]", "[[sensor]"), f"{file}: not TOML"),
+            (text.replace("[sensor]", "[[sensor]"), "not TOML"),
         ):
             file.write_text(broken, "utf-8")
             page.goto(own.url)

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 from batching import ring_sweep, unitcad
+from typer.testing import CliRunner
 
+from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline.plan import build_key
 from unitcad.pipeline.subjects import subject
@@ -245,3 +247,10 @@ def test_a_batch_s_folder_is_no_device() -> None:
     data = {"base": "encapsulating", "name": "Con", "sweep": {"diameter_mm": [14.0, 15.0]}}
     assert from_file(data, Path(), "x").slug == "con-batch"
     assert from_file({**data, "name": "Cone"}, Path(), "x").slug == "cone"
+
+
+def test_the_shipped_sweeps_are_listed() -> None:
+    done = CliRunner().invoke(app, ["list", "sweeps"])
+    assert [line.split("\t")[0] for line in done.output.splitlines()] == ["all-materials", "published", "thickness"]
+    assert all(len(line.split("\t")[1]) > 20 for line in done.output.splitlines())
+    assert all(line.endswith(".") for line in done.output.splitlines())

@@ -14,8 +14,8 @@ from unitcad.catalogue import Printer, choose, printers
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.meshcheck.file_checks import check_files, expand
 from unitcad.meshcheck.findings import FileReport, Finding
-from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.rules.f_file import Limits
+from unitcad.meshcheck.rules.inspection import Options
 from unitcad.meshcheck.rules.registry import check_prefixes
 from unitcad.meshcheck.rules.s_scale import unit_named
 

@@ -39,8 +39,8 @@ ASSUMPTIONS = [
 ]
 FAR = (
     "Beyond 2 cm the curve on the skin falls faster than was measured on arms: on hand and forearm vibration keeps "
-    "0.79 (0.70 to 0.88) of its amplitude every 20 mm at 40 to 60 Hz and 0.80 (0.68 to 0.92) at 75 to 100 Hz. Under a "
-    "flat motor no body within the template's sources does the second."
+    "0.79 (0.70 to 0.88) of its amplitude every 20 mm at 40 to 60 Hz and 0.80 (0.68 to 0.92) at 75 to 100 Hz. Both "
+    "bands fit one of 400 random bodies within the template's sources under a flat motor, and eight under an axial one."
 )
 _DIRECTIONS: dict[Drive, Direction] = {"flat": "tangential", "axial": "normal"}
 _COMPONENTS = {"flat": ("u_r", "u_theta", "u_z"), "axial": ("u_r", "u_z")}

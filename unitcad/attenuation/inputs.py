@@ -120,7 +120,8 @@ class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
     """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known).
 
     `passes`: how often the wave from motor to skin passes the border between the layers; `drive`: how the motor's force
-    acts, turning in the skin's plane (flat) or along the motor's axis (axial); `moduli`: which ones the layers have.
+    acts, turning in the skin's plane (flat) or along the motor's axis (axial); `moduli`: which ones the layers have;
+    `unread`: features of the unit that no model reads and no measured unit had.
     """
 
     name: str
@@ -135,6 +136,7 @@ class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
     amplitude: float | None = None
     drive: Drive = "flat"
     moduli: Literal["small-strain", "quasi-static"] = "small-strain"
+    unread: tuple[str, ...] = ()
 
     @property
     def motor_diameter(self) -> float:

@@ -115,7 +115,7 @@ def _in_style(error: Any, command: str) -> UnitcadError:
         limit = f"must be at least {low:g}" if high is None else f"must be from {low:g} to {high:g}"
         return Refusal(name, value, limit, float(low if high is None or value < low else high))
     if wrong := re.fullmatch(r"'(.*)' is not a valid (int|float).*", text):
-        return Refusal(
-            name, wrong[1], f"takes a {'whole ' * (wrong[2] == 'int')}number, such as {parameter.default or 1}"
-        )
+        unit = f" ({parameter.metavar})" if parameter.metavar not in (None, "N") else ""
+        whole = "whole " if wrong[2] == "int" else ""
+        return Refusal(name, wrong[1], f"takes a {whole}number{unit}, such as {parameter.default or 1}")
     return Refusal(name.strip("{}"), None, f"{text}; {more}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated
 
 import typer
@@ -124,7 +125,10 @@ def frequencies(text: str) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) not in (1, 3) or not all(math.isfinite(n) and n > 0 for n in numbers):
-        raise Refusal("--frequency", text, "must be HZ or FROM:TO:STEP, numbers above 0", "100:150:10")
+        meant = [float(number) for number in re.findall(r"\d+(?:\.\d+)?", text)][:3]
+        meant += [10.0] * (len(meant) == 2)
+        nearest = ":".join(f"{n:g}" for n in meant) if meant and min(meant) > 0 else "100:150:10"
+        raise Refusal("--frequency", text, "must be HZ or FROM:TO:STEP, numbers above 0", nearest)
     lowest, highest = FREQUENCIES_HZ
     clipped = [min(max(n, lowest), highest) for n in numbers[:2]]
     if clipped != numbers[:2]:

@@ -11,7 +11,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,7 +20,7 @@ from manifold3d import CrossSection, Manifold
 from unitcad.errors import missing_extra
 from unitcad.export import svg
 from unitcad.export.chart import number
-from unitcad.export.svg import Measure, Region
+from unitcad.export.svg import Measure, Region, Side
 from unitcad.kernels.mesh import arrays
 
 MM = 72 / 25.4
@@ -36,7 +36,7 @@ TAPER = 0.15
 """Slope of a face that still counts as upright."""
 SAME_MM = 0.02
 """Lengths this close are one: a caliper shows 0.01 mm."""
-Loop = Sequence[svg.Point] | np.ndarray
+Loop = Sequence[svg.Point]
 _INK = {"extension": 0.5, "leader": 0.3, "axis": 0.4}
 _WIDTH = {"extension": 0.25, "leader": 0.3, "axis": 0.3, "dimension": 0.35, "skin": 0.6}
 
@@ -221,8 +221,8 @@ def across(
 def windows(loops: Sequence[Loop], width_at: Callable[[float, float], float]) -> list[Measure]:
     """Return the openings in the outer faces of a section; `width_at(x, z)` is an opening's width."""
     found = list[Measure]()
-    ends: list[tuple[Literal["left", "right"], Callable[..., float]]] = [("left", min), ("right", max)]
-    for side, end in ends:
+    sides: tuple[tuple[Side, Callable[..., float]], ...] = (("left", min), ("right", max))
+    for side, end in sides:
         edge = end(x for loop in loops for x, _ in loop)
         walls = sorted(sorted((a[1], b[1])) for a, b in _sides(loops) if abs(a[0] - edge) + abs(b[0] - edge) < SAME_MM)
         for (_, low), (high, _) in pairwise(walls):

@@ -19,6 +19,7 @@ from unitcad.shape.body import Body
 from unitcad.shape.profile import GRID_PER_MM
 from unitcad.text import xml_attribute, xml_text
 
+Side = Literal["below", "left", "right"]
 Point = tuple[float, float]
 TEXT_PX = 12.0
 CHARACTER_PX = 0.62 * TEXT_PX
@@ -63,7 +64,7 @@ class Measure:
     text: str
     start: float
     end: float
-    side: Literal["below", "left", "right"]
+    side: Side
     row: int
     reach: float
 

@@ -35,12 +35,10 @@ MOST_PAIRS = 10_000_000
 """Pairs of boxes that `box_pairs` returns."""
 
 _FAN = 4
-_PART = 512  # pairs of nodes in a part at least
 _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at
 _WIDE = 1 << 20  # pairs of nodes whose children are held together
 _STEP_BITS = 13
 _STEP = 1 << _STEP_BITS  # pairs of nodes looked at together
-_FEW = 4096  # points, which are sorted in less time than all steps are gone through
 _TOP = 65_534  # largest step; 65,535 is an empty box's low corner
 _FACES = 1 << 14  # faces whose corners stay in the processor's cache
 _BITS = 14  # of each axis in a Morton key
@@ -68,25 +66,6 @@ def frame_of(points: Floats) -> Frame:
     """Return a frame round (n, 3) points."""
     low, high = extent(points)
     return Frame(low, (_TOP - 1) / np.maximum(high - low, 1e-300))
-
-
-def ranks_of(steps: list[Ints], points: Floats, most: int) -> list[Ints] | None:
-    """Return the ranks of the coordinates of (n, 3) points along each axis, uint16 from 0 to `most`.
-
-    None if there are more, or if two coordinates of many points share a step.
-    """
-    ranks = []
-    for axis, step in enumerate(steps):
-        if len(points) <= min(_FEW, most):
-            ranks.append(np.unique(points[:, axis], return_inverse=True)[1].reshape(-1).astype(np.uint16))
-            continue
-        column, holder, there = points[:, axis], np.zeros(_TOP + 1), np.zeros(_TOP + 1, bool)
-        holder[step] = column
-        there[step] = True
-        if np.count_nonzero(there) > most + 1 or not np.array_equal(holder.take(step), column):
-            return None
-        ranks.append((np.cumsum(there) - 1).astype(np.uint16).take(step))
-    return ranks
 
 
 def morton_order(steps: list[Ints], corner: Ints | None = None) -> Ints:
@@ -184,20 +163,8 @@ def meeting_pairs(boxes: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints
 
     Rows near each other should be near in space.
     """
-    for walk in meeting_parts(boxes, 1, tick):
-        yield from walk
-
-
-def meeting_parts(boxes: Ints, n: int, tick: Tick = lambda: None) -> list[Iterator[tuple[Ints, Ints]]]:
-    """Return `n` iterators that yield the pairs of `meeting_pairs` between them."""
     tree = _tree(boxes, 0)
-    first, second = np.triu_indices(tree.roots)
-    level = len(tree.rows)
-    while level > 1 and n > 1 and len(first) < n * _PART:
-        first, second = _joined(_below(tree, tree, level, first, second, lambda: None, own=True))
-        level -= 1
-    parts = zip(np.array_split(first, n), np.array_split(second, n), strict=True)
-    return [_descend(tree, tree, level, *part, tick, own=True) for part in parts]
+    yield from _descend(tree, tree, len(tree.rows), *np.triu_indices(tree.roots), tick, own=True)
 
 
 def meeting_between(boxes: Ints, others: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:

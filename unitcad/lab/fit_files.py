@@ -11,6 +11,7 @@ import numpy as np
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.lab_fit import PERCENT, ModelFit, quantiles
 from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE
+from unitcad.attenuation.edge.scores import sign_flip_p
 from unitcad.export.chart import Series, chart
 from unitcad.lab.fitting import Fitted
 from unitcad.spec.toml import text_of, without_none
@@ -144,9 +145,18 @@ def against_text(one: ModelFit) -> str:
 
 
 def leads_text(result: Fitted) -> str:
-    """Say which model leads, and by which rule."""
+    """Say which model leads, by which rule, and the test that decided."""
+    judged = result.chosen.judged
+    errors = {name: np.abs(one.errors[one.own]) for name, one in judged.items()}
+    lead = result.fit.leads
+    tests = [
+        f"{other} x {judged[other].own_score:.2f}, p {sign_flip_p(errors[lead], errors[other]):.2g}"
+        for other in (RULE, BASELINE)
+        if other != lead
+    ]
     return (
-        f"{result.fit.leads} leads. Another model than {RULE} leads only if, on the lab's own units each left out, its "
+        f"{lead} leads: x {judged[lead].own_score:.2f} on the lab's own units ({'; '.join(tests)}). Another "
+        f"model than {RULE} leads only if, on the lab's own units each left out, its "
         f"mean error is less than {RULE}'s and the {BASELINE}'s and p is at most {OVERTURNED:g} against both."
     )
 

@@ -244,13 +244,19 @@ class Compared:
         return sorted(self.judged, key=place)
 
     def at_bound(self, name: str) -> str | None:
-        """Return a constant that the units do not determine: none of them reads it, or the search met its bound."""
+        """Return a constant that the units do not determine, None if they determine all.
+
+        None of the units reads it, all read it alike with another constant, or the search met its bound.
+        """
         constants = self.fitted[name].constants
         if name == "divider" and np.any(np.isclose(constants[0], KAPPA, rtol=1e-6)):
             return "kappa"
         assert self.campaigns is not None
-        unread = ~gradients(COMPARED[name], self.campaigns.table, constants).any(axis=0)
-        return COMPARED[name].names[int(np.argmax(unread))] if unread.any() and name != BASELINE else None
+        read = gradients(COMPARED[name], self.campaigns.table, constants)
+        unread = ~read.any(axis=0)
+        if name == BASELINE or (not unread.any() and np.linalg.matrix_rank(read) == read.shape[1]):
+            return None
+        return COMPARED[name].names[int(np.argmax(unread)) if unread.any() else -1]
 
 
 @dataclass(frozen=True)

@@ -45,6 +45,8 @@ def load_figure(source: str) -> tuple[Point, ...]:
     known = figures()
     path = known.get(source) or Path(source)
     if source not in known and not source.endswith(".csv"):
+        if Path(source).exists():
+            raise Refusal("FIGURE", source, "is not a CSV file")
         raise unknown_name("FIGURE", source, known)
     numbered = enumerate(read_text(path).splitlines(), 1)
     lines = {i: line for i, line in numbered if line.strip() and not line.startswith("#")}

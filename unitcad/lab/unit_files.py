@@ -123,18 +123,18 @@ def _cast(unit: UnitNames, folder: Path, field: str) -> tuple[CastRecord, CastUn
         raise Refusal(where, name, str(error)) from None
     units = {one.cavity: one for one in record.units}
     usable = [one for one in record.units if one.usable]
+    nearest = min((one.cavity for one in usable), key=lambda cavity: abs(cavity - (unit.cavity or 0)), default=None)
     listed, field = some(units), f"{field}.cavity"
     if unit.cavity is not None:
         found = units.get(unit.cavity)
         if found is None and units:
-            nearest = min(units, key=lambda cavity: abs(cavity - unit.cavity))  # type: ignore[operator]
             raise Refusal(field, unit.cavity, f"{name} has no such unit; it has {listed}", nearest)
     elif len(units) > 1 and len(usable) != 1:
         raise Refusal(field, None, f"is required: {name} has the cavities {listed}")
     else:
         found = next(iter([*usable, *record.units]), None)
     if found is not None and not found.usable:
-        raise Refusal(field, found.cavity, f"{name} says that this unit is not usable")
+        raise Refusal(field, found.cavity, f"{name} says that this unit is not usable", nearest)
     return record, found
 
 

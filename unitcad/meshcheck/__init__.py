@@ -6,8 +6,8 @@ Of unitcad it needs only `workers`, `errors`, `text`, `files` and `geometry`, an
 
 from unitcad.meshcheck.file_checks import check_bytes, check_file, check_mesh
 from unitcad.meshcheck.findings import Facts, FileReport, Finding, Location
-from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.rules.f_file import Limits
+from unitcad.meshcheck.rules.inspection import Options
 
 __all__ = [
     "Facts",

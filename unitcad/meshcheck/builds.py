@@ -19,7 +19,6 @@ from unitcad.meshcheck.findings import Facts, Finding, counted, ending, number, 
 from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, weld_exact
 from unitcad.meshcheck.geometry.topology import diagonals, topology_of
 from unitcad.meshcheck.one_mesh import CheckedMesh, Solid, check_on_bed, check_surface, overlapping
-from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.readers import threemf_schema as schema
 from unitcad.meshcheck.readers.read_3mf import Build, Instance, Key, read_build
 from unitcad.meshcheck.readers.read_step import Measured, measured
@@ -29,7 +28,7 @@ from unitcad.meshcheck.rules import g_shells, s_scale, v_values
 from unitcad.meshcheck.rules.f_file import F012, Deadline, Unreadable, keeping
 from unitcad.meshcheck.rules.g_crossing import G001
 from unitcad.meshcheck.rules.g_shells import G007, T008, expected
-from unitcad.meshcheck.rules.inspection import Inspection, Printer
+from unitcad.meshcheck.rules.inspection import Inspection, Options, Printer
 from unitcad.meshcheck.rules.s_scale import likely_unit
 from unitcad.meshcheck.rules.v_values import V001
 

@@ -25,11 +25,11 @@ from unitcad.meshcheck.builds import check_3mf, check_step
 from unitcad.meshcheck.findings import Facts, FileReport, Finding, detailed, ending, merge
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.one_mesh import check_on_bed, check_surface
-from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.readers import kind_of
 from unitcad.meshcheck.readers.read_step import missing
 from unitcad.meshcheck.rules import g_shells, s_scale
 from unitcad.meshcheck.rules.f_file import F001, F005, F011, F012, Deadline, Limits, OutOfTime, Unreadable, keeping
+from unitcad.meshcheck.rules.inspection import Options
 from unitcad.meshcheck.rules.p_package import P011
 from unitcad.meshcheck.rules.s_scale import UNITS_MM
 from unitcad.workers import Pool, WorkerEnded, limit_memory

@@ -10,10 +10,9 @@ from pathlib import Path, PureWindowsPath
 import msgspec
 
 from unitcad import files
-from unitcad.errors import UnitcadError, misfit
+from unitcad.errors import Refusal, UnitcadError, misfit
 from unitcad.meshcheck.findings import FileReport, counted, merge
-from unitcad.meshcheck.options import Options
-from unitcad.meshcheck.rules.inspection import Printer
+from unitcad.meshcheck.rules.inspection import Options, Printer
 from unitcad.meshcheck.rules.m_manifest import M004, M005, ListedFile, check_listed
 
 _MESHES = ("stl", "3mf")
@@ -60,7 +59,7 @@ def read(where: str) -> Listing:
     try:
         manifest = msgspec.convert(files.read_json(path), _Manifest)
     except UnitcadError as error:
-        raise UnitcadError(f"--manifest {where}: cannot be read: {error}") from error
+        raise Refusal("--manifest", str(where), f"cannot be read: {error}") from error
     except msgspec.ValidationError as error:
         raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: {misfit(error)}") from error
     listed: dict[str, ListedFile] = {}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -11,11 +10,10 @@ import numpy as np
 from manifold3d import Manifold
 
 from unitcad.geometry.arrays import extent
-from unitcad.geometry.boxes import Tick, box_pairs
+from unitcad.geometry.boxes import box_pairs
 from unitcad.meshcheck.findings import Facts, Finding, Location, counted, detail, ending, point
 from unitcad.meshcheck.geometry.mesh import Mesh, representable, solid_of
-from unitcad.meshcheck.geometry.sieves import arranged, stars_of
-from unitcad.meshcheck.geometry.topology import surface_of, topology_on, works_on
+from unitcad.meshcheck.geometry.topology import topology_of
 from unitcad.meshcheck.rules import registry
 from unitcad.meshcheck.rules.f_file import F001, Deadline, Unreadable, keeping
 from unitcad.meshcheck.rules.g_shells import G002
@@ -101,7 +99,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict:
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):
-        part = replace(_inspected(mesh, deadline.tick, cross=cross), strict=strict)
+        part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick, cross, strict=strict)
     topology = part.topology
     area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
     facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)
@@ -112,18 +110,6 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict:
     if part.solid:
         facts = replace(facts, volume_mm3=float(topology.volumes.sum()))
     return CheckedMesh(in_file(findings, mesh), facts, part)
-
-
-def _inspected(mesh: Mesh, tick: Tick, *, cross: bool) -> Inspection:
-    """Return a mesh to inspect. Where two cores share it, all that follows from its edges is worked out together."""
-    surface = surface_of(mesh, tick)
-    cross = cross and len(surface.kept) > 0
-    ready = None
-    if cross:
-        with suppress(MemoryError):  # which comes again where it is wanted
-            ready = arranged(surface), stars_of(surface)
-    found = [work(surface, tick) for work in works_on(surface)]
-    return Inspection(mesh, topology_on(surface, found, tick), tick, cross, ready=ready)
 
 
 def check_on_bed(part: Inspection, printer: Printer) -> tuple[Finding, ...]:

@@ -242,7 +242,7 @@ def _views(moulds: MouldSet, body: Body) -> tuple[Callable[[float], str], ...]:
 
     regions = svg.cut([body], moulds.segments, y=cell.y, swell=1.0)
     whole = CrossSection([np.array(loop) for region in regions for loop in region.loops], FillRule.EvenOdd)
-    loops = whole.simplify(sheet.SAME_MM / 4).to_polygons()
+    loops = [[(float(x), float(z)) for x, z in loop] for loop in whole.simplify(sheet.SAME_MM / 4).to_polygons()]
     measures = [*sheet.across(loops, (cell.x, 0.0), round_at), *sheet.upright(loops), *sheet.windows(loops, width_at)]
     title = f"A - A, cut at y = {cell.y:g}"
     section = partial(svg.section, regions, measures, title=title, ground="seat", named=False)

@@ -6,6 +6,7 @@ run only if the spec that the server was started with names the same.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Mapping
 from importlib import import_module
@@ -109,6 +110,5 @@ def _fault(error: UnitcadError) -> Fault:
 
 def _line_of(message: str) -> int | None:
     """Return the line that tomllib's message names."""
-    _, _, place = message.rpartition("(at line ")
-    digits = place.partition(",")[0]
-    return int(digits) if digits.isdigit() else None
+    place = re.match(r"the text:(\d+):", message)
+    return int(place[1]) if place else None

@@ -18,12 +18,12 @@ from unitcad.files import LARGEST, read
 from unitcad.meshcheck import readers
 from unitcad.meshcheck.file_checks import check_file
 from unitcad.meshcheck.findings import Finding
-from unitcad.meshcheck.options import Options
 from unitcad.meshcheck.readers.read_3mf import read_build
 from unitcad.meshcheck.readers.read_step import step_bodies
 from unitcad.meshcheck.readers.threemf_package import open_package
 from unitcad.meshcheck.rules import s_scale
 from unitcad.meshcheck.rules.f_file import F011, Deadline, Limits, Unreadable
+from unitcad.meshcheck.rules.inspection import Options
 from unitcad.shape import Polyhedron
 from unitcad.shape.profile import FACETS, GRID_PER_MM
 

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
-from unitcad.errors import Refusal, unknown_key, unknown_name
+from unitcad.errors import Refusal, UnknownKey, unknown_key, unknown_name
 from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, named_in, notes, table_in
 from unitcad.text import invisible, printable, without_invisible
 
@@ -103,7 +103,10 @@ def _refusals(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
             if key in fields:
                 yield from _refusals(below, fields[key].type, _below(field, key))
             else:
-                yield unknown_key(_below(field, key), below, fields, "`unitcad schema`")
+                unknown = unknown_key(_below(field, key), below, fields, "`unitcad schema`")
+                homes = [] if field or unknown.nearest else _homes(key, fields)
+                moved = UnknownKey(key, below, f"unknown key at the top; known: {' or '.join(homes)}")
+                yield moved if homes else unknown
         missing = (name for name, entry in fields.items() if entry.required and name not in node)
         yield from (Refusal(_below(field, name), None, "is required") for name in missing)
         return
@@ -115,6 +118,13 @@ def _refusals(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
     for key, below, of in inside:
         yield from _refusals(below, of, _below(field, key))
     yield _refusal(node, kind, field)
+
+
+def _homes(key: str, fields: Mapping[str, Any]) -> list[str]:
+    """Return the paths of a key in the tables of a file, each list by its first entry."""
+    tables = {name: table_in(field.type) for name, field in fields.items()}
+    tables |= {f"{name}.0": table_in(entry) for name, field in fields.items() if (entry := entry_in(field.type))}
+    return [f"{name}.{key}" for name, table in tables.items() if table and key in fields_of(table)]
 
 
 def _refusal(value: Any, kind: Any, field: str) -> Refusal:

@@ -46,6 +46,8 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
         advice = _advice(text, line, column)
         why = _PLACE.sub("", str(error)).replace(" (at end of document)", ": the file ends too early")
+        why = why.replace("Illegal character '\\n'", "the quotes do not end in their line")
+        why = re.sub(r"Cannot (declare|overwrite) .*", "the line sets a key or table for the second time", why)
         raise UnitcadError(f"{name}:{line}:{column}: not TOML: {why}{advice}") from None
     except RecursionError:
         raise UnitcadError(f"{name}: nests too deeply") from None

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from unitcad.errors import Refusal
+from unitcad.errors import Refusal, UnknownKey
 from unitcad.rooms import load
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
 from unitcad.spec.raw import RawSpec
@@ -35,7 +35,7 @@ def check_path(path: str, base: dict[str, Any], place: str = "sweep") -> None:
             there = node if isinstance(node, list) else []
             if index_in(step, len(there)) is None:
                 limit = f"the base has no entry {step} of {'.'.join(steps[:i])}: {_entries(len(there))}"
-                raise Refusal(f"{place}.{path}", None, limit)
+                raise UnknownKey(f"{place}.{path}", None, limit)
             kind = entry
         elif any(typing.get_origin(k) is dict or k is Any for k in alternatives(kind)):
             return
@@ -104,4 +104,4 @@ def _unknown(path: str, base: dict[str, Any], place: str) -> Refusal:
     known = known_paths(base)
     begun = sorted((name for name in known if path and name.startswith(path)), key=len)
     close = begun or difflib.get_close_matches(path, known, n=1, cutoff=0.0)
-    return Refusal(f"{place}.{path}", path, "unknown key", close[0] if close else None)
+    return UnknownKey(f"{place}.{path}", None, "unknown key", close[0] if close else None)

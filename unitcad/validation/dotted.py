@@ -10,15 +10,18 @@ from unitcad.spec.fields import index_in
 
 def put(data: dict[str, Any], path: str, value: Any) -> None:
     """Set `value` at a dotted path, making tables on the way but no list entries. Raises Refusal where none leads."""
-    *way, last = path.split(".")
+    steps = path.split(".")
     node: Any = data
-    for step in way:
+    while (count := _steps(node, steps)) < len(steps):
+        step = ".".join(steps[:count])
         if isinstance(node, list):
             node = node[_index(node, step, path, value)]
         elif isinstance(node, dict):
             node = node.setdefault(step, {})
         else:
             break
+        del steps[:count]
+    last = ".".join(steps)
     if isinstance(node, list):
         node[_index(node, last, path, value)] = value
     elif isinstance(node, dict):
@@ -34,8 +37,11 @@ ABSENT = object()
 
 def at(data: Any, path: str) -> Any:
     """Return the value at a dotted path, or `ABSENT`."""
-    node = data
-    for step in path.split(".") if path else ():
+    node, steps = data, path.split(".") if path else []
+    while steps:
+        count = _steps(node, steps)
+        step = ".".join(steps[:count])
+        del steps[:count]
         if isinstance(node, list):
             index = index_in(step, len(node))
             node = ABSENT if index is None else node[index]
@@ -46,9 +52,19 @@ def at(data: Any, path: str) -> Any:
 
 def drop(data: dict[str, Any], path: str) -> bool:
     """Take out the key at a dotted path; whether there was one. An entry of a list stays."""
-    table, _, key = path.rpartition(".")
-    node = at(data, table)
-    return isinstance(node, dict) and node.pop(key, ABSENT) is not ABSENT
+    steps = path.split(".")
+    for i in reversed(range(len(steps))):
+        node = at(data, ".".join(steps[:i]))
+        if isinstance(node, dict) and node.pop(".".join(steps[i:]), ABSENT) is not ABSENT:
+            return True
+    return False
+
+
+def _steps(node: Any, steps: list[str]) -> int:
+    """Return the number of steps that a table's key makes: a sweep has keys such as "layers.0.wall_mm"."""
+    if not isinstance(node, dict):
+        return 1
+    return next((n for n in range(len(steps), 1, -1) if ".".join(steps[:n]) in node), 1)
 
 
 def _index(node: list[Any], step: str, path: str, value: Any) -> int:

@@ -6,7 +6,7 @@ import tomllib
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from unitcad.errors import Refusal
+from unitcad.errors import Refusal, UnknownKey
 from unitcad.spec import convert
 from unitcad.spec.raw import EstimateTable
 
@@ -37,7 +37,8 @@ def lab_fit(text: str) -> LabFit:
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         raise Refusal(FIELD, None, f"not TOML: {error}") from None
     except Refusal as refusal:
-        raise Refusal(f"{FIELD}: {refusal.field}", refusal.value, refusal.limit) from None
+        limit = "unknown key; name a lab-fit.toml of unitcad fit" if isinstance(refusal, UnknownKey) else refusal.limit
+        raise Refusal(f"{FIELD}: {refusal.field}", refusal.value, limit) from None
     wrong = fault(fit)
     if wrong:
         field, value, limit = wrong

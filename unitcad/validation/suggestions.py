@@ -258,7 +258,9 @@ def _is_wrong_by_itself(refusal: Refusal, data: Mapping[str, Any], judge: Judge,
     """Tell whether a sound file is refused with this value, or without this key: it is no consequence of another."""
     if not _is_typed(refusal, data):
         return False
-    given = at(data, refusal.field)
+    given, table = at(data, refusal.field), refusal.field.rpartition(".")[0]
+    if given is not ABSENT and table and at(data, table) is ABSENT:  # a key with dots in it, as a sweep has them
+        return True
     return refused(sound, {refusal.field: None if given is ABSENT else given}, judge) is not None
 
 
@@ -284,10 +286,15 @@ def _passed(
     """Return a change that passes a refusal over: one with which data are accepted, or the first one; {} for none."""
     field = refusal.field
     ways: list[Changes] = []
-    if not isinstance(refusal, UnknownKey):
+    table = field.rpartition(".")[0]
+    if isinstance(refusal, UnknownKey):
+        right = refusal.nearest
+        if isinstance(right, str) and right.rpartition(".")[0] == table and at(data, right) is ABSENT:
+            ways = [{field: None, right: at(data, field)}]
+    else:
         ways = [{field: value} for value in (at(sound, field), refusal.nearest) if value not in (None, ABSENT)]
     # A word of a list of words: the list's default takes its place.
-    ways += [{path: None} for path in (field, field.rpartition(".")[0]) if path]
+    ways += [{path: None} for path in (field, table) if path]
     first: Changes = {}
     for way in ways:
         after = refused(data, {**changes, **way}, judge)

@@ -9,9 +9,10 @@ from typing import Any, TypeVar
 
 from unitcad.errors import Refusal, UnitcadError, UnknownKey
 from unitcad.files import read_text
+from unitcad.rooms import file_kinds
 from unitcad.spec import read_toml
 from unitcad.spec.toml_lines import line_of
-from unitcad.validation.shipped_files import expect_kind
+from unitcad.validation.shipped_files import expect_kind, shipped_of
 from unitcad.validation.suggestions import every_fault
 
 T = TypeVar("T")
@@ -24,12 +25,12 @@ def load_file(path: Path, kind: str, judge: Callable[[dict[str, Any]], T]) -> T:
     """
     data = read_toml(path)
     if not data:
-        raise UnitcadError(f"{path}: is empty; unitcad init writes a file to start from")
+        raise UnitcadError(f"{path}: is empty; `unitcad schema {kind}` lists its keys")
     expect_kind(data, str(path), kind)
     try:
         return judge(data)
     except Refusal as first:
-        every = every_fault(first, data, judge, {})
+        every = every_fault(first, data, judge, _sound(kind))
         text = read_text(path)
         for i, one in enumerate(every):
             if isinstance(one, UnknownKey):
@@ -38,3 +39,9 @@ def load_file(path: Path, kind: str, judge: Callable[[dict[str, Any]], T]) -> T:
             one.file, one.line = os.fspath(path), line_of(text, one.field)
         every[0].others = tuple(every[1:])
         raise every[0] from None
+
+
+def _sound(kind: str) -> dict[str, Any]:
+    """Return the data of a shipped file of a kind; {} if none is shipped."""
+    shipped = [file for one in file_kinds() if one.name == kind and one.plural for file in shipped_of(one).values()]
+    return read_toml(shipped[0]) if shipped else {}

@@ -13,10 +13,11 @@ import numpy as np
 
 from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.attenuation.edge.measured_levels import Moduli, measured_table
-from unitcad.attenuation.edge.models import BASELINE, RULE, assessments
-from unitcad.attenuation.edge.nearest import nearest
+from unitcad.attenuation.edge.models import BASELINE, RULE, assessments, choice
+from unitcad.attenuation.edge.nearest import LENGTHS, coordinates_of, differing, nearest
 from unitcad.attenuation.edge.ranges import held, lead_of, predictive_of
 from unitcad.attenuation.inputs import EstimateInput
+from unitcad.catalogue import measurements
 from unitcad.text import listed, number
 
 PAPER = "the paper"
@@ -27,7 +28,10 @@ SURFACE = (
     "they are. published and corrected are the normal motion of the skin at the edge (|u_z|, equation 5b)."
 )
 ANALYTIC = ("published", "corrected")
-_LEAST = 1e-4
+_LEAST, _MOST = 1e-4, 2.0
+"""Levels beyond these are not printed as numbers."""
+_WIDEST = 100.0
+"""Largest factor between the ends of a range at which a level is stated."""
 SKIN_MM = (5, 10, 20)
 """Distances from the edge that the sentence on the skin names."""
 
@@ -38,19 +42,27 @@ def answer(
     """Return the answer of an estimate (`estimates.estimate`) as data.
 
     `lines`: the two that lead, `headline` the first without its source; `details`: how sure they are.
-    `level`: the headline's, measured or else `p50` (null if a modulus is known as a range only). `p10`, `p50` and
-    `p90`: the leading model's median and 80 % range, fractions of the motor's amplitude. `levels`: each model's edge
-    level; `analytic`: those of the paper's model. Errors are factors with the unit left out. `held`: how many of the
-    nine measured units lay in the range that was predicted without them.
+    `level`: the headline's, measured or else `p50` (null if a modulus is known as a range only, or if the unit is
+    `too_far` from the measured ones). `p10`, `p50` and `p90`: the leading model's median and 80 % range, fractions of
+    the motor's amplitude. `analytic`: the levels of the paper's model.
+
+    Errors are factors with the unit left out.
+    `held`: how many of the nine measured units lay in the range that was predicted without them.
+
+    With a lab's fit
+    `measured` and `nearest` are the lab's own; `elsewhere` is the paper's measurement of this unit.
     """
     lead, errors = lead_of(variant.moduli, fit), left_out(variant.moduli, fit)
     expected = predictive_of([variant], fit)
     low, middle, high = (float(end[0]) for end in expected.range)
-    known, measured = bool(np.isfinite([low, middle, high]).all()), _measured(estimated)
+    known, measured = bool(np.isfinite([low, middle, high]).all()), _measured(estimated, fit)
+    far = known and not measured and (high > _WIDEST * low or high > _MOST)
+    stated = not far and levels[lead.model]["value"] is not None
     best = assessments(variant.moduli)[lead.model].left_out
     data: dict[str, Any] = {
         "model": lead.model if known else None,
-        "level": measured[0]["level"] if measured else middle if levels[lead.model]["value"] is not None else None,
+        "level": measured[0]["level"] if measured else middle if stated else None,
+        "too_far": far,
         "p10": low if known else None,
         "p50": middle if known else None,
         "p90": high if known else None,
@@ -60,22 +72,24 @@ def answer(
         "baseline_error": errors[BASELINE],
         "held": None if fit else held(variant.moduli),
         "measured": measured,
-        "nearest": nearest(variant),
+        "elsewhere": _of_paper(estimated) if fit else [],
+        "nearest": _nearest(variant, fit),
+        "highest": _highest(fit),
         "analytic": {name: {**levels[name], "left_out": errors[name]} for name in ANALYTIC},
     }
-    headline = _headline(data, levels)
+    headline = _headline(data, levels, fit)
     return {
         **data,
         "headline": headline,
-        "lines": [f"{headline}{_source(variant, data, fit)}", _second(data)],
-        "details": list(_details(variant, estimated, data, fit)),
+        "lines": [f"{headline}{_source(variant, estimated, data, fit)}", _second(data)],
+        "details": list(_details(variant, estimated, data, levels, fit)),
     }
 
 
 def left_out(moduli: Moduli = "small-strain", fit: LabFit | None = None) -> dict[str, float]:
-    """Return each model's typical factor with the unit left out: by a lab's fit, or on the paper's nine units."""
+    """Return each model's typical factor with the unit left out: on the lab's own units, or on the paper's nine."""
     if fit:
-        return {name: one.left_out for name, one in fit.model.items()}
+        return {name: one.own_left_out or one.left_out for name, one in fit.model.items()}
     return {name: one.left_out.geometric_mean for name, one in assessments(moduli).items()}
 
 
@@ -86,41 +100,68 @@ def percent(level: float) -> str:
 
 def _range(low: float, high: float) -> str:
     """Return two fractions as a range in per cent; one number if both round to the same."""
-    first, last = percent(low), percent(high)
+    first, last = percent(low), percent(high) if high <= _MOST else f"over {percent(_MOST)}"
     return last if first == last else f"{first.removesuffix(' %')} to {last}"
 
 
-def _measured(estimated: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the measurements of this very unit, the lab's own ones first."""
-    own = [
+def _measured(estimated: dict[str, Any], fit: LabFit | None) -> list[dict[str, Any]]:
+    """Return the measurements of this very unit: the lab's own with a fit, else the paper's."""
+    if fit is None:
+        return _of_paper(estimated)
+    return [
         {"level": one["value"], "low": one["low"], "high": one["high"], "by": one["unit"]}
-        for one in estimated.get("own_measured", ())
+        for one in estimated["own_measured"]
     ]
+
+
+def _of_paper(estimated: dict[str, Any]) -> list[dict[str, Any]]:
     found = estimated["measured"] or {}
-    if found.get("same_size"):
-        printed = [found[key] for key in ("level", "also_printed") if found.get(key) is not None]
-        own += [{"level": level, "low": None, "high": None, "by": PAPER} for level in printed]
-    return own
+    if not found.get("same_size"):
+        return []
+    printed = [found[key] for key in ("level", "also_printed") if found.get(key) is not None]
+    return [{"level": level, "low": None, "high": None, "by": PAPER} for level in printed]
 
 
-def _headline(data: dict[str, Any], levels: dict[str, Any]) -> str:
+def _nearest(variant: EstimateInput, fit: LabFit | None) -> dict[str, Any]:
+    """Return the nearest measured unit as `nearest.nearest` does; with a fit, of the lab's own ones."""
+    found = nearest(variant)
+    if fit is None:
+        return found
+    place = coordinates_of(variant)
+    unit = min(fit.measured, key=lambda one: float(np.nansum((np.array(one.place) - place) ** 2)))
+    apart = place - np.array(unit.place)
+    silicones = ["silicones"] if not np.allclose(apart[LENGTHS:], 0.0) else []
+    return {**found, "unit": unit.unit, "level": unit.value, "differs_in": [*silicones, *differing(apart)]}
+
+
+def _highest(fit: LabFit | None) -> float:
+    """Return the highest level behind the leading model."""
+    paper = [float(measured_table().levels.max())] if fit is None or fit.with_paper else []
+    return max([*paper, *(unit.value for unit in (fit.measured if fit else ()))])
+
+
+def _headline(data: dict[str, Any], levels: dict[str, Any], fit: LabFit | None) -> str:
     """Return the measured or expected level, and the range, in words."""
     if data["p50"] is None:
         return f"Not known: {levels[RULE]['reason']}."
     where = "of the motor's amplitude at the edge"
-    most = float(measured_table().levels.max())
-    above = f" (no measured level is above {percent(most)})" if data["p90"] > most else ""
+    most = data["highest"]
+    highest = "highest measured level" if fit else f"highest level that {PAPER} prints as a number"
+    above = f" (above the {highest}, {percent(most)})" if data["p90"] > most else ""
+    if data["too_far"]:
+        ends = _range(data["p10"], data["p90"])
+        return f"No level: this unit is too far from the measured ones (80 % range {ends} {where})."
     expect = f"Expect {_range(data['p10'], data['p90'])}"
     if data["measured"]:
         first = data["measured"][0]
         by = f"in {PAPER}" if first["by"] == PAPER else f"on {first['by']}"
         return f"{_spread(first)} {where} (measured {by}). {expect}{above}."
     if data["level"] is None:
-        return f"{expect} {where}{above}."
+        return f"{expect} {where}{above}; a modulus is known as a range only."
     return f"{percent(data['level'])} {where}. {expect}{above}."
 
 
-def _source(variant: EstimateInput, data: dict[str, Any], fit: LabFit | None) -> str:
+def _source(variant: EstimateInput, estimated: dict[str, Any], data: dict[str, Any], fit: LabFit | None) -> str:
     """Say the source of the range, and which measured unit is nearest."""
     if data["p50"] is None:
         return ""
@@ -132,7 +173,19 @@ def _source(variant: EstimateInput, data: dict[str, Any], fit: LabFit | None) ->
     new = " Three or more layers: not measured." if len(variant.layers) > 2 else ""
     near = data["nearest"]
     close = "" if data["measured"] else f" Nearest measured: {near['unit']}, {number(100 * near['level'], 3)} %."
-    return f" By {what}.{new}{close}"
+    return f" By {what}.{new}{close}{''.join(f' {one}' for one in _besides(estimated['measured'] or {}))}"
+
+
+def _besides(printed: dict[str, Any]) -> Iterator[str]:
+    """Say which statements the paper makes on a unit that it gives no level for."""
+    if printed.get("level") is not None:
+        return
+    if ratio := printed.get("over_a_control_not_named"):
+        controls = [float(level) for level in measurements().controls.values()]
+        ends = _range(ratio * min(controls), ratio * max(controls))
+        yield f"The paper prints {number(100 * ratio, 4)} % of a control that it does not name for this unit: {ends}."
+    if direction := printed.get("direction_stated"):
+        yield f"The paper states of this unit: {direction}."
 
 
 def _spread(one: dict[str, Any]) -> str:
@@ -145,14 +198,15 @@ def _second(data: dict[str, Any]) -> str:
     published, corrected = (data["analytic"][name] for name in ANALYTIC)
     if published["low"] is None:
         return f"The paper's analytic model gives no number: {published['reason']}"
-    most = float(measured_table().levels.max())
+    most = data["highest"]
     above = (
         f", above every measured level ({percent(most)})" if max(published["high"], corrected["high"]) > most else ""
     )
     return (
         f"The paper's analytic model from this unit's moduli: {_level(published)} as published, {_level(corrected)} "
-        f"corrected{above} (normal motion of the skin). Typical error on measured units left out: "
-        f"x {number(published['left_out'], 2, zeros=True)}; of four class means x {number(data['baseline_error'], 2)}."
+        f"corrected{above} (its path of u_z through the walls, scaled to the measured units). Typical error on "
+        f"measured units left out: x {number(published['left_out'], 3, zeros=True)}; of four class means "
+        f"x {number(data['baseline_error'], 3, zeros=True)}."
     )
 
 
@@ -161,18 +215,37 @@ def _level(level: dict[str, Any]) -> str:
 
 
 def _details(
-    variant: EstimateInput, estimated: dict[str, Any], data: dict[str, Any], fit: LabFit | None
+    variant: EstimateInput,
+    estimated: dict[str, Any],
+    data: dict[str, Any],
+    levels: dict[str, Any],
+    fit: LabFit | None,
 ) -> Iterator[str]:
     """Say how sure the answer is: errors, unmeasured inputs, units that the models can't tell apart, the skin."""
-    name, error = data["model"] or RULE, number(data["typical_error"], 2)
-    worst = f", worst x {number(data['worst_error'], 2)} ({data['worst_at']})" if data["worst_error"] else ""
+    name, error = data["model"] or RULE, number(data["typical_error"], 3, zeros=True)
+    worst = (
+        f", worst x {number(data['worst_error'], 3, zeros=True)} ({data['worst_at']})" if data["worst_error"] else ""
+    )
+    if name == RULE and fit is None:
+        chosen = number(choice(variant.moduli).score.geometric_mean, 3, zeros=True)
+        worst += f"; x {chosen} if its form is chosen without the unit too"
     units = f"the units of {fit.name}" if fit else "the nine measured units"
     yield (
         f"Error of {name} on {units}, each left out: x {error} typical{worst}; four class means: x "
-        f"{number(data['baseline_error'], 2)}. Leaving out a whole class costs more: see the table of classes."
+        f"{number(data['baseline_error'], 3, zeros=True)}. Leaving out a whole class costs more: see the table of "
+        "classes."
     )
     if data["held"] is not None:
-        yield f"80 % range: it held {data['held']} of the nine measured units, each predicted without it."
+        knows = " The range above knows this unit's own level, so it is narrower." if data["measured"] else ""
+        yield f"80 % range: it held {data['held']} of the nine measured units, each predicted without it.{knows}"
+    middle, value = data["p50"], levels[name]["value"]
+    if middle is not None and value is not None and percent(middle) != percent(value):
+        yield (
+            f"{name} gives {percent(value)}; the measured levels of units like this one move the middle of the range "
+            f"to {percent(middle)}."
+        )
+    if data["elsewhere"]:
+        yield f"{PAPER.capitalize()} measured {percent(data['elsewhere'][0]['level'])} for this unit, in its own lab."
     others = [f"{number(100 * one['level'], 3)} %" for one in data["measured"][1:]]
     if others:
         yield f"Also measured: {listed(others)}."
@@ -181,6 +254,8 @@ def _details(
             f"Nearest measured unit: {data['nearest']['unit']}, {number(100 * data['nearest']['level'], 3)} %. This "
             f"unit differs in {listed(differs)}: the range is wider for it, by an assumed slope."
         )
+    if unread := data["nearest"]["not_read"]:
+        yield f"Not measured, and not in the range: {listed(unread)}."
     if len(variant.layers) == 1:
         yield "The rule gives every one-material unit the same level; 39.5, 45.2 and 60.2 % were measured."
     yield SURFACE

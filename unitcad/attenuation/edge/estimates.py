@@ -45,7 +45,7 @@ TABLE_NOTE = (
 )
 RANGE_NOTE = (
     "5 to 95 % of the score over units drawn again with replacement; of nine units it holds the score of new ones less "
-    "often than that (docs/estimate.md has the share)"
+    "often than that (docs/explanation/estimate.md has the share)"
 )
 P_NOTE = (
     "two-sided p of the mean difference of two models' errors with the unit left out, over all flips of the units' "

@@ -32,7 +32,8 @@ _OF_WAVES: dict[str, Callable[[Units, cf.Wave], Any]] = {
 }
 KINDS = {
     "rule": "two constants fitted to the measured levels: s, times q for each pass of a border whose inside is the "
-    "softer layer; no thickness, no damping, and of the moduli only which side is softer",
+    "softer layer. It reads which side is softer and, below the least measured ratio of moduli, an assumed line in the "
+    "ratio's logarithm",
     "published": "the paper's closed form as printed: transmission coefficients and exponentials along the walls, one "
     "constant s from the table (f1 and f2 are not printed)",
     "corrected": "the same path with complex moduli, complex impedances and the exact attenuation; one constant s",
@@ -48,8 +49,8 @@ ASSUMPTIONS = {
         "More than two layers: every border with the softer layer inside counts, which nobody has measured.",
     ],
     "published": [
-        "Plane waves cross each interface at right angles as if both sides were half-spaces; a layer is 1/14 to 1/67 "
-        "of a shear wavelength thick.",
+        "Plane waves cross each interface at right angles as if both sides were half-spaces; a layer of the measured "
+        "units is 1/14 to 1/67 of a shear wavelength thick.",
         "u_z decays and transmits as a shear wave, u_r as a pressure wave, though both components carry both.",
         "The path back into the skin has no coefficient: layers that close over the motor give the same number as open "
         "rings.",

@@ -173,7 +173,8 @@ def leader(errors: Mapping[str, np.ndarray]) -> str:
 
     The rule leads. Another model of `MODELS` takes its place only if its mean error is smaller than the rule's and the
     baseline's, and the sign-flip test tells it apart from both (p at most `OVERTURNED`); of several the one with the
-    least mean. This was written down before any number was looked at by it. Six units are the fewest that can do it.
+    least mean. The test was fixed before any number was looked at by it; the rule as the default was not: its score was
+    known. Six units are the fewest that can do it.
     """
 
     def overturns(name: str) -> bool:

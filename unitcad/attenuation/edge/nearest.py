@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.edge.closed_form import Units, borders
-from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
+from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table, unit_class
 from unitcad.attenuation.edge.variant_units import stacked
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements, motors
@@ -124,14 +124,18 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
 
 
 def nearest(variant: EstimateInput) -> dict[str, Any]:
-    """Return {unit, level, differs_in} of the paper's unit that is nearest to a variant.
+    """Return {unit, level, differs_in, not_read} of the paper's unit that is nearest to a variant.
 
-    Among units of its design with as many layers, or with fewer, the one whose moduli are nearest.
+    `differs_in`: inputs that widen the range; `not_read`: inputs that the range does not know.
+
+    Among units of its class, of its design if there are any, the one whose moduli are nearest.
     """
     table, layers = measured_table(), tuple(layer.material for layer in variant.layers)
     known = _moduli(variant.moduli)
     own = CONTROL if len(layers) == 1 else variant.design
-    alike = [i for i, design in enumerate(table.designs) if design == own] or list(range(len(table.names)))
+    kind = int(unit_class(stacked([variant]))[0])
+    alike = [i for i, group in enumerate(table.classes) if group == kind]
+    alike = [i for i in alike if table.designs[i] == own] or alike
     ends = np.log([layer.youngs_modulus.middle for layer in (variant.layers[0], variant.layers[-1])])
     row = min(alike, key=lambda i: (table.layers[i] != layers, float(np.abs(np.nan_to_num(known[i] - ends)).sum())))
     differs = {
@@ -142,7 +146,8 @@ def nearest(variant: EstimateInput) -> dict[str, Any]:
     return {
         "unit": table.names[row],
         "level": float(table.levels[row]),
-        "differs_in": [*(name for name, other in differs.items() if other), *_differs_from_all(variant)],
+        "differs_in": [*(name for name, other in differs.items() if other), *differing(coordinates_of(variant))],
+        "not_read": _not_read(variant),
     }
 
 
@@ -154,12 +159,17 @@ def _moduli(moduli: Any) -> np.ndarray:
 
 def _differs_from_all(variant: EstimateInput) -> list[str]:
     """Return the inputs that the measured units share and this unit does not."""
+    return [*differing(coordinates_of(variant)), *_not_read(variant)]
+
+
+def _not_read(variant: EstimateInput) -> list[str]:
+    """Return the inputs that the measured units share, this unit does not, and neither model nor range reads."""
     shared = measurements().unit
     motor = motors()[shared.motor]
     return [
-        *differing(coordinates_of(variant)),
         *(["drive"] if motor.drive is not None and variant.drive != motor.drive.value else []),
         *(["body"] if variant.tissue_name != shared.tissue else []),
+        *variant.unread,
     ]
 
 

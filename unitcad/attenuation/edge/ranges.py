@@ -23,11 +23,12 @@ from unitcad.attenuation.edge.nearest import LENGTHS, Lengths, coordinates, leng
 from unitcad.attenuation.edge.variant_units import stacked
 from unitcad.attenuation.inputs import EstimateInput
 
-LENGTH_SLOPE, MODULUS_SLOPE = 0.5, 1.0
-"""Standard deviations of d ln level / d ln input without measurement: assumed.
+LENGTH_SLOPES = np.array([1.2, 0.5, 0.5, 0.5, 1.0, 0.5, 0.5, 0.5, 0.5])
+MODULUS_SLOPE = 1.0
+"""Standard deviations of d ln level / d ln input without measurement, of the first `COORDINATES`: assumed.
 
-Finite elements give 0.1 for walls, caps and frequency and up to 1.2 for the diameter; the two measured pairs that
-differ in one modulus give +0.7 and +1.6.
+Finite elements give 0.1 for walls and caps, up to 1.2 for the diameter, and factors of 0.2 to 3 from 60 to 200 Hz. The
+two measured pairs that differ in one modulus give +0.7 and +1.6.
 """
 OF_THE_KIND = 0.5
 """Part of a residual's variance that belongs to the kind of unit, not to cast and reading: assumed."""
@@ -108,11 +109,12 @@ class Lead:
     def _far(self, at: np.ndarray) -> np.ndarray:
         """Return the variance added by lengths, frequency and moduli outside the measured ones."""
         # A place at a time: a search has many rows.
-        apart = [np.sum((at[:, :LENGTHS] - own[:LENGTHS]) ** 2, axis=-1) for own in np.unique(self.places, axis=0)]
+        places = np.unique(self.places, axis=0)[:, :LENGTHS]
+        apart = [np.sum((LENGTH_SLOPES * (at[:, :LENGTHS] - own)) ** 2, axis=-1) for own in places]
         away = np.min(apart, axis=0)
         ends = at[:, LENGTHS : LENGTHS + 2]
         outside = np.sum((ends - np.clip(ends, *self.moduli)) ** 2, axis=-1)
-        return LENGTH_SLOPE**2 * away + MODULUS_SLOPE**2 * outside
+        return away + MODULUS_SLOPE**2 * outside
 
     def _unmeasured_borders(self, units: Units) -> tuple[np.ndarray, np.ndarray]:
         """Return the variance below and above the centre added by borders that no measured unit had.

@@ -161,7 +161,8 @@ def expect_ending(path: Path, field: str) -> str:
     if ending in OTHER_PROGRAMS:
         raise Unreadable(field, path.name, OTHER_PROGRAMS[ending])
     if ending not in _by_ending():
-        raise Unreadable(field, path.name, f"no reader; known endings: {', '.join(_by_ending())}", ".csv")
+        limit = f"no reader for this ending; known: {', '.join(_by_ending())}"
+        raise Unreadable(field, None if field == str(path) else path.name, limit)
     return ending
 
 

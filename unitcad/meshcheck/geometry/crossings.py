@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, sorted_with_order
-from unitcad.geometry.boxes import Interrupted, Slabs, Tick, TooMany, box_pairs, meeting_parts
+from unitcad.geometry.arrays import Bools, Floats, Ints, columns_of, cross, distinct, sorted_with_order
+from unitcad.geometry.boxes import Interrupted, Tick, TooMany, box_order, boxes_of, frame_of, slabs_of
 from unitcad.meshcheck.geometry import predicates
-from unitcad.meshcheck.geometry.mesh import MANY, area_vectors, float32_steps, same_place
+from unitcad.meshcheck.geometry.mesh import area_vectors, float32_steps, same_place
 from unitcad.meshcheck.geometry.predicates import orient3d
-from unitcad.meshcheck.geometry.sieves import (
-    MOST_CONTACTS,
-    Arranged,
-    CommonCorners,
-    Contacts,
-    FaceBoxes,
-    Planes,
-    Stars,
-    common_corners,
-    face_boxes,
-    hub_walks,
-    planes_of,
-    small_shells,
+from unitcad.meshcheck.geometry.sieves import MOST_CONTACTS, Contacts, Planes, height_fields, planes_of, walks_of
+from unitcad.meshcheck.geometry.topology import (
+    Edges,
+    Topology,
+    Turns,
+    edges_of,
+    max_side_squared,
+    side_by_side,
+    surrounded,
 )
-from unitcad.meshcheck.geometry.topology import Edges, Topology, Turns, max_side_squared, side_by_side
 
 _FACES = 1 << 14  # pairs of faces that stay in the processor's cache
 _FOLD = 2.0  # float32 steps: a fold thinner than that has no thickness
@@ -125,70 +119,36 @@ def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> 
     return np.flatnonzero(two)[against][flat][thin], height[thin], higher[thin]
 
 
-LEAST_SHELLS = 200  # compared shell by shell, where they are small
-_BLOCK = 1 << 17
-_PARTS = 24  # of the walk over MANY faces or more
-_PAIRS = 1 << 15  # pairs looked at together: enough to outweigh the calls, few enough for the cache
-_RARE = 16  # of so many faces less than one has such a corner: most pairs need no look for one in common
-_SPARSE = 4  # of so many faces less than one is in a pair: a sieve of those few is the cheaper one
-_OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothing but perhaps touching
+_BLOCK = 1 << 17  # pairs of faces decided together
+_PAIRS = 1 << 15  # of which so many are sieved together: enough to outweigh the calls, few enough for the cache
 _MOST_LOOKS, _LOOKS = 50_000_000, 100  # pairs looked at, in all and a face
-_UNEVEN = 4  # times its share that a part of the walk may take
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
 @dataclass(frozen=True, eq=False)
 class Faces:
-    """Faces in the order of a space-filling curve and what the sieves need of them.
+    """Faces with an area in the order of a space-filling curve, and what decides pairs of them.
 
-    `normal` (3, m) is twice their area vectors; `columns` (3, n) are the vertices by axis, and `places` (3, m) the
-    first vertices in the places of the corners. `safe` are the corners whose stars are height fields;
-    `some_safe` says which faces have one, where few do.
+    `corners` (3, m) are their vertices, and `safe` (3, m) those whose stars are height fields, -1 for the others.
+    `shell` and `original` (m,) give each face's shell and its number in the file. `several`: whether there are several
+    shells; `doubled`: whether two faces may run along an edge in one direction.
     """
 
     vertices: Floats
     corners: Ints
-    normal: Floats
-    safe: CommonCorners
-    some_safe: Bools | None
-    columns: Floats
-    places: Ints
-    ranked: FaceBoxes | None
+    safe: Ints
+    planes: Planes
     shell: Ints
     original: Ints
     several: bool
     doubled: bool
-
-    @cached_property
-    def sieve(self) -> Sieve:
-        """The sieve of all faces."""
-        return _sieve(self)
-
-
-@dataclass(frozen=True, eq=False)
-class Sieve:
-    """Planes and boxes of faces, all or some."""
-
-    planes: Planes
-    boxes: FaceBoxes
-
-
-def _sieve(faces: Faces, some: Ints | None = None) -> Sieve:
-    """Return the sieve of all faces or, by their own numbers, of `some`."""
-    corners, places, normal = (
-        rows if some is None else rows.take(some, axis=1) for rows in (faces.corners, faces.places, faces.normal)
-    )
-    boxes = faces.ranked if faces.ranked is not None and some is None else face_boxes(faces.columns, corners)
-    return Sieve(planes_of(faces.columns, places, normal), boxes)
 
 
 @dataclass(eq=False)
 class Crossings:
     """Pairs of `faces` that meet, collected over the blocks; `stopped`: why not all were looked at, None if they were.
 
-    `crossing` pass through each other, `covering` overlap in one plane; `contact` has pairs of shells that meet, and
-    `meeting` (k, 2) those whose boxes do, sorted, where they were needed. Those of one of several `parts` of the walk
-    have no `faces` of their own.
+    `crossing` pass through each other, `covering` overlap in one plane; `contact` has pairs of shells that meet.
     """
 
     faces: Faces | None = None
@@ -198,8 +158,6 @@ class Crossings:
     leaning: list[Ints] = field(default_factory=list)
     kept: int = 0
     looked_at: int = 0
-    parts: int = 1
-    meeting: Ints | None = None
     stopped: Interrupted | None = None
 
     @property
@@ -213,163 +171,137 @@ class Crossings:
         return self.contact.shells_of(keys[distinct(keys)])
 
 
-def crossings_of(topology: Topology, ready: Arranged, stars: Stars, tick: Tick, *, every: bool = False) -> Crossings:
-    """Find the pairs of faces that meet, each where the file has it; `ready`: the surface's faces `arranged`.
+def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Crossings:
+    """Find the pairs of faces that meet, each where the file has it.
 
     `every`: all pairs of those that touch, else one for each pair of shells.
     """
-    if len(ready.order) < 2:
+    vertices, stored = topology.mesh.vertices, topology.stored
+    frame = frame_of(vertices)
+    steps = frame.steps(vertices)
+    boxes = boxes_of(steps, *stored.T)
+    order = box_order(boxes, frame)
+    order = order[topology.stored_areas[order].any(axis=1)]
+    if len(order) < 2:
         return Crossings()
     tick()
-    faces, slabs = _prepared(topology, ready, stars), ready.slabs
-    most = max(MOST_CONTACTS, 2 * len(ready.order))
-    crossings = Crossings(faces, Contacts(topology.n_shells, every, most))
-    parts = _PARTS if len(ready.order) >= MANY else 1
-    small = None
-    if topology.n_shells >= LEAST_SHELLS and not every:
-        with suppress(TooMany):
-            crossings.meeting = meeting = box_pairs(topology.low, topology.high, tick)
-            small = small_shells(
-                topology, meeting, faces.shell, faces.columns, faces.corners, faces.places, ready.steps
-            )
-    hubs = hub_walks(ready, stars.smooth, parts, tick) if small is None else []
-    if small is None:
-        walks = hubs or meeting_parts(ready.steps, parts, tick)
-    else:
-        walks = small.parts(parts, tick)
-        crossings.contact.noted += small.sharing.noted
-
-    def part(k: int) -> Crossings:
-        # Each begins with nothing known: which process does it has no say in what is found.
-        contact = Contacts(topology.n_shells, every, most // len(walks))
-        return _met(faces, slabs, walks[k], Crossings(None, contact, parts=len(walks)), tick)
-
-    for met in map(part, range(len(walks))):
-        crossings.crossing += met.crossing
-        crossings.covering += met.covering
-        crossings.leaning += met.leaning
-        crossings.contact.noted += met.contact.noted
-        crossings.contact.full |= met.contact.full
-        crossings.stopped = crossings.stopped or met.stopped
-    if crossings.stopped is not None:
-        crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
-    _leaning(faces, crossings)
-    if hubs:  # whose walks give some pairs twice
-        for blocks in (crossings.crossing, crossings.covering):
-            blocks[:] = [np.unique(np.sort(joined(blocks), axis=1), axis=0)]
-    return crossings
-
-
-def _met(faces: Faces, slabs: Slabs, walk: Iterator[tuple[Ints, Ints]], crossings: Crossings, tick: Tick) -> Crossings:
-    """Add to `crossings` the pairs of faces of a walk that meet; return them."""
+    faces = _prepared(topology, order)
+    crossings = Crossings(faces, Contacts(topology.n_shells, every, max(MOST_CONTACTS, 2 * len(order))))
+    slabs = slabs_of(steps, *faces.corners)
+    walks = walks_of(faces.planes.columns, faces.corners, faces.safe, boxes.take(order, axis=0), tick)
     waiting: list[tuple[Ints, Ints]] = []
-    count = 0
     try:
-        for i, j in walk:
-            i, j = slabs.meeting(*_strangers(faces, i, j))
-            waiting.append((i, j))
-            count += len(i)
-            if count > _BLOCK:
+        for i, j in chain.from_iterable(walks):
+            waiting.append(slabs.meeting(*_strangers(faces, i, j)))
+            if sum(len(some) for some, _ in waiting) > _BLOCK:
                 _decide(faces, waiting, crossings)
-                waiting, count = [], 0
+                waiting = []
                 tick()
         _decide(faces, waiting, crossings)
     except Interrupted as stop:
         crossings.stopped = stop
-    crossings.contact.pairs()  # what is noted twice goes where two processes share the work
+        crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
+    _leaning(crossings)
+    for blocks in (crossings.crossing, crossings.covering) if len(walks) > 1 else ():  # which give some pairs twice
+        blocks[:] = [np.unique(np.sort(joined(blocks), axis=1), axis=0)]
     return crossings
 
 
-def _prepared(topology: Topology, ready: Arranged, stars: Stars) -> Faces:
+def _prepared(topology: Topology, order: Ints) -> Faces:
     vertices, several = topology.mesh.vertices, topology.n_shells > 1
-    order, columns, corners, normal = ready.order, ready.columns, ready.corners, ready.normal
-    safe = stars.smooth.take(corners)
-    has_safe = np.asarray(safe.any(axis=0))
+    stored = topology.stored
+    columns, corners = np.ascontiguousarray(vertices.T), columns_of(stored, order)
+    normal = columns_of(topology.stored_areas, order)
+    edges = topology.edges if stored is topology.mesh.faces else edges_of(stored, len(vertices))
+    smooth = height_fields(columns, corners, normal, surrounded(edges, len(vertices)))
     places = same_place(vertices).take(corners) if several and topology.mesh.indexed else corners
     return Faces(
         vertices,
         corners,
-        normal,
-        common_corners(corners, safe, len(vertices)),
-        has_safe if np.count_nonzero(has_safe) * _RARE < len(order) else None,
-        columns,
-        places,
-        ready.ranked,
+        np.where(smooth.take(corners), corners, np.int32(-1)),
+        planes_of(columns, places, normal),
         topology.shells[order],
         topology.kept[order],
         several,
-        several or not stars.closed,
+        several or not edges.closed,
     )
 
 
 def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     """Drop pairs that share a vertex whose star is a height field."""
-    if faces.some_safe is not None:
-        some = np.flatnonzero(faces.some_safe.take(i, mode="clip"))
-        drop = some[faces.safe.of(i[some], j[some])]
-        return (np.delete(i, drop), np.delete(j, drop)) if len(drop) else (i, j)
-    keep = np.flatnonzero(~faces.safe.of(i, j))
+    apart = np.ones(len(i), bool)
+    mine = [corner.take(i, mode="clip") for corner in faces.safe]
+    theirs = [corner.take(j, mode="clip") for corner in faces.corners]
+    for one in mine:
+        for other in theirs:
+            apart &= one != other
+    keep = np.flatnonzero(apart)
     return i[keep], j[keep]
 
 
 def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings) -> None:
-    """Decide pairs of faces that are near each other: boxes and planes first, then exact signs."""
-    if not waiting or crossings.kept * crossings.parts > _FEW:
+    """Decide pairs of faces that are near each other: planes first, then exact signs."""
+    if not waiting or crossings.kept > _FEW:
         return
-    i = np.concatenate([pair[0] for pair in waiting])
-    j = np.concatenate([pair[1] for pair in waiting])
-    state, shared = np.empty((2, len(i)), np.int8)
+    i, j = (np.concatenate(part) for part in zip(*waiting, strict=True))
+    if not len(i):
+        return
     crossings.looked_at += len(i)
-    most = max(_MOST_LOOKS, _LOOKS * faces.corners.shape[1])
-    if crossings.looked_at * crossings.parts > most * (1 if crossings.parts == 1 else _UNEVEN):
+    if crossings.looked_at > (most := max(_MOST_LOOKS, _LOOKS * len(faces.original))):
         raise TooMany(most, "faces")
-    if "sieve" not in vars(faces) and crossings.looked_at * crossings.parts * _SPARSE < faces.corners.shape[1]:
-        some, at = np.unique(np.concatenate([i, j]), return_inverse=True)
-        sieve, at = _sieve(faces, some), at.reshape(2, -1)
-    else:
-        sieve, at = faces.sieve, (i, j)
-    for start in range(0, len(i), _PAIRS):
-        rows = slice(start, start + _PAIRS)
-        state[rows], shared[rows] = _sieved(faces, sieve, (i[rows], j[rows]), at[0][rows], at[1][rows])
-    if faces.several:
-        some = np.flatnonzero((state == _FLUSH) | ((state == _APART) & (shared > 0)))
-        _contacts(faces, i[some], j[some], crossings)
+    blocks = [slice(start, start + _PAIRS) for start in range(0, len(i), _PAIRS)]
+    sieved = [_sieved(faces, i[block], j[block]) for block in blocks]
+    open_, flush, shared = (np.concatenate(part) for part in zip(*sieved, strict=True))
     twice = np.flatnonzero(shared == 3)  # in one place: a face that the file lists twice, or another one
-    if faces.places is not faces.corners:
+    if faces.planes.ids is not faces.corners:
         twice = twice[_common(*(faces.corners.take(f[twice], axis=1) for f in (i, j))) == 3]
-    state[twice] = _APART
+    open_[twice] = False
     if faces.several:
-        _note(faces, i, j, twice, crossings.contact)
-    left = np.flatnonzero(state == _OPEN)
+        some = np.flatnonzero(~open_ & (shared > 0))
+        crossings.contact.add(faces.shell, i[some], j[some])
+        some = np.flatnonzero(flush)
+        some = some[crossings.contact.unknown(faces.shell, i[some], j[some])]
+        touch = some[predicates.meet(*(faces.vertices[faces.corners[:, f[some]].T] for f in (i, j))).touches]
+        crossings.contact.add(faces.shell, i[touch], j[touch])
+    left = np.flatnonzero(open_)
     _decide_exactly(faces, i[left], j[left], shared[left], crossings)
 
 
-def _sieved(faces: Faces, sieve: Sieve, pair: tuple[Ints, Ints], i: Ints, j: Ints) -> tuple[Ints, Ints]:
-    """Return the state of pairs by boxes and planes, and how many corners the faces share of those boxes leave open.
-
-    i, j are what the `sieve` calls the faces of the pairs.
-    """
-    state, shared = np.zeros((2, len(i)), np.int8)
-    state[sieve.boxes.touching(i, j)] = _FLUSH
-    rows = np.flatnonzero(state == _OPEN)
-    i, j, planes = i[rows], j[rows], sieve.planes
-    ids_a, ids_b = (planes.vertices(f) for f in (i, j))
-    shared[rows] = common = _common(ids_a, ids_b)
+def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Bools, Bools, Ints]:
+    """Return which pairs of faces may cross or overlap, which others may touch, and how many corners they share."""
+    planes = faces.planes
+    ids_a, ids_b = planes.vertices(i), planes.vertices(j)
+    common = _common(ids_a, ids_b)
     clear = planes.one_side(i, ids_b, common)
     left = np.flatnonzero(~clear)
     clear[left] = planes.one_side(j[left], ids_a.take(left, axis=1), common[left])
     # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
     edge = np.flatnonzero((common >= 2) & ~clear)
     if len(edge):
-        open_ = facing(faces, *(f[rows[edge]] for f in pair)) > 0
+        clear[edge] = facing(faces, i[edge], j[edge]) > 0
         if faces.doubled:
-            open_ &= ~run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
-        clear[edge] = open_
+            clear[edge] &= ~run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
     left = np.flatnonzero(~clear & (common < 3))
     a, b = (planes.corners(ids.take(left, axis=1)) for ids in (ids_a, ids_b))
+    flush = np.zeros(len(i), bool)
+    flush[left] = clear[left] = below = _flush(a, b)
+    rest = np.flatnonzero(~below)
+    left, a, b = left[rest], a.take(rest, axis=2), b.take(rest, axis=2)
     clear[left] = planes.seen_apart(i[left], a, b, common[left])
-    state[rows[clear]] = _APART
-    return state, shared
+    return ~clear, flush & (common == 0), common
+
+
+def _flush(a: Floats, b: Floats) -> Bools:
+    """Return which faces (corner, axis, n) lie to either side of a level plane and can do no more than touch there.
+
+    The plane holds four corners at most, so no side of one lies in it with all of the other.
+    """
+    flush = np.zeros(a.shape[2], bool)
+    for one, other in ((a, b), (b, a)):
+        high, low = one.max(axis=0), other.min(axis=0)
+        there = np.count_nonzero(one == high, axis=0) + np.count_nonzero(other == low, axis=0)
+        flush |= ((high < low) | ((high == low) & (there <= 4))).any(axis=0)
+    return flush
 
 
 def _common(a: Ints, b: Ints) -> Ints:
@@ -379,35 +311,6 @@ def _common(a: Ints, b: Ints) -> Ints:
         for m in range(3):
             shared += a[k] == b[m]
     return shared
-
-
-def _contacts(faces: Faces, i: Ints, j: Ints, crossings: Crossings) -> None:
-    """Note the shells that meet, of pairs of faces that can do no more than touch; those that share a corner do."""
-    contact = crossings.contact
-    one, other = faces.shell.take(i), faces.shell.take(j)
-    apart = np.flatnonzero(one != other)
-    keys = contact.keys(one.take(apart), other.take(apart))
-    asked = contact.open(keys)
-    i, j, keys = i[apart[asked]], j[apart[asked]], keys[asked]
-    asked = np.arange(len(keys))
-    if not contact.every:  # mostly the first pair of two shells shares a corner, and the others need no look
-        first = contact.foremost(keys)
-        first = first[_sharing(faces, i[first], j[first])]
-        contact.add(keys[first], np.stack([i[first], j[first]], axis=1))
-        asked = contact.open(keys)
-    sharing = _sharing(faces, i[asked], j[asked])
-    some = asked[sharing]
-    contact.add(keys[some], np.stack([i[some], j[some]], axis=1))
-    some = asked[~sharing]
-    some = some[contact.open(keys[some])]
-    a, b = (faces.vertices[faces.corners[:, f[some]].T] for f in (i, j))
-    some = some[predicates.meet(a, b).touches]
-    contact.add(keys[some], np.stack([i[some], j[some]], axis=1))
-
-
-def _sharing(faces: Faces, i: Ints, j: Ints) -> Bools:
-    """Return which pairs of faces have a corner in one place."""
-    return _common(faces.places.take(i, axis=1), faces.places.take(j, axis=1)) > 0
 
 
 def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Crossings) -> None:
@@ -423,7 +326,7 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Cro
     crossings.covering.append(pair[wide[wide_pairs(a[wide], b[wide])]])
     if faces.several:
         meets[some] |= meeting.touches | meeting.crosses
-        _note(faces, i, j, np.flatnonzero(meets), crossings.contact)
+        crossings.contact.add(faces.shell, i[meets], j[meets])
     crossing = some[meeting.crosses & (shared[some] < 2)]
     crossings.crossing.append(pair[crossing])
     crossings.kept += len(crossing) + len(wide)
@@ -438,19 +341,9 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Cro
         crossings.leaning.append(_edges_inside(faces, face, holder, one, other, sides))
 
 
-def _note(faces: Faces, i: Ints, j: Ints, some: Ints, contact: Contacts) -> None:
-    """Note the shells of `some` pairs of faces, which meet."""
-    if contact.full:
-        return
-    one, other = faces.shell.take(i[some]), faces.shell.take(j[some])
-    apart = np.flatnonzero(one != other)
-    some, keys = some[apart], contact.keys(one[apart], other[apart])
-    contact.add(keys, np.stack([i[some], j[some]], axis=1))
-
-
 def facing(faces: Faces, i: Ints, j: Ints) -> Floats:
     """Return the product of both faces' normals: positive where they look the same way."""
-    return np.einsum("ij,ij->j", faces.normal.take(i, axis=1), faces.normal.take(j, axis=1))
+    return np.einsum("ij,ij->j", faces.planes.normal.take(i, axis=1), faces.planes.normal.take(j, axis=1))
 
 
 def _edges_inside(faces: Faces, face: Ints, holder: Ints, one: Floats, other: Floats, sides: Ints) -> Ints:
@@ -469,13 +362,9 @@ def _edges_inside(faces: Faces, face: Ints, holder: Ints, one: Floats, other: Fl
     return np.column_stack([holder, ends, sides[kept, free[kept]], face]).astype(np.int64)
 
 
-def _leaning(faces: Faces, crossings: Crossings) -> None:
-    """Return edges that lie in a face with their two faces on both sides of it: crossings through an edge."""
-    if not crossings.leaning:
-        return
-    rows = np.concatenate(crossings.leaning)
-    if not len(rows):
-        return
+def _leaning(crossings: Crossings) -> None:
+    """Add edges that lie in a face with their two faces on both sides of it: crossings through an edge."""
+    rows = np.concatenate([np.empty((0, 5), np.int64), *crossings.leaning])
     rows = rows[np.lexsort(rows.T[[3, 2, 1, 0]])]
     same = (rows[1:, :3] == rows[:-1, :3]).all(axis=1) & (rows[1:, 3] != rows[:-1, 3])
     through = np.flatnonzero(same)

@@ -5,8 +5,7 @@ that a, b, c turn anticlockwise), zero if all four are coplanar. The filter's bo
 differences that are rounded themselves.
 
 The rest is small relative to its terms. In whole numbers, 64-bit arithmetic gives it modulo 2**64; if its bound is less
-than half of that, it is known. Elsewhere pairs of floats (Dekker, 1971) narrow the bound. Python's integers decide the
-rest: coordinates of very different size.
+than half of that, it is known. Python's integers decide the others.
 
 Triangles that are not coplanar: Devillers and Guigue, "Faster triangle-triangle intersection tests" (INRIA RR-4488,
 2002): on the line of the two planes each triangle cuts an interval; two determinants compare the intervals' ends. Both
@@ -25,7 +24,6 @@ from unitcad.geometry.arrays import Bools, Floats, Ints, cross
 
 _EPS = np.finfo(np.float64).eps / 2
 _BOUND = {2: (3.0 + 16.0 * _EPS) * _EPS, 3: (7.0 + 56.0 * _EPS) * _EPS}  # of the sum of the terms' sizes, by axes
-_PAIR_BOUND = 64 * _EPS * _EPS  # the same for pairs: at most five operations in a row, each off by 8 EPS**2 at most
 _TINY = 1e-270  # more than underflow takes from a determinant of coordinates that fit single precision
 _HALF = 2.0**62
 _ZERO = 10_000  # stands for the exponent of the lowest bit of 0
@@ -122,16 +120,6 @@ def _exact(points: Floats, size: Floats) -> Ints:
     points, size = points.take(left, axis=2), size[left]
     known, signs = _modular(points, 2 * (_BOUND[points.shape[1]] * size + _TINY))
     sign[left[known]] = signs
-    if known.all():
-        return sign
-    left, points, size = left[~known], points.compress(~known, axis=2), size[~known]
-    value = _determinant([[_Pair.difference(x, y) for x, y in zip(p, points[-1], strict=True)] for p in points[:-1]])
-    bound = _PAIR_BOUND * size + _TINY
-    sign[left] = np.sign(value.high)
-    unsure = np.flatnonzero(np.abs(value.high) <= bound)
-    left, points, bound = left[unsure], points.take(unsure, axis=2), bound[unsure]
-    known, signs = _modular(points, 2 * bound)
-    sign[left[known]] = signs
     if not known.all():
         whole = integers(points.compress(~known, axis=2))
         sign[left[~known]] = np.sign(_determinant(whole[:-1] - whole[-1])).astype(np.int8)
@@ -163,44 +151,6 @@ def integers(values: Floats) -> np.ndarray:
     digits = (mantissa * 2.0**53).astype(np.int64)
     shift = np.where(digits == 0, 0, exponent - exponent.min(initial=_ZERO, where=digits != 0))
     return digits.astype(object) << shift.astype(object)
-
-
-class _Pair:
-    """Numbers as sums high + low, low at most half the last bit of high; sums and products are off by 8 EPS**2."""
-
-    def __init__(self, high: Floats, low: Floats) -> None:
-        self.high = high + low
-        self.low = low - (self.high - high)
-
-    @classmethod
-    def difference(cls, a: Floats, b: Floats) -> _Pair:
-        """Return the difference of two floats, exact (Shewchuk 1997, two-diff)."""
-        high = a - b
-        virtual = a - high
-        return cls(high, (a - (high + virtual)) + (virtual - b))
-
-    def __neg__(self) -> _Pair:
-        return _Pair(-self.high, -self.low)
-
-    def __sub__(self, other: _Pair) -> _Pair:
-        return self + -other
-
-    def __add__(self, other: _Pair) -> _Pair:
-        high = self.high + other.high
-        virtual = high - self.high
-        return _Pair(high, (self.high - (high - virtual)) + (other.high - virtual) + (self.low + other.low))
-
-    def __mul__(self, other: _Pair) -> _Pair:
-        product = self.high * other.high
-        (a, b), (c, d) = _halves(self.high), _halves(other.high)
-        rest = b * d - (((product - a * c) - b * c) - a * d)  # exact (Dekker's product)
-        return _Pair(product, rest + (self.high * other.low + self.low * other.high))
-
-
-def _halves(value: Floats) -> tuple[Floats, Floats]:
-    scaled = value * 134_217_729.0  # 2 ** 27 + 1
-    high = scaled - (scaled - value)
-    return high, value - high
 
 
 _PAIRS = 1 << 13  # pairs whose corners stay in the processor's cache

@@ -10,39 +10,28 @@ from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.geometry.boxes import Tick, boxes_of, frame_of, meeting_between, morton_order
 from unitcad.meshcheck.geometry.topology import Topology, max_side_squared
 
-_FACES = 1 << 13  # faces whose corners stay in the processor's cache
+_FACES = 1 << 13  # faces looked at together
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def winding_number(vertices: Floats, faces: Ints, point: Floats) -> int:
-    """Count how often a closed surface winds round `point`: the sum of solid angles over 4 pi (Van Oosterom, 1983)."""
-    total = 0.0
-    for start in range(0, len(faces), _FACES):
-        block = faces[start : start + _FACES]
-        total += float(_half_angles(vertices, block, np.broadcast_to(point, (len(block), 3))).sum())
-    return round(total / (2 * np.pi))
-
-
 def winding_numbers(vertices: Floats, faces: Ints, first: Ints, count: Ints, points: Floats, tick: Tick) -> Ints:
-    """Return the same for points (n, 3), of each the surface of the `count` faces from `first` on."""
-    numbers, ends = np.zeros(len(points), np.int64), np.cumsum(count)
-    start = 0
+    """Return how often closed surfaces wind round points (n, 3), of each the surface of `count` faces from `first` on.
+
+    It is the sum of solid angles over 4 pi (Van Oosterom, 1983).
+    """
+    numbers, ends, start = np.zeros(len(points), np.int64), np.cumsum(count), 0
     while start < len(points):
         tick()
-        stop = max(int(np.searchsorted(ends, ends[start] - count[start] + _FACES, "right")), start + 1)
-        if stop == start + 1:
-            surface = faces[first[start] : first[start] + count[start]]
-            numbers[start] = winding_number(vertices, surface, points[start])
-        else:
-            row = np.repeat(np.arange(start, stop), count[start:stop])
-            place = np.arange(len(row)) - np.repeat(
-                ends[start:stop] - count[start:stop] - ends[start] + count[start], count[start:stop]
-            )
-            angles = _half_angles(vertices, faces[first[row] + place], points[row])
-            numbers[start:stop] = np.round(np.bincount(row - start, angles, stop - start) / (2 * np.pi))
+        before = ends[start] - count[start]
+        stop = max(int(np.searchsorted(ends, before + _FACES, "right")), start + 1)
+        some = count[start:stop]
+        row = np.repeat(np.arange(start, stop), some)
+        place = np.arange(len(row)) - np.repeat(ends[start:stop] - some - before, some)
+        angles = _half_angles(vertices, faces[first[row] + place], points[row])
+        numbers[start:stop] = np.round(np.bincount(row - start, angles, stop - start) / (2 * np.pi))
         start = stop
     return numbers
 
@@ -65,7 +54,6 @@ SLACK = 0.995  # of the floor: a wall drawn at the floor passes after rounding a
 _SAMPLES = 40_000
 _FINEST = 6  # a face has at most _FINEST (_FINEST + 1) / 2 points
 _ROUNDING_MM = 1e-6
-_BLOCKS, _POINTS = 4, 2048  # a look at the faces may take so many blocks of box pairs, and one for so many points
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +86,7 @@ def cast(topology: Topology, floors: tuple[float, float], least: float, tick: Ti
     floor = np.where(lying(topology), level, upright) * SLACK
     reach = np.maximum(floor, least)
     solid = np.flatnonzero(sound)
-    seeing = _seeing(corners, normal, solid, reach, len(points), tick)
-    return Rays(points, owner, floor[owner], *_behind(corners, normal, solid, points, owner, reach, seeing, tick))
+    return Rays(points, owner, floor[owner], *_behind(corners, normal, solid, points, owner, reach, tick))
 
 
 def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float) -> tuple[Floats, Ints]:
@@ -119,47 +106,6 @@ def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float)
     return np.concatenate(points), np.concatenate(owner)
 
 
-class _Many(Exception):
-    """Box pairs so many that rays alone are cast in less time."""
-
-
-def _seeing(corners: Floats, normal: Floats, solid: Ints, reach: Floats, points: int, tick: Tick) -> Bools:
-    """Return which faces, of `solid` ones, may see an opposed face within `reach` behind them: no ray of others hits.
-
-    Most see none. All of them where the boxes of so many meet that the rays of all `points` are cast in less time.
-    """
-    seeing = np.zeros(len(corners), bool)
-    if not len(solid):
-        return seeing
-    blocks = _BLOCKS + points // _POINTS
-
-    def counted() -> None:
-        nonlocal blocks
-        tick()
-        blocks -= 1
-        if not blocks:
-            raise _Many
-
-    swept = corners[solid] - (normal * reach[:, None])[solid, None]
-    places = np.concatenate([corners[solid], swept]).reshape(-1, 3)
-    steps = frame_of(places).steps(places)
-    first = 3 * np.arange(len(solid))
-    order = morton_order(steps, first)
-    first, by_place = first[order], solid[order]
-    here = [first + k for k in range(3)]
-    there = [corner + 3 * len(solid) for corner in here]
-    try:
-        for i, j in meeting_between(boxes_of(steps, *here, *there), boxes_of(steps, *here), counted):
-            face, other = by_place[i], by_place[j]
-            opposed = np.einsum("ij,ij->i", normal[face], normal[other]) < -OPPOSED
-            face, other = face[opposed], other[opposed]
-            away = np.einsum("ikx,ix->ik", corners[other] - corners[face, :1], normal[face])
-            seeing[face[(away.min(axis=1) < 0.0) & (away.max(axis=1) > -reach[face] - _ROUNDING_MM)]] = True
-    except _Many:
-        seeing[solid] = True
-    return seeing
-
-
 def _behind(
     corners: Floats,
     normal: Floats,
@@ -167,30 +113,25 @@ def _behind(
     points: Floats,
     owner: Ints,
     reach: Floats,
-    seeing: Bools,
     tick: Tick,
 ) -> tuple[Floats, Floats, Ints]:
-    """Return distances from each point of the faces `seeing`, against its normal, and the face across, as `Rays` has.
-
-    reach (m,): of each face.
-    """
-    thickness, behind = np.full((2, len(points)), np.inf)
-    across = np.full(len(points), -1)
-    which = np.flatnonzero(seeing[owner])
-    if not len(which):
+    """Return distances from each point, against its face's normal, and the face across, as `Rays` has; `reach` (m,)."""
+    n, m = len(points), len(solid)
+    thickness, behind = np.full((2, n), np.inf)
+    across = np.full(n, -1)
+    if not n:
         return thickness, behind, across
-    ends = points[which] - (normal * reach[:, None])[owner[which]]
-    places = np.concatenate([points[which], ends, corners[solid].reshape(-1, 3)])
+    ends = points - (normal * reach[:, None])[owner]
+    places = np.concatenate([points, ends, corners[solid].reshape(-1, 3)])
     steps = frame_of(places).steps(places)
-    n, m = len(which), len(solid)
     order = morton_order(steps, np.arange(n))
-    rays, by_curve = boxes_of(steps, order, order + n), which[order]
+    rays = boxes_of(steps, order, order + n)
     first = 2 * n + 3 * np.arange(m)
     order_faces = morton_order(steps, first)
     first, by_place = first[order_faces], solid[order_faces]
     faces = boxes_of(steps, first, first + 1, first + 2)
     for i, j in meeting_between(rays, faces, tick):
-        ray, face = by_curve[i], by_place[j]
+        ray, face = order[i], by_place[j]
         facing = np.einsum("ij,ij->i", normal[owner[ray]], normal[face])
         opposed = facing < -OPPOSED
         ray, face, facing = ray[opposed], face[opposed], facing[opposed]

@@ -5,10 +5,8 @@ A half-edge is 3 * face + side; side k runs from corner k to corner k + 1. Every
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +14,6 @@ from unitcad.geometry.arrays import (
     Bools,
     Floats,
     Ints,
-    by_appearance,
     cross,
     distinct,
     extent,
@@ -24,7 +21,7 @@ from unitcad.geometry.arrays import (
     order_of_packed,
     sorted_with_order,
 )
-from unitcad.geometry.boxes import Tick, box_pairs
+from unitcad.geometry.boxes import Tick
 from unitcad.geometry.components import components
 from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_steps, same_place
 
@@ -138,21 +135,13 @@ def surrounded(edges: Edges, n_vertices: int) -> Bools:
     return whole
 
 
-def pinched_closed(faces: Ints, across: Ints, n_vertices: int) -> Ints:
-    """Return vertices of a closed, consistently wound mesh whose faces form more than one fan."""
-    return np.flatnonzero(_fans(faces, across, np.ones(n_vertices, bool)) > 1).astype(np.int32)
-
-
-def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
-    """Return such vertices of any mesh, without those of edges that have more than two faces.
-
-    Fans are joined across edges of two faces.
-    """
+def pinched_vertices(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
+    """Return vertices whose faces form more than one fan, but for those of edges that have more than two faces."""
     whole = surrounded(edges, n_vertices)
-    rest, many = ~whole, edges.size > 2
-    rest[edges.low[many]] = rest[edges.high[many]] = False
     several = _fans(faces, opposite(edges, 3 * len(faces)), whole) > 1
-    if rest.any():
+    if not whole.all():
+        rest, many = ~whole, edges.size > 2
+        rest[edges.low[many]] = rest[edges.high[many]] = False
         first = edges.first[(edges.size == 2) & (rest[edges.low] | rest[edges.high])]
         start = np.ascontiguousarray(faces).reshape(-1)
         several |= _joined_fans(start, edges.order[first], edges.order[first + 1], rest) > 1
@@ -215,17 +204,6 @@ def shells_of(faces: Ints, edges: Edges, turns: Turns | None) -> Ints:
     return components(len(faces), left // 3, right // 3)
 
 
-def shells_by_vertex(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
-    """Return the same where no vertex has faces of two shells."""
-    shells = components(n_vertices, edges.low, edges.high).take(faces[:, 0])
-    n = int(shells.max(initial=0)) + 1
-    if n == 1:
-        return shells
-    first = np.full(n, len(shells))  # of a vertex that no face uses: after all
-    first[shells[::-1]] = np.arange(len(shells))[::-1]
-    return by_appearance(first, len(shells) + 1)[1].take(shells)
-
-
 def turns_of(vertices: Floats, faces: Ints, edges: Edges) -> Turns | None:
     """Return the turns at the edges of four, six and so on faces that are balanced; None where there are none."""
     if edges.closed:
@@ -252,20 +230,11 @@ def _around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> Turns:
     angle = np.arctan2(np.einsum("ij,ij->i", cross(zero, out), axis), np.einsum("ij,ij->i", zero, out))
     angle[angle < -_SAME_ANGLE] += 2 * np.pi
     angle[angle > 2 * np.pi - _SAME_ANGLE] -= 2 * np.pi
-    order = _order_within(size, starts, angle)
+    order = np.lexsort((angle, group))
     angle, half, ends = angle[order], half[order], ends[order]
     fresh = np.diff(angle, prepend=-np.inf) > _SAME_ANGLE
     fresh[starts] = True
     return Turns(many, half, group, ends, np.cumsum(fresh, dtype=np.int32) - np.int32(1))
-
-
-def _order_within(size: Ints, starts: Ints, values: Floats) -> Ints:
-    """Return the order of values by size within each of some groups that follow each other; equal ones stay."""
-    order = np.arange(len(values))
-    for n in np.unique(size).tolist():
-        places = starts[size == n][:, None] + np.arange(n)
-        order[places] = np.take_along_axis(places, np.argsort(values[places], axis=1, kind="stable"), axis=1)
-    return order
 
 
 def _paired(edges: Edges, turns: Turns) -> tuple[Ints, Ints]:
@@ -295,9 +264,8 @@ def _paired(edges: Edges, turns: Turns) -> tuple[Ints, Ints]:
 
 WELD = 1e-5  # of the shell's diagonal
 NARROW = 0.1  # of the shortest edge at a vertex
+_FEW = 500  # points whose pairs are all looked at in less time than a tree takes to load
 _CROWD = 30  # points within reach of a vertex, itself too: more means points that lie everywhere, not a seam
-_BLOCK = 1024  # pairs of boxes looked at: of so many for each of a crowd the rest is not looked at
-_BLOCKS = 64  # blocks that a few points may take
 
 
 @dataclass(frozen=True)
@@ -383,41 +351,27 @@ def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
     level = np.ceil(np.log2(np.maximum(reach, 1e-300)) / 2)
     for size in np.unique(level):
         some = np.flatnonzero(level >= size)
-        if len(some) > 1:
-            pairs = some[_within(points[some], float(4.0**size))]
-            near.append(pairs[level[pairs].min(axis=1, initial=np.inf) == size])
+        pairs = some[_within(points[some], float(4.0**size))]
+        near.append(pairs[level[pairs].min(axis=1, initial=np.inf) == size])
     pairs = np.concatenate(near)
     distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
     return pairs[fits], distance[fits]
 
 
-class _Crowd(Exception):
-    """Points that lie close on the scale of all of them."""
-
-
 def _within(points: Floats, reach: float) -> Ints:
     """Return pairs (k, 2) of points no farther from each other than `reach`; none of a crowd."""
     n = len(points)
-    blocks = iter(range(_BLOCKS + _CROWD * n // _BLOCK))
+    if n <= _FEW:
+        pairs = np.stack(np.triu_indices(n, 1), axis=1)
+        pairs = pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
+        return pairs if n + 2 * len(pairs) <= _CROWD * n else pairs[:0]
+    from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
-    def tick() -> None:
-        if next(blocks, None) is None:
-            raise _Crowd
-
-    try:
-        half = 0.5000001 * reach
-        pairs = box_pairs(points - half, points + half, tick)
-    except _Crowd:
-        # The boxes' steps are too coarse for them.
-        from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
-
-        tree = cKDTree(points)
-        if tree.count_neighbors(tree, reach) > _CROWD * n:
-            return np.empty((0, 2), np.int64)
-        return tree.query_pairs(reach, output_type="ndarray")
-    pairs = pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
-    return pairs if n + 2 * len(pairs) <= _CROWD * n else pairs[:0]
+    tree = cKDTree(points)
+    if tree.count_neighbors(tree, reach) > _CROWD * n:
+        return np.empty((0, 2), np.int64)
+    return tree.query_pairs(reach, output_type="ndarray")
 
 
 def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
@@ -504,10 +458,6 @@ def side_by_side(one: Floats, other: Floats) -> Bools:
     return np.asarray((one * other > 0) | ((one * other < 0) & (one + other < -1e-9 * np.abs(one))))
 
 
-Found = tuple[Any, ...]
-"""Some of what a `Topology` has beside its surface."""
-
-
 @dataclass(frozen=True, eq=False)
 class OpenEdges:
     """Edges of one face, before vertices were welded and after it.
@@ -524,12 +474,16 @@ class OpenEdges:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """A mesh without degenerate faces whose open edges are welded.
+class Topology:
+    """A mesh without degenerate faces whose open edges are welded, and what follows from its edges.
 
     `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2. `stored` are the faces before welding
     moved any, with vertices in one place joined. `repeated` are the file's faces that use a vertex twice, `unused`
     counts vertices that no face uses, `opened` has the edges of one face, if any.
+    `shells` labels faces, `turns` has those round edges of four and more. `low` and `high`: each shell's box, mm;
+    `volumes`: what it encloses, mm3, below zero where its faces look inwards; `closed`: whether it has an inside.
+    `pinched` are vertices of several fans, `twice` faces with the vertices of another one, `unbalanced` edges of an
+    even number of faces along which more run one way than the other.
     """
 
     mesh: Mesh
@@ -540,25 +494,6 @@ class Surface:
     repeated: Ints
     unused: int
     opened: OpenEdges | None
-
-    @cached_property
-    def stored_areas(self) -> Floats:
-        """Twice the area vectors of the faces as stored, mm2."""
-        if self.stored is self.mesh.faces:
-            return self.areas
-        return area_vectors(self.mesh.vertices, self.stored)
-
-
-@dataclass(frozen=True, eq=False)
-class Topology(Surface):
-    """A surface, and what follows from its edges.
-
-    `shells` labels faces, `turns` has those round edges of four and more. `low` and `high`: each shell's box, mm;
-    `volumes`: what it encloses, mm3, below zero where its faces look inwards; `closed`: whether it has an inside.
-    `pinched` are vertices of several fans, `twice` faces with the vertices of another one, `unbalanced` edges of an
-    even number of faces along which more run one way than the other.
-    """
-
     turns: Turns | None
     shells: Ints
     n_shells: int
@@ -569,6 +504,11 @@ class Topology(Surface):
     pinched: Ints
     twice: Ints
     unbalanced: Ints
+
+    @cached_property
+    def stored_areas(self) -> Floats:
+        """Twice the area vectors of the faces as stored, mm2."""
+        return self.areas if self.stored is self.mesh.faces else area_vectors(self.mesh.vertices, self.stored)
 
     @cached_property
     def watertight(self) -> bool:
@@ -582,16 +522,10 @@ class Topology(Surface):
 
 
 def topology_of(mesh: Mesh, tick: Tick) -> Topology:
-    """Work out the topology of a mesh with finite vertices."""
-    surface = surface_of(mesh, tick)
-    return topology_on(surface, [work(surface, tick) for work in works_on(surface)], tick)
-
-
-def surface_of(mesh: Mesh, tick: Tick) -> Surface:
-    """Work out the edges and areas of a mesh with finite vertices, and weld what is open."""
+    """Work out the topology of a mesh with finite vertices; open edges are welded first."""
     mesh, unused = _referenced(mesh) if mesh.indexed else (mesh, 0)
     faces, vertices = mesh.faces, mesh.vertices
-    repeated = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+    repeated = ~_three(faces)
     kept = np.arange(len(faces), dtype=np.int32)
     if repeated.any():
         kept = np.flatnonzero(~repeated).astype(np.int32)
@@ -601,87 +535,41 @@ def surface_of(mesh: Mesh, tick: Tick) -> Surface:
     stored, opened = faces, None
     if not edges.closed and (edges.size == 1).any():
         faces, stored, kept, edges, opened = _welded(vertices, faces, kept, edges)
+        tick()
+    areas, turns = area_vectors(vertices, faces), turns_of(vertices, faces, edges)
     tick()
-    areas, mesh = area_vectors(vertices, faces), replace(mesh, faces=faces, normals=None)
-    tick()
-    return Surface(mesh, kept, edges, areas, stored, np.flatnonzero(repeated), unused, opened)
-
-
-def works_on(surface: Surface) -> list[Callable[[Surface, Tick], Found]]:
-    """Return what is to be worked out for `topology_on`, each alone."""
-    return [_by_vertex, _pinched_and_twice_of_closed] if surface.edges.closed else [_by_shell, _pinched_and_twice]
-
-
-def topology_on(surface: Surface, found: Sequence[Found], tick: Tick) -> Topology:
-    """Return the topology of a surface from the results of `works_on`."""
-    by_shell, (pinched, twice, same) = found
-    if surface.edges.closed and len(pinched):
-        by_shell = _by_shell(surface, tick)
-    turns, shells, low, high, volume, closed = by_shell
-    if same is not None and len(twice):
-        twice = np.setdiff1d(twice, _facing(same[0], same[1], surface.areas, shells, volume * closed))
-    edges, unbalanced = surface.edges, np.empty(0, int)
-    if not edges.closed:
-        unbalanced = np.flatnonzero((edges.size % 2 == 0) & ~edges.balanced)
-    return Topology(
-        **{each.name: getattr(surface, each.name) for each in fields(surface)},
-        turns=turns,
-        shells=shells,
-        n_shells=len(low),
-        low=low,
-        high=high,
-        volumes=volume,
-        closed=closed,
-        pinched=pinched,
-        twice=twice,
-        unbalanced=unbalanced,
-    )
-
-
-def _by_vertex(surface: Surface, tick: Tick) -> Found:
-    """Return what `_by_shell` does of a surface whose edges have two faces each, wound alike, if no vertex is pinched.
-
-    Then faces with a common vertex are of one shell, and there are half as many vertices as faces.
-    """
-    shells = shells_by_vertex(surface.mesh.faces, surface.edges, len(surface.mesh.vertices))
-    return None, *_of_shells(surface, shells, tick)
-
-
-def _pinched_and_twice_of_closed(surface: Surface, tick: Tick) -> Found:
-    """Return what `_pinched_and_twice` does of a surface whose edges have two faces each, wound alike."""
-    faces = surface.mesh.faces
-    across = opposite(surface.edges, 3 * len(faces))
-    tick()
-    pinched = pinched_closed(faces, across, len(surface.mesh.vertices))
-    return pinched, np.flatnonzero(across[0::3] // 3 == across[1::3] // 3), None
-
-
-def _by_shell(surface: Surface, tick: Tick) -> Found:
-    """Return `turns`, `shells`, `low`, `high`, `volumes` and `closed` of a `Topology`."""
-    vertices, faces, edges = surface.mesh.vertices, surface.mesh.faces, surface.edges
-    turns = turns_of(vertices, faces, edges)
-    return turns, *_of_shells(surface, shells_of(faces, edges, turns), tick)
-
-
-def _of_shells(surface: Surface, shells: Ints, tick: Tick) -> tuple[Ints, Floats, Floats, Floats, Bools]:
-    """Return `shells`, `low`, `high`, `volumes` and `closed` of a `Topology`."""
-    vertices, faces = surface.mesh.vertices, surface.mesh.faces
+    shells = shells_of(faces, edges, turns)
     tick()
     low, high = _boxes(vertices, faces, shells)
-    volume = signed_volumes(vertices, faces, surface.areas, shells, len(low))
-    return shells, low, high, volume, closed_shells(surface.edges, shells, len(low))
-
-
-def _pinched_and_twice(surface: Surface, tick: Tick) -> Found:
-    """Return the vertices of several fans, the faces with the vertices of others, and `_same_vertices`.
-
-    Shells that touch in a face are among the faces still.
-    """
-    faces = surface.mesh.faces
-    pinched = pinched_open(faces, surface.edges, len(surface.mesh.vertices))
+    n = len(low)
+    volumes, closed = signed_volumes(vertices, faces, areas, shells, n), closed_shells(edges, shells, n)
     tick()
-    same = _same_vertices(faces)
-    return pinched, np.sort(same[0][same[1]]), same
+    pinched = pinched_vertices(faces, edges, len(vertices))
+    tick()
+    order, same = _same_vertices(faces)
+    twice = np.sort(order[same | np.append(same[1:], False)] if edges.closed else order[same])
+    if len(twice):
+        twice = np.setdiff1d(twice, _facing(order, same, areas, shells, volumes * closed))
+    return Topology(
+        replace(mesh, faces=faces, normals=None),
+        kept,
+        edges,
+        areas,
+        stored,
+        np.flatnonzero(repeated),
+        unused,
+        opened,
+        turns,
+        shells,
+        n,
+        low,
+        high,
+        volumes,
+        closed,
+        pinched,
+        twice,
+        np.empty(0, int) if edges.closed else np.flatnonzero((edges.size % 2 == 0) & ~edges.balanced),
+    )
 
 
 def _referenced(mesh: Mesh) -> tuple[Mesh, int]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from unitcad.meshcheck.findings import Finding, counted, number
-from unitcad.meshcheck.geometry.rays import winding_number
+from unitcad.meshcheck.geometry.rays import winding_numbers
 from unitcad.meshcheck.geometry.topology import Topology
 from unitcad.meshcheck.rules.inspection import Inspection, Printer, at_region
 from unitcad.meshcheck.rules.registry import Rule
@@ -38,7 +38,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     """Apply the rules; D004 needs a mesh that has an inside."""
     yield from _stands(part.topology)
     if part.solid:
-        yield from _trapped(part.topology)
+        yield from _trapped(part)
 
 
 def _stands(topology: Topology) -> Iterator[Finding]:
@@ -63,16 +63,16 @@ def _stands(topology: Topology) -> Iterator[Finding]:
         yield D005.finding(message, len(places), places)
 
 
-def _trapped(topology: Topology) -> Iterator[Finding]:
+def _trapped(part: Inspection) -> Iterator[Finding]:
     """Apply D004: shells that face inwards inside another one."""
-    if topology.n_shells < 2:
-        return
+    topology = part.topology
     volumes, low, high = topology.volumes, topology.low, topology.high
     faces, vertices = topology.mesh.faces, topology.mesh.vertices
     places = []
     for i in np.flatnonzero(volumes < 0)[:50]:
         own = topology.shells == i
-        if winding_number(vertices, faces[~own], vertices[faces[np.argmax(own), 0]]) > 0:
+        others, at = faces[~own], vertices[faces[np.argmax(own)][:1]]
+        if winding_numbers(vertices, others, np.array([0]), np.array([len(others)]), at, part.tick)[0] > 0:
             places.append(at_region(topology.kept[own], (low[i] + high[i]) / 2))
     if places:
         yield D004.finding(f"{counted(len(places), 'hollow')} without an opening", len(places), places)

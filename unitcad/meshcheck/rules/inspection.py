@@ -1,20 +1,20 @@
-"""The input of the rules: a mesh, properties of it that several rules need, a printer; and the places of findings."""
+"""The input of the rules: a mesh, properties of it that several rules need, a printer, options; places of findings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol, SupportsFloat
 
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.boxes import Tick
-from unitcad.meshcheck.findings import Location, detail, point
+from unitcad.meshcheck.findings import SHOWN, Location, detail, point
 from unitcad.meshcheck.geometry.crossings import Crossings, crossings_of
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.geometry.rays import Rays, cast
-from unitcad.meshcheck.geometry.sieves import Arranged, Stars, arranged, stars_of
 from unitcad.meshcheck.geometry.topology import Edges, Topology
+from unitcad.meshcheck.rules.f_file import Limits
 
 
 class Printer(Protocol):
@@ -71,8 +71,8 @@ def at_region(faces: Ints, xyz: Floats) -> Location:
 class Inspection:
     """A mesh with finite vertices, as the file has it, with its topology.
 
-    `tick` is called now and then by what takes long; `cross`: whether faces are compared with each other; `ready`: what
-    that needs, where it is known already. `strict`: whether crossings too shallow for a printer are errors.
+    `tick` is called now and then by what takes long; `cross`: whether faces are compared with each other. `strict`:
+    whether crossings too shallow for a printer are errors.
     """
 
     mesh: Mesh
@@ -80,7 +80,6 @@ class Inspection:
     tick: Tick
     cross: bool = True
     printer: Printer | None = None
-    ready: tuple[Arranged, Stars] | None = None
     strict: bool = False
 
     @property
@@ -93,9 +92,7 @@ class Inspection:
         """How its faces meet each other; nothing where they are not compared."""
         if not self.cross or not len(self.topology.kept):
             return Crossings()
-        every = detail().meshes is not None
-        ready, stars = self.ready or (arranged(self.topology), stars_of(self.topology))
-        return crossings_of(self.topology, ready, stars, self.tick, every=every)
+        return crossings_of(self.topology, self.tick, every=detail().meshes is not None)
 
     @cached_property
     def material(self) -> Rays:
@@ -103,3 +100,36 @@ class Inspection:
         assert self.printer is not None
         floors = float(self.printer.least_wall_mm), float(self.printer.least_flat_wall_mm)
         return cast(self.topology, floors, float(self.printer.least_feature_mm), self.tick, side=1)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a check: the rules, the output and the printer.
+
+    `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all. An error
+    that ended the check of a file (not readable, a limit reached, no mesh) is always kept.
+    `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
+    `shells`: the number of shells expected (G005). `cross`: look for self-crossing. `strict`: crossings too shallow for
+    a printer are errors too. `strict_3mf`: content that the 3MF specification forbids and common programs write is an
+    error, not a warning. `unwanted`: prefixes of codes that no select brings back. `locations`: how many are kept of a
+    finding; `draw`: keep meshes with the report.
+    """
+
+    select: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+    unit: str | None = None
+    printer: Printer | None = None
+    shells: int | None = None
+    cross: bool = True
+    strict: bool = False
+    strict_3mf: bool = False
+    limits: Limits = field(default_factory=Limits)
+    unwanted: tuple[str, ...] = ()
+    locations: int = SHOWN
+    draw: bool = False
+
+    def wants(self, code: str) -> bool:
+        """Return whether findings of `code` are reported, unless they ended the check: those always are."""
+        chosen = max((len(p) for p in self.select if code.startswith(p)), default=-1 if self.select else 0)
+        dropped = max((len(p) for p in self.ignore if code.startswith(p)), default=-1)
+        return chosen >= 0 and chosen > dropped and not code.startswith(self.unwanted or ("-",))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-LAB = Path(__file__).parent.parent / "templates" / "lab"
+LAB = Path(__file__).parents[2] / "templates" / "lab"
 CODE = """
 import json, sys
 from pathlib import Path

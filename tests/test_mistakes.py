@@ -1,0 +1,155 @@
+"""Usual mistakes at the command line: each answer names file and line, field, value, limit and a value that works."""
+
+import shlex
+import sys
+
+import pytest
+
+from unitcad import cli
+from unitcad.validation.shipped_files import shipped_files
+
+UNIT = 'name = "unit"\ndesign = "encapsulating"\ndiameter_mm = 14\n'
+LAYER = '[[layers]]\nmaterial = "{}"\nwall_mm = 1.25\ncap_mm = 1.25\n'
+GOOD = UNIT + LAYER.format("ecoflex-00-10") + LAYER.format("dragon-skin-30")
+SILICONES = "ecoflex-00-10, ecoflex-00-30, ecoflex-00-50, dragon-skin-10-medium, dragon-skin-30"
+THIN = "the motor (7), 0.1 of clearance and walls of 2.5 a side need 12.2 mm; nearest accepted: 12.2"
+
+COMMANDS = {
+    "biuld unit.toml": "COMMAND = 'biuld': unknown name; closest: build; nearest accepted: 'build'",
+    "build unit.toml --jobs 4": "--jobs: unknown option; see unitcad build --help",
+    "build unit.toml --format stl": "--format: unknown option; closest: --formats",
+    "build encapsulatng": "SPEC = 'encapsulatng': unknown name; closest: encapsulating, single-encapsulating; "
+    "nearest accepted: 'encapsulating'",
+    "build Embedded": "SPEC = 'Embedded': unknown name; closest: embedded, single-embedded; "
+    "nearest accepted: 'embedded'",
+    "build folder": "SPEC = 'folder': is a folder; name a TOML file in it",
+    "build ./folder": "folder: is a folder, not a regular file",
+    "build part.csv": "SPEC = 'part.csv': is not a TOML file, whose name ends in .toml",
+    "build gone.toml": "gone.toml: no such file",
+    "build empty.toml": "empty.toml: is empty; `unitcad schema spec` lists its keys",
+    "build binary.toml": "binary.toml: not UTF-8 (byte 0)",
+    "build sweep.toml": "sweep.toml: is a file of the kind sweep, not spec",
+    "build target.toml": "target.toml: is a file of the kind target, not spec; unitcad design target.toml takes it",
+    "build unit.toml --set 'diameter_mm 15'": "--set = 'diameter_mm 15': needs the form path=value, such as "
+    "layers.0.wall_mm=1.0",
+    "build unit.toml --set diameter_mm=14,5": "diameter_mm = '14,5': takes a number; nearest accepted: 14.5",
+    "build unit.toml --set diameter_mm=1.45cm": "diameter_mm = '1.45cm': takes a number; nearest accepted: 14.5",
+    "build unit.toml --set diameter_mm=1.4": f"diameter_mm = 1.4: {THIN}",
+    "build unit.toml --set diameter_mm=-14": f"diameter_mm = -14: must be at least 1, and {THIN}",
+    "build unit.toml --set wall_mm=2": "wall_mm = 2: unknown key at the top; known: layers.0.wall_mm",
+    "build unit.toml --set layers.5.wall_mm=2": "layers.5.wall_mm = 2: no entry 5: the list has the entries 0 to 1",
+    "build unit.toml --only mould": "--only = 'mould': unknown name; closest: moulds; nearest accepted: 'moulds'",
+    "build unit.toml --formats STL": "--formats = 'STL': unknown name; closest: stl; nearest accepted: 'stl'",
+    "build unit.toml --fit unit.toml": "estimate.fit: design = 'encapsulating': unknown key; "
+    "name a lab-fit.toml of unitcad fit",
+    "build unit.toml -o part.csv": "part.csv: is a file, not a folder; choose another with -o",
+    "batch unit.toml": "unit.toml: is a file of the kind spec, not sweep; unitcad build unit.toml takes it",
+    "batch sweep.toml -j two": "--jobs = 'two': takes a whole number, such as 1",
+    "batch sweep.toml --table xlsx": "--table = 'xlsx': unknown name; known: csv, json, parquet",
+    "estimate unit.toml --model pubished": "--model = 'pubished': unknown name; closest: published; "
+    "nearest accepted: 'published'",
+    "estimate unit.toml --frequency 125hz": "--frequency = '125hz': must be HZ or FROM:TO:STEP, numbers above 0; "
+    "nearest accepted: '125'",
+    "estimate unit.toml --frequency 100-200": "--frequency = '100-200': must be HZ or FROM:TO:STEP, numbers above 0; "
+    "nearest accepted: '100:200:10'",
+    "check part.csv --select TT": "--select = 'TT': unknown code; unitcad check --list-rules lists all",
+    "check part.csv --jobs 0": "--jobs = 0: must be at least 1; nearest accepted: 1",
+    "check a.stl --printer ender": "--printer = 'ender': unknown name; closest: ender-3; nearest accepted: 'ender-3'",
+    "check part.csv --report sarif": "--report = 'sarif': must be FORMAT=FILE; nearest accepted: 'sarif=report.sarif'",
+    "material part.csv": "--like: is required: 'part' is no shipped silicone, and a curve gives only a modulus; known: "
+    + SILICONES,
+    "material unit.toml --like ecoflex-00-30": "unit.toml: no reader for this ending; known: .h5, .hdf5, .mat, .tdms, "
+    ".csv, .txt, .tsv, .asc, .dat, .lvm, .tab, .uff, .unv, .wav",
+    "measure unit.toml": "unit.toml: is a file of the kind spec, not campaign; unitcad build unit.toml takes it",
+    "fit nowhere": "LAB = 'nowhere': unknown name; known: synthetic-bench",
+    "score part.csv": "part.csv:1: header = 'a,b': must be unit,distance_mm,value,error,source",
+    "score unit.toml": "FIGURE = 'unit.toml': is not a CSV file",
+    "phantom skn": "PHANTOM = 'skn': unknown name; closest: skin; nearest accepted: 'skin'",
+    "design quiet": "TARGET = 'quiet': unknown name; closest: quiet-edge; nearest accepted: 'quiet-edge'",
+    "list motor": "KIND = 'motor': unknown name; closest: motors; nearest accepted: 'motors'",
+    "schema sweeps": "KIND = 'sweeps': unknown name; closest: sweep; nearest accepted: 'sweep'",
+    "init 'my unit'": "NAME = 'my unit': must be letters, digits, dots and dashes; nearest accepted: 'my-unit'",
+    "init unit": "unit.toml: is there already; choose another name",
+    "coupon prusa": "PRINTER = 'prusa': unknown name; closest: prusa-mk4, prusa-mk3s; nearest accepted: 'prusa-mk4'",
+    "cache gc --limit 1GB": "--limit = '1GB': takes a number (MB), such as 4096",
+    "report unit.toml": "unit.toml: is not a folder",
+}
+FILES = {
+    ("build", 'name = "a"\ndesign = encapsulating\n'): [
+        '2:10: not TOML: Invalid value; put quotes round a text: "encapsulating"'
+    ],
+    ("build", 'name = "a\n'): ["1:10: not TOML: the quotes do not end in their line"],
+    ("build", UNIT.replace("14", "14,5")): [
+        "3:17: not TOML: Expected newline or end of document after a statement; write a point in a number: 14.5"
+    ],
+    ("build", UNIT.replace("14", "14 mm")): [
+        "3:18: not TOML: Expected newline or end of document after a statement; write a number without its unit: 14"
+    ],
+    ("build", "name: a\n"): ["1:5: not TOML: Expected '=' after a key in a key/value pair; write name = ..."],
+    ("build", '{"name": "a"}'): ['1:1: not TOML: Invalid statement; this is JSON: write name = "value"'],
+    ("build", GOOD.replace("diameter_mm", "diameter")): [
+        "3: diameter = 14: unknown key; closest: diameter_mm, parameters; nearest accepted: 'diameter_mm'"
+    ],
+    ("build", GOOD + '[output]\nformats = "stl"\n'): [
+        '13: output.formats = \'stl\': takes a list such as ["stl"]; nearest accepted: ["stl"]'
+    ],
+    ("build", GOOD.replace("14", '"14 mm"').replace("ecoflex-00-10", "ecoflex 00-10")): [
+        "3: diameter_mm = '14 mm': takes a number; nearest accepted: 14",
+        "5: layers.0.material = 'ecoflex 00-10': unknown name; closest: ecoflex-00-10, ecoflex-00-50, ecoflex-00-30; "
+        "nearest accepted: 'ecoflex-00-10'",
+    ],
+    ("batch", 'base = "encapsulatng"\n[sweep]\nmode = "prodct"\n"layers.0.wall_mm" = [1.0]\n'): [
+        "1: base = 'encapsulatng': unknown name; closest: encapsulating, single-encapsulating; "
+        "nearest accepted: 'encapsulating'",
+        "3: sweep.mode = 'prodct': unknown name; closest: product; nearest accepted: 'product'",
+    ],
+    ("batch", 'base = "encapsulating"\n[sweep]\n"layers.0.wal_mm" = [1.0]\n"layers.5.wall_mm" = [1.0]\n'): [
+        "3: sweep.layers.0.wal_mm: unknown key; nearest accepted: 'layers.0.wall_mm'",
+        "4: sweep.layers.5.wall_mm: the base has no entry 5 of layers: they are 0 to 1",
+    ],
+    ("design", '[target]\nedge_max = 12\n[at_hand]\nprinter = "prusa"\n'): [
+        "2: target.edge_max = 12: is a fraction of the motor's amplitude, at most 2; nearest accepted: 0.12",
+        "4: at_hand.printer = 'prusa': unknown name; closest: prusa-mk4, prusa-mk3s; nearest accepted: 'prusa-mk4'",
+    ],
+    ("measure", '[sensor]\nquantity = "speed"\nunit = "V"\n[[unit]]\nname = 3\nedge = "a.csv"\n'): [
+        "2: sensor.quantity = 'speed': unknown name; known: acceleration, displacement, velocity",
+        "5: unit.0.name = 3: takes a text",
+        "6: unit.0.edge = 'a.csv': takes a list such as [\"a\"]",
+    ],
+    ("fit", 'name = "l"\nmoduli = "fast"\n[[unit]]\nname = "a"\nspec = "encapsulatng"\nlevel = { value = 0.05 }\n'): [
+        "2: moduli = 'fast': unknown name; known: quasi-static, small-strain",
+        "5: unit.0.spec = 'encapsulatng': unknown name; closest: encapsulating, single-encapsulating; "
+        "nearest accepted: 'encapsulating'",
+    ],
+    ("phantom", 'name = "p"\n[[layers]]\nname = "a"\nsilicone = "ecoflex-00-30"\nthickness_mm = -2\n'): [
+        "2: layers.0.thinner_pct: is required",
+        "5: layers.0.thickness_mm = -2: must be at least 0.5; nearest accepted: 0.5",
+    ],
+}
+
+
+def answer(words, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["unitcad", *words])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 2
+    return [line.removeprefix("error: ") for line in capsys.readouterr().err.splitlines()]
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_a_mistake_in_a_command_is_answered_in_one_line(line, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    for name, text in {"unit.toml": GOOD, "empty.toml": "", "part.csv": "a,b\n"}.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "binary.toml").write_bytes(b"\xff\x00\x80")
+    (tmp_path / "sweep.toml").write_text(shipped_files("sweeps")["thickness"].read_text())
+    (tmp_path / "target.toml").write_text(shipped_files("targets")["quiet-edge"].read_text())
+    assert answer(shlex.split(line), capsys, monkeypatch) == [COMMANDS[line]]
+
+
+@pytest.mark.parametrize(("command", "text"), FILES)
+def test_every_mistake_in_a_file_is_told_with_its_line(command, text, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.toml").write_text(text)
+    assert answer([command, "a.toml"], capsys, monkeypatch) == [f"a.toml:{line}" for line in FILES[command, text]]
