@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (540_000, 406, 67_500),
-    "core": (260_000, 226, 33_700),
-    "tests": (404_000, 0, 0),
+    "total": (542_600, 402, 67_750),
+    "core": (269_600, 221, 34_700),
+    "tests": (408_200, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900

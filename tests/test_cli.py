@@ -16,10 +16,9 @@ from typer.testing import CliRunner
 from unitcad.casting.steps import duration
 from unitcad.cli import app
 from unitcad.export import slicer
-from unitcad.validation import templates
 
 
-def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+def run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "unitcad", *words],
         capture_output=True,
@@ -33,11 +32,11 @@ def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess
 
 @pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "rules"])
 def test_list_names_what_is_shipped(kind: str) -> None:
-    done = _run("list", kind)
+    done = run("list", kind)
     assert done.returncode == 0
-    data = json.loads(_run("list", kind, "--json").stdout)
+    data = json.loads(run("list", kind, "--json").stdout)
     assert list(data) == [kind]
-    assert kind in _run("list").stdout.split()
+    assert kind in run("list").stdout.split()
     for name in data[kind]:
         assert name in done.stdout
     if kind in ("materials", "motors", "printers"):
@@ -60,35 +59,16 @@ def test_list_names_what_is_shipped(kind: str) -> None:
     ],
 )
 def test_asked_wrongly_is_exit_2_and_writes_nothing(words: list[str], tmp_path: Path) -> None:
-    done = _run(*words, cwd=tmp_path)
+    done = run(*words, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr
     assert "Traceback" not in done.stdout + done.stderr
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_of_another_kind_is_named_with_its_command_and_a_bare_name_finds_its_file(tmp_path: Path) -> None:
-    for name, text in (("walls", 'base = "embedded"\n[sweep]\ndiameter_mm = [14, 15]\n'), ("mine", None)):
-        template = Path(str(templates()["single-embedded"]))
-        (tmp_path / f"{name}.toml").write_text(text or template.read_text("utf-8"), "utf-8")
-    for words, told in (
-        ("build walls", "SPEC = 'walls.toml': is a sweep: run unitcad batch walls.toml"),
-        ("estimate thickness", "SPEC = 'thickness': is a sweep: run unitcad batch thickness"),
-        ("batch mine.toml", "SWEEP = 'mine.toml': is a spec: run unitcad build mine.toml"),
-        ("batch forearm-patch", "SWEEP = 'forearm-patch': is an array: run unitcad build forearm-patch"),
-        ("design walls", "TARGET = 'walls.toml': is a sweep: run unitcad batch walls.toml"),
-        ("phantom mine", "PHANTOM = 'mine.toml': is a spec: run unitcad build mine.toml"),
-    ):
-        done = _run(*words.split(), cwd=tmp_path)
-        assert (done.returncode, done.stderr) == (2, f"error: {told}\n"), words
-    done = _run("build", "mine", "--only", "unit", "--formats", "stl", cwd=tmp_path)
-    assert done.returncode == 0
-    assert done.stdout.startswith(str(Path("out", "single-embedded-")))
-
-
 def test_an_output_that_is_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine")
-    done = _run("build", "embedded", "--formats", "stl", cwd=tmp_path)
+    done = run("build", "embedded", "--formats", "stl", cwd=tmp_path)
     assert done.returncode == 2
     assert (tmp_path / "out").read_text() == "mine"
 
@@ -99,7 +79,7 @@ def test_a_folder_that_can_not_be_written_is_one_line(tmp_path: Path) -> None:
     else:
         (tmp_path / "locked").mkdir(mode=0o500)
         target = str(tmp_path / "locked" / "out")
-    done = _run("build", "embedded", "--formats", "stl", "-o", target)
+    done = run("build", "embedded", "--formats", "stl", "-o", target)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "Traceback" not in done.stderr
@@ -107,8 +87,8 @@ def test_a_folder_that_can_not_be_written_is_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("setting", "field"), [("layers.0.cap_mm=500", "layers.0.cap_mm"), ("diameter_mm=900",) * 2])
 def test_estimate_says_that_build_would_refuse_the_moulds(setting: str, field: str, tmp_path: Path) -> None:
-    estimated = _run("estimate", "encapsulating", "--set", setting, "--model", "divider", "--json")
-    built = _run("build", "encapsulating", "--set", setting, cwd=tmp_path)
+    estimated = run("estimate", "encapsulating", "--set", setting, "--model", "divider", "--json")
+    built = run("build", "encapsulating", "--set", setting, cwd=tmp_path)
     assert (estimated.returncode, built.returncode) == (0, 2)
     reason = built.stderr.removeprefix("error: ")
     assert reason.startswith(field.partition("=")[0] + " = ")
@@ -122,25 +102,27 @@ WRONG = {
     "build --format stl": "--format: unknown option; closest: --formats",
     "build": "SPEC...: is required; see unitcad build --help",
     "bild": "COMMAND = 'bild': unknown name; closest: build; nearest accepted: 'build'",
-    "batch x -j abc": "--jobs = 'abc': takes a whole number, such as 1",
-    "batch a b": "SWEEP = 'b': a batch takes one sweep; build this one by another command",
     "build a --out": "Option '--out' requires an argument; see unitcad --help",
     "check --jobs 0": "--jobs = 0: must be at least 1; nearest accepted: 1",
     "cache gc --limit -1": "--limit = -1: must be from 0 to 1e+12; nearest accepted: 0",
-    "material a.csv --width-mm nan": "--width-mm: nan is not a finite number; see unitcad material --help",
 }
 
 
 @pytest.mark.parametrize("words", WRONG)
 def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words: str) -> None:
+    check_wrong(words, WRONG[words])
+
+
+def check_wrong(words: str, told: str) -> None:
+    """Check that a command line is refused in one line, the same in JSON."""
     command, *rest = words.split()
     below = rest[:1] if command == "cache" else []
-    plain = _run(command, *rest)
-    as_json = _run(command, *below, "--json", *rest[len(below) :])
+    plain = run(command, *rest)
+    as_json = run(command, *below, "--json", *rest[len(below) :])
     assert plain.returncode == as_json.returncode == 2
     assert plain.stdout == ""
     (line,) = plain.stderr.splitlines()
-    assert line == f"error: {WRONG[words]}"
+    assert line == f"error: {told}"
     assert f"error: {json.loads(as_json.stdout)['error']['message']}" == line
 
 
@@ -168,8 +150,8 @@ def test_help_cuts_no_option_s_name_and_no_square_bracket(command: str) -> None:
 
 
 def test_help_and_version() -> None:
-    assert "build" in _run("--help").stdout
-    assert _run("--version").stdout.startswith("unitcad 0.")
+    assert "build" in run("--help").stdout
+    assert run("--version").stdout.startswith("unitcad 0.")
 
 
 @pytest.mark.parametrize(
@@ -178,11 +160,10 @@ def test_help_and_version() -> None:
         (["build", "encapsulatin"], "SPEC = 'encapsulatin'"),
         (["build", "encapsulating", "--only", "units"], "--only = 'units'"),
         (["build", "encapsulating", "--set", "x"], "--set = 'x'"),
-        (["batch", "publishd"], "SWEEP = 'publishd'"),
     ],
 )
 def test_a_refused_argument_is_called_as_in_the_help(words: list[str], field: str, tmp_path: Path) -> None:
-    done = _run(*words, "--json", cwd=tmp_path)
+    done = run(*words, "--json", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith(f"error: {field}: ")
     assert json.loads(done.stdout)["error"]["field"] == field.partition(" ")[0]
@@ -201,7 +182,7 @@ def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(
 ) -> None:
     if slicer.program() is None:
         said = "PrusaSlicer is not installed"
-    done = _run("build", "embedded", "--slice", *words, cwd=tmp_path)
+    done = run("build", "embedded", "--slice", *words, cwd=tmp_path)
     assert done.returncode == 2
     assert said in done.stderr
     assert not (tmp_path / "out").exists()
@@ -209,13 +190,13 @@ def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(
 
 def test_the_summary_of_a_gang_speaks_of_each_unit(tmp_path: Path) -> None:
     gang = ("--set", "moulds.cavities=[2,1]", "--only", "unit,casting", "--no-report")
-    done = _run("build", "embedded", *gang, "-o", str(tmp_path))
+    done = run("build", "embedded", *gang, "-o", str(tmp_path))
     assert done.stderr.startswith("embedded: 2 units, each 14 mm across")
 
 
 def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_output(tmp_path: Path) -> None:
     """Every figure is that of a file in the folder."""
-    done = _run("build", "embedded", "--formats", "stl", "-o", str(tmp_path))
+    done = run("build", "embedded", "--formats", "stl", "-o", str(tmp_path))
     folder = Path(done.stdout.strip())
     assert done.stdout.count("\n") == 1
     assert folder.is_dir()
@@ -234,6 +215,6 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     assert lines[8] == f"open {folder / 'bench.html'} to cast"
     assert lines[9] == f"open {folder / 'report.html'}"
     assert (folder / "report.html").is_file()
-    without = _run("build", "embedded", "--formats", "stl", "-o", str(tmp_path / "b"), "--no-report")
+    without = run("build", "embedded", "--formats", "stl", "-o", str(tmp_path / "b"), "--no-report")
     assert not (Path(without.stdout.strip()) / "report.html").exists()
     assert "open " not in without.stderr

@@ -59,8 +59,8 @@ def test_a_help_ends_with_two_examples_that_the_command_takes(name):
             command.make_context(name, rest)
 
 
-def test_commands_are_in_five_groups_and_each_line_is_its_helps_first():
-    assert sorted({command.group for command in commands().values()}) == sorted(GROUPS)
+def test_commands_are_in_known_groups_and_each_line_is_its_helps_first():
+    assert {command.group for command in commands().values()} <= set(GROUPS)
     for name, listed in commands().items():
         first = " ".join(ROOT.get_command(CONTEXT, name).help.partition("\n\n")[0].split())
         assert first.startswith(listed.help)

@@ -122,6 +122,17 @@ def _circles(graph: dict[str, set[str]]) -> dict[str, set[str]]:
     return left
 
 
+def test_a_test_that_imports_a_room_lies_in_the_room_s_folder() -> None:
+    """The others are the core's, but for tests/whole, on pages and commands of several rooms; .ci/core runs them."""
+    tests = Path(__file__).parent
+    imports = re.compile(rf"^\s*(?:from|import) unitcad\.({'|'.join(ROOMS)})\b", re.MULTILINE)
+    found = {
+        file.relative_to(tests).as_posix(): imports.findall(file.read_text("utf-8")) for file in tests.rglob("*.py")
+    }
+    apart = (*(f"{room}/" for room in ROOMS), "whole/", "attenuation/references/")
+    assert {name: rooms for name, rooms in found.items() if rooms and not name.startswith(apart)} == {}
+
+
 def test_no_files_import_each_other_in_a_circle() -> None:
     graph = _file_imports(PACKAGE)
     assert len(graph) > 250

@@ -10,13 +10,10 @@ from typing import Any
 
 import pytest
 
-from unitcad.arrays.array_file import array_templates, expanded, load_array
-from unitcad.arrays.patch import patch_moulds
 from unitcad.errors import Refusal, UnknownKey
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import to_data
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
-from unitcad.spec.toml import read_toml
 from unitcad.validation import custom_templates, load, put, read, templates
 from unitcad.validation.suggestions import is_number, with_changes
 
@@ -30,10 +27,6 @@ Judge = Callable[[dict[str, Any]], object]
 
 def moulds_of(data):
     return load(data, makeable=lambda spec: MouldSet(spec).plan)
-
-
-def tools_of(data):
-    return patch_moulds(load_array(data)).plan
 
 
 def numbers(node, path=""):
@@ -115,16 +108,6 @@ def any_code():
 @pytest.mark.parametrize("name", CASTABLE)
 def test_a_wild_number_of_a_spec_is_refused_with_a_value_that_is_accepted(name, count):
     check_each_field(read(name), fields_of_spec(name), moulds_of, count, name)
-
-
-@pytest.mark.parametrize("count", [6, pytest.param(200, marks=pytest.mark.long)])
-@pytest.mark.parametrize("name", sorted(array_templates()))
-def test_a_wild_number_of_an_array_is_refused_with_a_value_that_is_accepted(name, count):
-    path = array_templates()[name]
-    base = expanded(read_toml(path), path.parent)
-    tables = ("layout.", "sheet.", "body.", "circuit.")
-    own = {at: value for at, value in numbers(load_array(name).asked).items() if at.startswith(tables)}
-    check_each_field(base, own, tools_of, count, name)
 
 
 @pytest.mark.parametrize("name", sorted(templates()))

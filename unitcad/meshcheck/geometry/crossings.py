@@ -284,10 +284,7 @@ def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Bools, Bools, Ints]:
     left = np.flatnonzero(~clear & (common < 3))
     a, b = (planes.corners(ids.take(left, axis=1)) for ids in (ids_a, ids_b))
     flush = np.zeros(len(i), bool)
-    flush[left] = clear[left] = below = _flush(a, b)
-    rest = np.flatnonzero(~below)
-    left, a, b = left[rest], a.take(rest, axis=2), b.take(rest, axis=2)
-    clear[left] = planes.seen_apart(i[left], a, b, common[left])
+    flush[left] = clear[left] = _flush(a, b)
     return ~clear, flush & (common == 0), common
 
 

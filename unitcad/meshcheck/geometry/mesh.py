@@ -51,9 +51,6 @@ LARGEST = float(np.finfo(np.float32).max)
 SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
 """Coordinates below this are 0 as float32, and are taken for it: even doubles do not hold their products."""
 
-MANY = 50_000
-"""Faces from which a second core is worth its while."""
-
 _BLOCK = 1 << 15  # points that stay in the processor's cache
 
 
@@ -85,34 +82,21 @@ def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
     """Return distinct points as float64 (v, 3), and for each of the corners (m, k, 3) which of them it is, (m, k).
 
     Points with the same three numbers are one; -0.0 is 0.0. They are in the order in which they first appear: those of
-    a face are mostly near each other then, which the processor's cache needs. By blocks, since first use of memory
-    takes longer than the computation.
+    a face are mostly near each other then, which the processor's cache needs.
     """
     if corners.dtype != np.float32:
         corners = representable(corners)
     sides, n = corners.shape[1], corners.shape[0] * corners.shape[1]
-    rows = max(_BLOCK // sides, 1)
-    blocks = [slice(start, start + rows) for start in range(0, len(corners), rows)]
     room = max(n - 1, 1).bit_length()
-    key, at = np.empty(n, np.uint64), 0
-    for block in blocks:
-        mixed = _mix(_bits(corners[block]))
-        np.bitwise_and(mixed, ~np.uint64((1 << room) - 1), out=key[at : at + len(mixed)])
-        at += len(mixed)
+    key = _mix(_bits(corners)) & ~np.uint64((1 << room) - 1)
     order = order_of_packed(key, room)
     fresh = distinct(key)
     places, number = by_appearance(order[fresh], n)
-    index, before = np.empty(n, np.int32), -1
-    for start in range(0, n, _BLOCK):
-        rank = np.cumsum(fresh[start : start + _BLOCK], dtype=np.int32)
-        rank += before
-        index[order[start : start + _BLOCK]] = number.take(rank)
-        before = rank[-1]
+    index = np.empty(n, np.int32)
+    index[order] = number.take(np.cumsum(fresh, dtype=np.int32) - np.int32(1))
     index = index.reshape(-1, sides)
     vertices = corners[places // sides, places % sides]
-    if not all(
-        np.array_equal(vertices.take(index[block], axis=0), np.ascontiguousarray(corners[block])) for block in blocks
-    ):
+    if not np.array_equal(vertices.take(index, axis=0), corners):
         # Two places have one hash.
         values = _bits(corners).view(corners.dtype)
         _, first, rank = np.unique(values, axis=0, return_index=True, return_inverse=True)

@@ -73,7 +73,6 @@ class Contacts:
 
 _UNIT = np.finfo(np.float64).eps / 2
 _PLANE = 128 * _UNIT  # of longest side ** 2 * largest coordinate: a height times twice the area is off by less
-_LINE = 16 * _UNIT  # of the mesh's size ** 2: twice an area in a plane is off by less
 _TINY = 1e-270  # more than underflow takes from coordinates that fit single precision
 
 
@@ -82,8 +81,7 @@ class Planes:
     """Faces by their corners and planes.
 
     `columns` (3, n): the coordinates of vertices; `ids` (3, m): the vertices of the faces; `normal` (3, m): twice their
-    area vectors; `offset` and `error` (m,): normal * point - offset is right to within the error. `line_error` is the
-    same for twice an area in a plane square to an axis.
+    area vectors; `offset` and `error` (m,): normal * point - offset is right to within the error.
     """
 
     columns: Floats
@@ -91,7 +89,6 @@ class Planes:
     normal: Floats
     offset: Floats
     error: Floats
-    line_error: float
 
     def vertices(self, i: Ints) -> Ints:
         """Return the vertices of faces i: (corner, n), to take with."""
@@ -125,31 +122,6 @@ class Planes:
             below += height < -error
         return ((above == 0) | (below == 0)) & (above + below >= 3 - shared) & (shared < 3)
 
-    def seen_apart(self, i: Ints, a: Floats, b: Floats, shared: Ints) -> Bools:
-        """Return whether a side of a or b has them on both sides of its line, as seen along the axis that i faces most.
-
-        `a` are the corners of i, `b` those of the other face.
-        """
-        drop = np.argmax(np.abs(self.normal.take(i, axis=1)), axis=0)
-        rows = np.arange(len(i))
-        (x_a, y_a), (x_b, y_b) = ([corners[:, (drop + k) % 3, rows] for k in (1, 2)] for corners in (a, b))
-        return self._outside(x_a, y_a, x_b, y_b, shared) | self._outside(x_b, y_b, x_a, y_a, shared)
-
-    def _outside(self, x: Floats, y: Floats, other_x: Floats, other_y: Floats, shared: Ints) -> Bools:
-        """Return whether all of the other's corners (corner, pair) are outside one side of a triangle in the plane."""
-        along_x, along_y = x[[1, 2, 0]] - x, y[[1, 2, 0]] - y
-        turn = along_x[0] * along_y[1] - along_y[0] * along_x[1]
-        turn = np.sign(turn) * (np.abs(turn) > self.line_error)
-        along_x *= turn
-        along_y *= turn
-        inside, outside = np.zeros((2, *x.shape), np.int8)
-        for k in range(3):
-            height = along_x * (other_y[k] - y)
-            height -= along_y * (other_x[k] - x)
-            inside += height > self.line_error
-            outside += height < -self.line_error
-        return np.asarray(((inside == 0) & (outside >= 3 - shared) & (shared < 3)).any(axis=0))
-
 
 def planes_of(columns: Floats, ids: Ints, normal: Floats) -> Planes:
     """Return the planes of faces from vertices (3, n), their ids (3, m) and their `area_vectors` (3, m)."""
@@ -167,7 +139,7 @@ def planes_of(columns: Floats, ids: Ints, normal: Floats) -> Planes:
     longest *= longest
     longest *= _PLANE * float(np.maximum(-low, high).max())
     longest += _TINY
-    return Planes(columns, ids, normal, offset, longest, _LINE * float((high - low).max()) ** 2 + _TINY)
+    return Planes(columns, ids, normal, offset, longest)
 
 
 _SOUND = 1e-9  # of the squared longest side: faces with less area have no direction worth adding to a mean

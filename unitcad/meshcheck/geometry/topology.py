@@ -19,7 +19,6 @@ from unitcad.geometry.arrays import (
     extent,
     extents,
     order_of_packed,
-    sorted_with_order,
 )
 from unitcad.geometry.boxes import Tick
 from unitcad.geometry.components import components
@@ -43,6 +42,12 @@ class Edges:
     low: Ints
     high: Ints
     closed: bool
+
+    @cached_property
+    def pairs(self) -> tuple[Ints, Ints]:
+        """The two half-edges of each edge that has two faces."""
+        first = self.first[self.size == 2]
+        return self.order[first], self.order[first + 1]
 
     @cached_property
     def balanced(self) -> Bools:
@@ -119,8 +124,7 @@ def _sorted_edges(faces: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:
 def opposite(edges: Edges, n_half: int) -> Ints:
     """Return for each half-edge the one across its edge; itself where an edge has other than two faces."""
     across = np.arange(n_half, dtype=np.int32)
-    pairs = edges.first[edges.size == 2]
-    one, other = edges.order[pairs], edges.order[pairs + 1]
+    one, other = edges.pairs
     across[one] = other
     across[other] = one
     return across
@@ -196,8 +200,7 @@ def shells_of(faces: Ints, edges: Edges, turns: Turns | None) -> Ints:
 
     Faces are joined across edges of two faces, and in pairs across edges of four, six and so on, by their `turns`.
     """
-    pairs = edges.first[edges.size == 2]
-    left, right = edges.order[pairs], edges.order[pairs + 1]
+    left, right = edges.pairs
     if turns is not None:
         one, other = _paired(edges, turns)
         left, right = np.concatenate([left, one]), np.concatenate([right, other])
@@ -540,8 +543,11 @@ def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     tick()
     shells = shells_of(faces, edges, turns)
     tick()
-    low, high = _boxes(vertices, faces, shells)
-    n = len(low)
+    n = int(shells.max(initial=-1)) + 1
+    if n == 1:
+        low, high = (corner[None] for corner in extent(vertices))
+    else:
+        low, high = extents(vertices[faces].reshape(-1, 3), np.repeat(shells, 3), n)
     volumes, closed = signed_volumes(vertices, faces, areas, shells, n), closed_shells(edges, shells, n)
     tick()
     pinched = pinched_vertices(faces, edges, len(vertices))
@@ -606,21 +612,6 @@ def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[In
     return joined, stored, whole_kept, after, OpenEdges(edges, kept, shut, left, split)
 
 
-def _boxes(vertices: Floats, faces: Ints, shells: Ints) -> tuple[Floats, Floats]:
-    """Return low and high corner of each shell, (n, 3) mm."""
-    n = int(shells.max(initial=-1)) + 1
-    if n == 1:
-        low, high = extent(vertices)
-        return low[None], high[None]
-    low, high, label = np.full((3, n), np.inf), np.full((3, n), -np.inf), shells.astype(np.intp)
-    for axis in range(3):
-        column = np.ascontiguousarray(vertices[:, axis])
-        one, two, three = (column.take(faces[:, k]) for k in range(3))
-        np.minimum.at(low[axis], label, np.minimum(np.minimum(one, two), three))
-        np.maximum.at(high[axis], label, np.maximum(np.maximum(one, two), three))
-    return low.T, high.T
-
-
 def diagonals(low: Floats, high: Floats) -> Floats:
     """Return the diagonals of boxes, mm."""
     sides = high - low
@@ -628,24 +619,12 @@ def diagonals(low: Floats, high: Floats) -> Floats:
 
 
 def _same_vertices(faces: Ints) -> tuple[Ints, Bools]:
-    """Return an order of the faces that may have others' vertices, and where in it one has those of the one before."""
-    a, b, c = np.ascontiguousarray(faces.T)
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    ordered = np.stack([low, a ^ b ^ c ^ low ^ high, high])
-    # Equal for equal faces, and for others now and then.
-    key = (ordered[0].astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + ordered[1].astype(np.uint64)) * np.uint64(
-        0xC2B2AE3D27D4EB4F
-    )
-    key += high.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    kept = 64 - max(len(key) - 1, 1).bit_length()
-    key, order = sorted_with_order(key >> np.uint64(64 - kept), kept)
-    again = ~distinct(key)
-    some = np.sort(order[again | np.append(again[1:], False)[: len(again)]]).astype(np.int64)
-    ordered = ordered[:, some]
-    by_vertices = np.lexsort(ordered)
-    some, ordered = some[by_vertices], ordered[:, by_vertices]
-    same = (ordered[:, 1:] == ordered[:, :-1]).all(axis=0)
-    return some, np.append(False, same)[: len(some)]
+    """Return an order of the faces by their vertices, and where in it one has those of the one before."""
+    ordered = np.sort(faces, axis=1)
+    order = np.lexsort(ordered.T)
+    ordered = ordered[order]
+    same = (ordered[1:] == ordered[:-1]).all(axis=1)
+    return order, np.append(False, same)[: len(order)]
 
 
 def _facing(order: Ints, same: Bools, areas: Floats, shells: Ints, volume: Floats) -> Ints:

@@ -79,8 +79,7 @@ def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, tick: 
     thin = (np.bincount(rays.owner, minlength=n) > 0) & (thick == 0)
     if not thin.any():
         return []
-    pairs = edges.first[edges.size == 2]
-    left, right = edges.order[pairs] // 3, edges.order[pairs + 1] // 3
+    left, right = (half // 3 for half in edges.pairs)
     both = thin[left] & thin[right]
     group = components(n, left[both], right[both])
     places: list[Location] = []

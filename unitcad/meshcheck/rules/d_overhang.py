@@ -45,9 +45,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     leaning &= mesh.vertices[mesh.faces, 2].max(axis=1) > bed + float(printer.layer_mm) / 2
     if not leaning.any():
         return
-    edges = topology.edges
-    pairs = edges.first[edges.size == 2]
-    one, other = edges.order[pairs], edges.order[pairs + 1]
+    one, other = topology.edges.pairs
     left, right = one // 3, other // 3
     inner = leaning[left] & leaning[right]
     region = components(len(leaning), left[inner], right[inner])

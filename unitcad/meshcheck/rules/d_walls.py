@@ -65,9 +65,7 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
         return []
     points, owner, thickness = rays.points, rays.owner, rays.thickness
     faces = topology.mesh.faces
-    edges = topology.edges
-    pairs = edges.first[edges.size == 2]
-    left, right = edges.order[pairs] // 3, edges.order[pairs + 1] // 3
+    left, right = (half // 3 for half in topology.edges.pairs)
     n = len(faces)
     marked = np.zeros(n, bool)
     marked[owner[thin]] = True
