@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
 from unitcad.arrays.array_file import array_templates
 from unitcad.serve.answers import answered
+from unitcad.serve.form import groups
 from unitcad.serve.messages import Ask, Edit, Trusted
 from unitcad.serve.server import _trusted
 from unitcad.spec import read_toml
@@ -155,3 +156,15 @@ def test_no_option_of_the_command_line_is_told_on_the_page():
     assert [fault.field for fault in told] == ["design"]
     assert "can't be cast" in told[0].message
     assert "--only" not in told[0].message
+
+
+def test_the_form_has_the_size_of_a_refused_part_and_offers_a_motor_where_there_is_none():
+    data = read_toml(templates()["encapsulating"])
+    shown = {
+        field.path: field.value
+        for group in groups({**data, "motor": {"part": "VG1040003D"}}, None)
+        for field in group.fields
+    }
+    assert (shown["motor.diameter_mm"], shown["motor.thickness_mm"], shown["motor.drive"]) == (10, 4, "axial")
+    (without,) = [group for group in groups({**data, "motor": False}, None) if group.path == "motor"]
+    assert (without.fields, without.present, without.optional) == ([], False, True)

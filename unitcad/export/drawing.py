@@ -36,7 +36,7 @@ TAPER = 0.15
 """Slope of a face that still counts as upright."""
 SAME_MM = 0.02
 """Lengths this close are one: a caliper shows 0.01 mm."""
-Loop = Sequence[svg.Point] | np.ndarray
+Loop = Sequence[svg.Point]
 _INK = {"extension": 0.5, "leader": 0.3, "axis": 0.4}
 _WIDTH = {"extension": 0.25, "leader": 0.3, "axis": 0.3, "dimension": 0.35, "skin": 0.6}
 

@@ -98,7 +98,7 @@ def table_groups(
 ) -> Iterator[Group]:
     """Yield a group for each of the tables (path, title, type); arguments as of `fields`."""
     for path, title, table in tables:
-        optional = path in _OPTIONAL
+        optional = path in _OPTIONAL or data.get(path) is False  # motor = false
         present = not optional or isinstance(data.get(path), dict)
         shown = [*fields(table, path, data, settled, choices)] if present else []
         yield Group(path, title, shown, present, optional, _NEEDS.get(path, {}), _OPTIONAL.get(path, ""))

@@ -113,6 +113,7 @@ def _unit(spec: Spec, answer: Answer) -> None:
     )
     if grams:
         answer.figures.append(("silicone", sum(grams), "g"))
+    if grams and not spec.motor.absent:
         motor = catalogue.motors(spec.motors)[spec.motor.part] if spec.motor.part else None
         answer.figures.append(("with its motor", sum(grams) + 1e3 * motor_mass(spec, motor).middle, "g"))
 
