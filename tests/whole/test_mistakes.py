@@ -43,6 +43,9 @@ COMMANDS = {
     "build unit.toml --fit unit.toml": "estimate.fit: design = 'encapsulating': unknown key; "
     "name a lab-fit.toml of unitcad fit",
     "build unit.toml -o part.csv": "part.csv: is a file, not a folder; choose another with -o",
+    "build unit.toml --set moulds.cavities=2x5": "moulds.cavities = '2x5': unknown name; known: fill or a list such as "
+    "[1, 1]",
+    "build forearm-patch --set layout.pitch_mm=x": "layout.pitch_mm = 'x': takes a number or a list such as [1.5, 1.5]",
     "batch unit.toml": "SWEEP = 'unit.toml': is a spec: run unitcad build unit.toml",
     "batch sweep.toml -j two": "--jobs = 'two': takes a whole number, such as 1",
     "batch sweep.toml --table xlsx": "--table = 'xlsx': unknown name; known: csv, json, parquet",

@@ -55,8 +55,8 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapp
         limit += f"; with {listed(wider, 'and')} it is accepted as it is"
     changes, met = followed(refusal, data, judge)
     if set(changes) != {field}:
-        pitches = {path: value for path, value in changes.items() if path.startswith(_PITCH)}
-        if not pitches and field.startswith(_PITCH):
+        pitches = {path: value for path, value in changes.items() if path.startswith(_PITCH) and is_number(value)}
+        if not pitches and field.startswith(_PITCH) and is_number(refusal.nearest):
             pitches = {field: refusal.nearest}
         if field in pitches and (wider := _wider(pitches, data, judge)):
             if changes:

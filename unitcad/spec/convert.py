@@ -132,7 +132,9 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     table, known, words = table_in(kind), _plain_kinds(kind), _words(kind)
     given = next((plain for plain in (bool, float, str, dict) if isinstance(value, plain)), type(value))
     if isinstance(value, str) and words:
-        return unknown_name(field, value, words)
+        unknown = unknown_name(field, value, words)
+        others = [_name(plain, kind) for plain in _NAMES if plain in known - {str}]
+        return Refusal(field, value, " or ".join([unknown.limit, *others]), unknown.nearest)
     if not (given in known or (given is int and float in known)):
         names = [_name(plain, kind) for plain in _NAMES if plain in known]
         limit = f"takes {', or '.join(names) if table else ' or '.join(names)}"
