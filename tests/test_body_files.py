@@ -188,7 +188,7 @@ def test_a_pocket_that_only_its_facets_make_narrow_passes_with_a_note(
     ("template", "change", "why"),
     [
         ("embedded", "motor=false", "motor = false: the design embedded is drawn round one"),
-        ("custom/strap-lugs", "motor=true", "motor = true: takes a table, or false for none; nearest accepted: false"),
+        ("custom/strap-lugs", "motor=true", "motor = true: takes a table, or false for none"),
         ("custom/strap-lugs", "motor=false", "(fpcb|wires): leads to a motor, and motor = false"),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.errors import Refusal
-from unitcad.export.printing import stl
+from unitcad.export import printing
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.shape import cylinder
 
@@ -86,7 +86,7 @@ def test_what_moulds_of_arrays_do_not_draw_is_refused(name: str, unit: dict[str,
 
 
 def test_an_array_refuses_a_unit_without_a_motor(tmp_path: Path) -> None:
-    (tmp_path / "disc.stl").write_bytes(stl(*arrays(realise(cylinder(7, 0, 4), 96)), "disc"))
+    (tmp_path / "disc.stl").write_bytes(printing.stl(*arrays(realise(cylinder(7, 0, 4), 96)), "disc"))
     layer = '[[layers]]\nmaterial = "ecoflex-00-30"\nwall_mm = 3.0\n'
     text = f'name = "disc"\ndesign = "disc.stl"\ndiameter_mm = 14.0\nmotor = false\n{layer}'
     (tmp_path / "disc.toml").write_text(text)

@@ -26,10 +26,10 @@ COMMANDS = {
     "build ./folder": "folder: is a folder, not a regular file",
     "build part.csv": "SPEC = 'part.csv': is not a TOML file, whose name ends in .toml",
     "build gone.toml": "gone.toml: no such file",
-    "build empty.toml": "empty.toml: is empty; `unitcad schema spec` lists its keys",
+    "build empty.toml": "SPEC = 'empty.toml': is empty; `unitcad schema spec` lists its keys",
     "build binary.toml": "binary.toml: not UTF-8 (byte 0)",
-    "build sweep.toml": "sweep.toml: is a file of the kind sweep, not spec",
-    "build target.toml": "target.toml: is a file of the kind target, not spec; unitcad design target.toml takes it",
+    "build sweep.toml": "SPEC = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
+    "build target.toml": "SPEC = 'target.toml': is a target: run unitcad design target.toml",
     "build unit.toml --set 'diameter_mm 15'": "--set = 'diameter_mm 15': needs the form path=value, such as "
     "layers.0.wall_mm=1.0",
     "build unit.toml --set diameter_mm=14,5": "diameter_mm = '14,5': takes a number; nearest accepted: 14.5",
@@ -43,7 +43,7 @@ COMMANDS = {
     "build unit.toml --fit unit.toml": "estimate.fit: design = 'encapsulating': unknown key; "
     "name a lab-fit.toml of unitcad fit",
     "build unit.toml -o part.csv": "part.csv: is a file, not a folder; choose another with -o",
-    "batch unit.toml": "unit.toml: is a file of the kind spec, not sweep; unitcad build unit.toml takes it",
+    "batch unit.toml": "SWEEP = 'unit.toml': is a spec: run unitcad build unit.toml",
     "batch sweep.toml -j two": "--jobs = 'two': takes a whole number, such as 1",
     "batch sweep.toml --table xlsx": "--table = 'xlsx': unknown name; known: csv, json, parquet",
     "estimate unit.toml --model pubished": "--model = 'pubished': unknown name; closest: published; "
@@ -60,7 +60,8 @@ COMMANDS = {
     + SILICONES,
     "material unit.toml --like ecoflex-00-30": "unit.toml: no reader for this ending; known: .h5, .hdf5, .mat, .tdms, "
     ".csv, .txt, .tsv, .asc, .dat, .lvm, .tab, .uff, .unv, .wav",
-    "measure unit.toml": "unit.toml: is a file of the kind spec, not campaign; unitcad build unit.toml takes it",
+    "measure unit.toml": "CAMPAIGN = 'unit.toml': is a spec: run unitcad build unit.toml",
+    "fit unit.toml": "LAB = 'unit.toml': is a spec: run unitcad build unit.toml",
     "fit nowhere": "LAB = 'nowhere': unknown name; known: synthetic-bench",
     "score part.csv": "part.csv:1: header = 'a,b': must be unit,distance_mm,value,error,source",
     "score unit.toml": "FIGURE = 'unit.toml': is not a CSV file",

@@ -10,7 +10,7 @@ import numpy as np
 
 from unitcad.accuracy.responses import REFERENCE, respond
 from unitcad.attenuation.edge.inputs_seen import changed, ends
-from unitcad.attenuation.edge.models import assessments, edge_levels, in_order, stored
+from unitcad.attenuation.edge.models import edge_levels, stored
 from unitcad.attenuation.edge.variant_units import stacked
 from unitcad.attenuation.inputs import EstimateInput, body
 from unitcad.estimating import closed_forms, fit_of
@@ -27,8 +27,7 @@ def amplifications(spec: Spec, variant: EstimateInput) -> dict[str, Any]:
     Amplification: relative change of a result over that of the input, by central differences.
     """
     moved = ends(variant, STEP)
-    names = in_order(assessments(variant.moduli))
-    models = sorted(closed_forms(spec.estimate.models), key=names.index)[:1]
+    models = closed_forms(spec.estimate.models)
     fit = fit_of(spec)
     results = {
         f"edge level, model {model}": edge_levels(

@@ -156,6 +156,9 @@ def _models(data: dict[str, Any]) -> Table:
         ratios = [level(one, 100) for one in block["hierarchical_over_control"] or []]
         spread = [_predicted(block["predictive"])] if fitted else []
         table.add_row(name, level(block["edge_level"], 100), *spread, *ratios)
+    answer = data["answer"]
+    mean = f"{100 * answer['class_mean']:.3g} ({answer['class']})"
+    table.add_row("class mean", mean, *["-"] * (len(ranges) + len(controls)))
     for own in data.get("own_measured", ()):
         shown = level(own, 100), f"{own['unit']}, {own['frequency_hz']:g} Hz"
         table.add_row("measured here", *shown, *["-"] * len(controls))
@@ -344,11 +347,18 @@ def level(quantity: dict[str, Any] | None, factor: float = 1.0, digits: int = 3)
     """Format a value with its range, or the one of the two that there is."""
     if not quantity:
         return "-"
-    value, low, high = (None if quantity.get(k) is None else f"{quantity[k] * factor:.{digits}g}" for k in _PARTS)
+    value, low, high = (
+        None if quantity.get(k) is None else _shown(quantity[k] * factor, factor, digits) for k in _PARTS
+    )
     spread = f"{low} to {high}" if low and high and low != high else ""
     if value:
         return f"{value} ({spread})" if spread else value
     return spread or "not known"
+
+
+def _shown(value: float, factor: float, digits: int) -> str:
+    """Format a number; a level next to nothing as below 0.01 %."""
+    return "below 0.01" if factor == 100 and value < 0.01 else f"{value:.{digits}g}"
 
 
 _PARTS = ("value", "low", "high")

@@ -76,6 +76,7 @@ _LONGEST = 2000
 """Characters of an error that are printed."""
 _ARGUMENTS = {
     "spec": "SPEC", "sweep": "SWEEP", "phantom": "PHANTOM", "target": "TARGET", "hash": "HASH", "tables": "--table",
+    "campaign": "CAMPAIGN", "fit": "LAB",
 }  # fmt: skip
 """What the command line calls parameters that are no options, or options of another name."""
 

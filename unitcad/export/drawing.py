@@ -36,7 +36,7 @@ TAPER = 0.15
 """Slope of a face that still counts as upright."""
 SAME_MM = 0.02
 """Lengths this close are one: a caliper shows 0.01 mm."""
-Loop = Sequence[svg.Point]
+Loop = Sequence[svg.Point] | np.ndarray
 _INK = {"extension": 0.5, "leader": 0.3, "axis": 0.4}
 _WIDTH = {"extension": 0.25, "leader": 0.3, "axis": 0.3, "dimension": 0.35, "skin": 0.6}
 
@@ -101,7 +101,8 @@ def _draw(canvas: Any, root: ElementTree.Element, left_mm: float, top_mm: float)
     canvas.saveState()
     canvas.translate(left_mm * MM, top_mm * MM)
     canvas.scale(PT_PER_PX, -PT_PER_PX)
-    for element in root:
+    # Texts come last: a length has the lines that pass behind it blanked out.
+    for element in sorted(root, key=lambda one: one.tag.endswith("text")):
         tag, kind = element.tag.rpartition("}")[2], element.get("class", "")
         at = {key: float(value) for key, value in element.items() if re.fullmatch(r"[cxyr]+[12]?", key)}
         canvas.setStrokeGray(_INK.get(kind, 0.0))
@@ -115,10 +116,16 @@ def _draw(canvas: Any, root: ElementTree.Element, left_mm: float, top_mm: float)
         elif tag == "text":
             canvas.saveState()
             canvas.scale(1, -1)
+            text, middle = _latin(element.text or ""), element.get("text-anchor", "")
+            if re.match(r"[ØR]?[0-9]", text):
+                wide = canvas.stringWidth(text, "Helvetica", svg.TEXT_PX)
+                left = at["x"] - {"middle": wide / 2, "end": wide}.get(middle, 0.0)
+                canvas.setFillGray(1)
+                canvas.rect(left, -at["y"] - 1, wide, 0.75 * svg.TEXT_PX + 1, stroke=0, fill=1)
             canvas.setFillGray(0)
             canvas.setFont("Helvetica", svg.TEXT_PX)
             write = {"middle": canvas.drawCentredString, "end": canvas.drawRightString}
-            write.get(element.get("text-anchor", ""), canvas.drawString)(at["x"], -at["y"], _latin(element.text or ""))
+            write.get(middle, canvas.drawString)(at["x"], -at["y"], text)
             canvas.restoreState()
         elif tag in ("path", "polygon"):
             path = canvas.beginPath()

@@ -41,7 +41,9 @@ def kind_of(data: Mapping[str, object]) -> FileKind | None:
 
 
 def expect_kind(data: Mapping[str, object], source: str, kind: str) -> None:
-    """Raise WrongArgument for a file of another kind than `kind` that a command takes: the error names the command."""
+    """Raise WrongArgument for an empty file, and for one of another kind, with the command that takes it."""
+    if not data:
+        raise WrongArgument(kind, source, f"is empty; `unitcad schema {kind}` lists its keys")
     found = kind_of(data)
     if found and found.name != kind and found.command:
         raise _other_kind(found, kind, source, WrongArgument)

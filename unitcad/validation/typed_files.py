@@ -1,4 +1,4 @@
-"""TOML files of one kind: every fault of a file with its line, or the kind that the file is instead."""
+"""TOML files of one kind: every fault of a file with its line."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from unitcad.errors import Refusal, UnitcadError, UnknownKey
+from unitcad.errors import Refusal, UnknownKey
 from unitcad.files import read_text
 from unitcad.rooms import file_kinds
 from unitcad.spec import read_toml
@@ -21,11 +21,9 @@ T = TypeVar("T")
 def load_file(path: Path, kind: str, judge: Callable[[dict[str, Any]], T]) -> T:
     """Return the result of `judge` for the data of a TOML file of a kind.
 
-    Raises Refusal with the file's other faults, each with file and line; UnitcadError for a file of another kind.
+    Raises Refusal with the file's other faults, each with file and line; WrongArgument for a file of another kind.
     """
     data = read_toml(path)
-    if not data:
-        raise UnitcadError(f"{path}: is empty; `unitcad schema {kind}` lists its keys")
     expect_kind(data, str(path), kind)
     try:
         return judge(data)

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.edge.lab_fit import LabFit
-from unitcad.attenuation.edge.measured_levels import Moduli, measured_table
+from unitcad.attenuation.edge.measured_levels import CLASSES, Moduli, measured_table, unit_class
 from unitcad.attenuation.edge.models import BASELINE, RULE, assessments, choice
 from unitcad.attenuation.edge.nearest import LENGTHS, coordinates_of, differing, nearest
 from unitcad.attenuation.edge.ranges import held, lead_of, predictive_of
+from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.text import listed, number
@@ -47,7 +48,8 @@ def answer(
     the motor's amplitude. `analytic`: the levels of the paper's model.
 
     Errors are factors with the unit left out.
-    `held`: how many of the nine measured units lay in the range that was predicted without them.
+    `held`: how many of the nine measured units lay in the range that was predicted without them. `class_mean` is
+    the baseline.
 
     With a lab's fit
     `measured` and `nearest` are the lab's own; `elsewhere` is the paper's measurement of this unit.
@@ -57,6 +59,7 @@ def answer(
     low, middle, high = (float(end[0]) for end in expected.range)
     known, measured = bool(np.isfinite([low, middle, high]).all()), _measured(estimated, fit)
     far = known and not measured and (high > _WIDEST * low or high > _MOST)
+    group = int(unit_class(nominal(variant))[0])
     stated = not far and levels[lead.model]["value"] is not None
     best = assessments(variant.moduli)[lead.model].left_out
     data: dict[str, Any] = {
@@ -69,6 +72,8 @@ def answer(
         "typical_error": errors[lead.model],
         "worst_error": None if fit else best.worst,
         "worst_at": None if fit else best.worst_at,
+        "class": CLASSES[group],
+        "class_mean": _class_mean(variant, group, fit),
         "baseline_error": errors[BASELINE],
         "held": None if fit else held(variant.moduli),
         "measured": measured,
@@ -120,6 +125,14 @@ def _of_paper(estimated: dict[str, Any]) -> list[dict[str, Any]]:
         return []
     printed = [found[key] for key in ("level", "also_printed") if found.get(key) is not None]
     return [{"level": level, "low": None, "high": None, "by": PAPER} for level in printed]
+
+
+def _class_mean(variant: EstimateInput, group: int, fit: LabFit | None) -> float:
+    """Return the baseline: the mean of the unit's class, by a lab's fit or of the paper's units."""
+    if fit:
+        return fit.model[BASELINE].constants[CLASSES[group]]
+    table = measured_table(variant.moduli)
+    return float(np.exp(np.log(table.levels[table.classes == group]).mean()))
 
 
 def _nearest(variant: EstimateInput, fit: LabFit | None) -> dict[str, Any]:
