@@ -24,7 +24,6 @@ from unitcad.meshcheck.geometry.topology import (
     surrounded,
 )
 
-_FACES = 1 << 14  # pairs of faces that stay in the processor's cache
 _FOLD = 2.0  # float32 steps: a fold thinner than that has no thickness
 _WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding
 
@@ -94,11 +93,7 @@ def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> 
         two &= edges.balanced
     pair = edges.first[two]
     left, right = edges.order[pair] // 3, edges.order[pair + 1] // 3
-    facing = np.empty(len(pair))
-    for start in range(0, len(pair), _FACES):
-        block = slice(start, start + _FACES)
-        one, other = areas.take(left[block], axis=0), areas.take(right[block], axis=0)
-        facing[block] = np.einsum("ij,ij->i", one, other)
+    facing = np.einsum("ij,ij->i", areas.take(left, axis=0), areas.take(right, axis=0))
     against = np.flatnonzero(facing < 0)
     if not len(against):
         return against, np.empty(0), np.empty(0)

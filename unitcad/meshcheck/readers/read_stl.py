@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.arrays import Floats
 from unitcad.meshcheck.findings import SHOWN, Finding, Location, counted
 from unitcad.meshcheck.geometry.mesh import Mesh, weld_exact
 from unitcad.meshcheck.readers import rows
@@ -43,7 +43,6 @@ _NUMBERS = [i for i in range(_TOKENS) if i not in _WORDS]
 _NOT_FINITE = re.compile(rows.NOT_FINITE.encode(), re.IGNORECASE)
 _PRINTABLE = bytes(b for b in range(256) if b in b"\t\n\v\f\r" or (b >= 32 and b != 127))
 _BLOCK = 8_000_000
-_FACES = 1 << 14  # faces whose corners stay in the processor's cache
 
 
 def read_stl(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
@@ -86,24 +85,14 @@ def _binary_size(data: memoryview) -> int:
 
 def _mesh(corners: Floats, normals: Floats, findings: list[Finding]) -> Mesh | None:
     """Return the mesh of corners (m, 3, 3); none if one is no float32 number (V001)."""
-    bad = _not_single(corners)
+    with np.errstate(over="ignore"):
+        bad = np.flatnonzero(~np.isfinite(corners.astype(np.float32)).all(axis=(1, 2)))
     if len(bad):
         findings.append(faces_not_finite(len(bad), (Location(face=int(i)) for i in bad)))
         return None
     vertices, faces = weld_exact(corners)
     # Zeros are no normals (T013), and most programs write none.
     return Mesh(vertices, faces, np.ascontiguousarray(normals) if normals.any() else None, indexed=False)
-
-
-def _not_single(corners: Floats) -> Ints:
-    """Return the faces of corners (m, 3, 3) of which one is no float32 number."""
-    found = [np.empty(0, np.intp)]
-    with np.errstate(over="ignore"):
-        for start in range(0, len(corners), _FACES):
-            finite = np.isfinite(corners[start : start + _FACES].astype(np.float32))
-            if not finite.all():
-                found.append(start + np.flatnonzero(~finite.all(axis=(1, 2))))
-    return np.concatenate(found)
 
 
 def _is_text(head: bytes, data: memoryview) -> bool:
