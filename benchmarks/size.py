@@ -16,8 +16,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (542_600, 402, 67_750),
-    "core": (269_600, 221, 34_700),
+    "total": (542_800, 402, 67_750),
+    "core": (270_000, 221, 34_750),
     "tests": (408_200, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
