@@ -120,7 +120,7 @@ def test_commands_refuse_bad_values_in_one_line(count, seed, tmp_path, capsys, m
         (["init", "CON"], "NAME"),
         (["init", "lpt1.mine"], "NAME"),
         (["init", "ends."], "NAME"),
-        (["schema", "\udcff"], "schema"),
+        (["schema", "\udcff"], "KIND"),
         (["coupon", "\x00"], "PRINTER"),
     ],
 )
