@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from unitcad import __version__
 from unitcad.arrays.array import Array
@@ -233,6 +233,8 @@ def _patch(moulds: PatchMoulds, store: Store) -> tuple[list[PartRecord], dict[st
     )
     for body in blank.unit:
         parts[body.name] = {**record(blank, body), "material": _material(moulds, body.step), "files": {}}
+        if (solids := len(blank.mesh(body).decompose())) > 1:
+            parts[body.name]["solids"] = solids
         path, key = f"patch/{file_stem(body)}.stl", partial(body_key, blank, body, "stl")
         table.append(Planned(path, partial(stl_content, blank, body), key, form="stl", bodies=(body.name,)))
     glb = partial(patch_glb, blank, patch_parts(moulds.arranged))
@@ -376,7 +378,7 @@ def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
 def _under(folder: str, part: PartRecord) -> PartRecord:
     """Return a unit's part as the array's manifest has it: name and files under the unit's folder."""
     files = {
-        form: BodyFile(path=f"{folder}/{file['path']}", sha256=file["sha256"]) for form, file in part["files"].items()
+        form: cast("BodyFile", {**file, "path": f"{folder}/{file['path']}"}) for form, file in part["files"].items()
     }
     return {**part, "name": f"{folder}: {part['name']}", "files": files}
 

@@ -166,8 +166,8 @@ def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchSt
 def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tuple[Body, ...]]:
     """Return the bodies of each of the printer's plates by its 3MF: `stem`.3mf, or numbered if there are several.
 
-    In their order, each on the first plate with room for it. A spare tongue, the piece that bends first, is added if
-    there is room.
+    In their order, each on the first plate with room for it. A spare tongue, the piece that bends first, is added to
+    the tongue's plate if it has room.
     """
     bed_x, bed_y = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
     filled: list[dict[Body, tuple[float, float]]] = []
@@ -176,6 +176,8 @@ def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tup
     for body in (*bodies, *spare):
         x0, y0, _, x1, y1, _ = extent(body.shape)
         for plate in filled:
+            if body in spare and tongue not in plate:
+                continue
             sizes = [*plate.values(), (x1 - x0, y1 - y0)]
             ends = ((x + w, y + d) for (x, y), (w, d) in zip(layout(sizes, (bed_x, bed_y)), sizes, strict=True))
             if all(x <= bed_x and y <= bed_y for x, y in ends):

@@ -35,6 +35,7 @@ class Listing:
 class _File(msgspec.Struct):
     path: str
     sha256: str | None = None
+    copies: int = 1
 
 
 class _Part(msgspec.Struct):
@@ -70,7 +71,8 @@ def read(where: str) -> Listing:
                 outside.append(file.path)
                 continue
             place = os.path.abspath(path.parent / file.path)
-            new = ListedFile((part.name,), part.role == "tool", file.sha256, part.volume_mm3, part.solids)
+            volume = None if part.volume_mm3 is None else file.copies * part.volume_mm3
+            new = ListedFile((part.name,), part.role == "tool", file.sha256, volume, file.copies * part.solids)
             listed[place] = _together(listed[place], new) if place in listed else new
     return Listing(path, listed, manifest.printer if isinstance(manifest.printer, str) else None, tuple(outside))
 

@@ -211,7 +211,10 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, prog
         progress(planned.stage)
         made[planned.path] = sha256 = store.file(planned.key(), planned.make)
         for name in planned.bodies:
+            copies = planned.bodies.count(name)
             parts[name]["files"][planned.form] = BodyFile(path=planned.path, sha256=sha256)
+            if copies > 1:
+                parts[name]["files"][planned.form]["copies"] = copies
 
     later = [planned for planned in table if planned.stage in ("step", "step pictures")]
     for planned in table:

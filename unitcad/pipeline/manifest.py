@@ -29,14 +29,18 @@ NO_KERNEL = "no B-rep kernel is installed for STEP"
 
 
 class BodyFile(TypedDict):
-    """A file that contains a body."""
+    """A file that contains a body; `copies`: how often, if more than once."""
 
     path: str
     sha256: str
+    copies: NotRequired[int]
 
 
 class PartRecord(TypedDict):
-    """A body of unit or tooling; `files` by format, `bbox_mm` the mesh's (x0, y0, z0, x1, y1, z1)."""
+    """A body of unit or tooling; `files` by format, `bbox_mm` the mesh's (x0, y0, z0, x1, y1, z1).
+
+    `solids`: how many it consists of, if more than one.
+    """
 
     name: str
     role: str
@@ -47,6 +51,7 @@ class PartRecord(TypedDict):
     bbox_mm: list[float]
     triangles: int
     files: dict[str, BodyFile]
+    solids: NotRequired[int]
 
 
 class PourRecord(TypedDict):

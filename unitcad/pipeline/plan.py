@@ -18,7 +18,7 @@ import numpy as np
 
 from unitcad import __version__
 from unitcad.cache import digest
-from unitcad.casting.bill import plates
+from unitcad.casting.bill import SPARE_TONGUE, plates
 from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.preparation import slicer_settings
 from unitcad.casting.views import picture_path
@@ -31,9 +31,10 @@ from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import mould_set
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import step_helper
-from unitcad.pipeline.scenes import pictures
-from unitcad.shape import Shape, content_hash
+from unitcad.pipeline.scenes import GAP, pictures
+from unitcad.shape import Shape, content_hash, moved
 from unitcad.shape.body import Body, copies, part_names
+from unitcad.shape.column import extent
 from unitcad.spec import Spec
 from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.spec.raw import OUTPUTS, Output
@@ -94,10 +95,14 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
             settings = slicer_settings(moulds) if group.name == "moulds" else {}
             make = partial(threemf_content, moulds, plate, settings)
             key = partial(joint_key, moulds, plate, "3mf", *bed, settings)
-            yield Planned(path, make, key, form="3mf", bodies=tuple(body.name for body in plate if body in printed))
+            spared = next((body.name for body in plate if body.kind == "tongue"), "")
+            names = tuple(spared if body.name == SPARE_TONGUE else body.name for body in plate)
+            yield Planned(path, make, key, form="3mf", bodies=names)
         make, key = partial(glb_content, moulds, every), partial(joint_key, moulds, every, "glb")
         yield Planned(f"{together}.glb", make, key, form="glb", bodies=names)
-        yield step_file(f"{together}.step", moulds, [body.in_file for body in every], group.name)
+        solids = [body.in_file for body in every]
+        solids = side_by_side(solids) if group.name == "moulds" else solids
+        yield step_file(f"{together}.step", moulds, solids, group.name)
     if "unit" in only:
         yield _drawn(moulds, "section.svg", partial(unit_section, moulds), "section")
     if "casting" in only:
@@ -278,6 +283,25 @@ def unit_section(moulds: MouldSet) -> str:
     """Return the drawing of the unit cut along its tail, with dimensions in mm, as SVG."""
     concentric = moulds.design.tooling == "concentric"
     return svg.unit_section(moulds.unit, moulds.dimensions, moulds.segments, concentric=concentric)
+
+
+def side_by_side(bodies: Sequence[Body]) -> list[Body]:
+    """Return pieces of tooling, those of each later pour and further bases and trays next to the first pour's.
+
+    As assembled, the cups of two pours would be in one place.
+    """
+    columns, first = [], True
+    last = max((body.step or 1 for body in bodies), default=1)
+    for body in bodies:
+        column = (body.step or 1) - 1
+        if body.kind in ("base", "tray"):
+            column, first, last = (0, False, last) if first else (last, False, last + 1)
+        columns.append(column)
+    boxes = [extent(body.shape) for body in bodies]
+    pitch = max((box[3] for box in boxes), default=0.0) - min((box[0] for box in boxes), default=0.0) + GAP
+    return [
+        replace(body, shape=moved(body.shape, x=column * pitch)) for body, column in zip(bodies, columns, strict=True)
+    ]
 
 
 def step_file(path: str, moulds: MouldSet, bodies: Sequence[Body], name: str) -> Planned:

@@ -8,6 +8,7 @@ from unitcad import catalogue
 from unitcad.designs import design_of
 from unitcad.designs.limits import EPS
 from unitcad.spec import Spec, motor_of
+from unitcad.spec.custom_code import is_body_file
 from unitcad.text import number
 
 CIRCUIT_STOCK = (0.05, 0.5)
@@ -38,9 +39,10 @@ def _thin_layers(spec: Spec) -> list[str]:
 
 
 def _leads(spec: Spec) -> list[str]:
-    if spec.fpcb or spec.wires or spec.motor.absent or not design_of(spec).caps:
+    drawn = is_body_file(spec.design)
+    if spec.fpcb or spec.wires or spec.motor.absent or not (design_of(spec).caps or drawn):
         return []
-    offer = "add a table [wires] with diameter_mm, or [fpcb]"
+    offer = "draw a notch for them" if drawn else "add a table [wires] with diameter_mm, or [fpcb]"
     return [f"no way out for the motor's leads: they lie between unit and skin; {offer}"]
 
 
