@@ -52,9 +52,9 @@ def test_a_unit_that_the_constants_were_fitted_to_is_not_scored(tmp_path: Path) 
 
 
 def test_points_farther_out_are_over_the_unit_s_own_level(tmp_path: Path) -> None:
-    rows = ["embedded D30/D10,0,0.5,,f", "embedded D30/D10,10,0.1,,f", "embedded D30/E10,10,0.1,,f"]
+    rows = ["embedded D30/D10,0,0.5,,f", "embedded D30/D10,10,0.1,,f"]
     data = score(load_figure(written(tmp_path, *rows)))
-    (one,) = data["decay"]  # the other unit has no level at 0 mm
+    (one,) = data["decay"]
     curve = estimate_spec(load("embedded"))["layered"]["drives"]["flat"]["u"]
     assert one["measured"] == 0.2
     assert one["flat"] == pytest.approx({key: curve[key][10] for key in ("value", "low", "high")}, rel=1e-4)
@@ -105,3 +105,18 @@ def test_files_that_are_no_figures_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("unit,value\n")
     with pytest.raises(Refusal, match="must be unit,distance_mm,value,error,source"):
         load_figure(str(tmp_path / "a.csv"))
+
+
+@pytest.mark.parametrize(
+    ("row", "limit"),
+    [
+        ('embedded D30/E10,5,0.2,,"x"', "needs a row at 0 mm"),
+        ('embedded D10/D10,0,0.4,,"x"', "name it single D10"),
+    ],
+)
+def test_rows_that_can_not_be_compared_are_refused(row: str, limit: str, tmp_path: Path) -> None:
+    figure = tmp_path / "figure.csv"
+    figure.write_text(f"unit,distance_mm,value,error,source\n{row}\n")
+    with pytest.raises(Refusal, match=limit) as refused:
+        load_figure(str(figure))
+    assert refused.value.line == 2

@@ -57,12 +57,22 @@ def load_figure(source: str) -> tuple[Point, ...]:
     if not right:
         faults = [Refusal("header", ",".join(rows.fieldnames or ()), f"must be {','.join(COLUMNS)}")]
         faults[0].line = next(iter(lines), 1)
+    where: list[int] = []
     for row in rows if right else ():
+        line = list(lines)[rows.line_num - 1]
         try:
             points.append(_point(row))
+            where.append(line)
         except Refusal as fault:
-            fault.line = list(lines)[rows.line_num - 1]
+            fault.line = line
             faults.append(fault)
+    at_edge = {point.unit for point in points if point.distance_mm == 0.0}
+    for point, line in zip(points, where, strict=True) if not faults else ():
+        if point.unit not in at_edge:
+            faults.append(
+                Refusal("distance_mm", point.distance_mm, f"{point.unit} needs a row at 0 mm to compare with")
+            )
+            faults[-1].line = line
     if not points and not faults:
         raise Refusal("FIGURE", source, "has no points")
     for fault in faults:
@@ -106,6 +116,8 @@ def _layers(field: str, unit: str) -> tuple[str, list[str]]:
     layers = [short[name] for name in pair.split("/")]
     if (design == CONTROL) != (len(layers) == 1):
         raise Refusal(field, unit, f"{CONTROL} has one silicone, a design two or more")
+    if design != CONTROL and len(set(layers)) == 1:
+        raise Refusal(field, unit, f"all layers are one silicone: name it {CONTROL} {pair.split('/')[0]}")
     return design, layers
 
 
