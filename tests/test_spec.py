@@ -171,6 +171,8 @@ def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are() -> None
         load("encapsulating", ["layers.0.walls_mm=1"])
     with pytest.raises(Refusal, match=r"unknown key at the top; known: layers\.0\.wall_mm$"):
         load("encapsulating", ["wall_mm=1"])
+    with pytest.raises(Refusal, match=r"unknown key; skin_mm belongs above the first \[table\]$"):
+        load("encapsulating", {"layers.1.skin_mm": 0.4})
 
 
 def test_a_custom_design_without_its_text_is_refused() -> None:
