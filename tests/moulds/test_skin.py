@@ -18,6 +18,7 @@ from unitcad.validation import load, templates, warnings
 
 SETS = [
     ("encapsulating", "skin_mm=0.5"),
+    ("encapsulating", "skin_mm=20"),  # thicker than its floor, and than the unit
     ("embedded", "skin_mm=0.3", "moulds.cavities=[2,2]"),
     ("no-fpcb", "skin_mm=1.0", "motor.lip_mm=0.3", "moulds.draft_deg=2"),
     ("three-layer", "skin_mm=0.6", "moulds.printer=sla", "moulds.pour=injected"),
