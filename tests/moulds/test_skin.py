@@ -1,6 +1,7 @@
 """A film that closes the skin side: drawn below z = 0, cast in a tray, its silicone bought, its steps at the end."""
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,10 @@ def test_the_procedure_ends_with_the_skin(source):
     assert cure.wait_min == pytest.approx(60 * made.pours[-1].cure_h)
     bought = sum(i.quantity for i in made.bill if i.item.startswith(f"{last} part"))
     poured = sum(p.part_a_g + p.part_b_g for p in made.pours if p.material == last)
+    weighed, mixed, *_ = (step for step in made.assembly if step.title in ("Weigh for the skin", "Mix"))
+    assert made.assembly.index(mixed) == made.assembly.index(weighed) + 1
+    grams = [float(text) for text in re.findall(r"([\d.]+) g of", weighed.text)]
+    assert sum(grams) == pytest.approx(bought - poured, rel=0.01)
     film = cells * math.pi * (moulds.spec.diameter_mm / 2) ** 2 * moulds.spec.skin_mm / 1000
     assert bought - poured >= max(2.0, 1.5 * film)
     assert "skin tray" in {item.item for item in made.bill}

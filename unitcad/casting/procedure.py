@@ -26,6 +26,7 @@ from unitcad.casting.pouring import (
     after_pours,
     agent_faces,
     bond_faces,
+    film_mm3,
     measurements,
     motor_in,
     pour_steps,
@@ -141,6 +142,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
     pours = tuple(pour_of(batch, pour_steps(batch, shown), agent_faces(moulds, batch.step)) for batch in batches)
     silicones = [batch.silicone for batch in batches]
     grams = [batch.volume_mm3 * float(batch.silicone.density_g_cm3) / 1000 for batch in batches]
+    skin_g = film_mm3(moulds) * float(silicones[-1].density_g_cm3) / 1000
     prepared = tuple(preparation(moulds, list(dict.fromkeys(silicones))))
     out = tuple(release(moulds, silicones[0]))
     motor = *motor_in(moulds, silicones), *skin_on(moulds, silicones)
@@ -163,7 +165,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         bonds=bond_faces(moulds),
         release=out,
         assembly=motor,
-        measure=tuple(measurements(moulds, grams, slot)),
+        measure=tuple(measurements(moulds, grams, skin_g, slot)),
         eccentricity=eccentricity(moulds),
         without_ribs=eccentricity(moulds, with_ribs=False),
         walls=walls(moulds) if plan.concentric else (),
