@@ -209,7 +209,9 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     )
     assert lines[2].startswith(f"print moulds/moulds.3mf: about {duration(procedure['printing']['minutes'])}, at most ")
     assert lines[3] == "mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
-    assert lines[4].startswith(f"ready {duration(procedure['earliest_finish_min'])} after the print")
+    out = duration(procedure["earliest_finish_min"])
+    assert lines[4].startswith(f"out of the mould {out} after the print: 2 pours, ")
+    assert lines[4].endswith(" at the bench; motor in 24 h 5 min later")
     assert f"{len(manifest['mould_checks'])} of {len(manifest['mould_checks'])} mould checks passed" in lines[5]
     assert lines[6:8] == manifest["estimate"]["lines"]
     assert lines[8] == f"open {folder / 'bench.html'} to cast"

@@ -640,8 +640,8 @@ def measurements(
 ) -> Iterator[str]:
     """Name the measures of the first part, and their expected values.
 
-    `masses_g`: of each layer of one unit, trimmed; `skin_g`: of its skin. `slot_height`: of the slot as the slicer makes the tongue (mm), None
-    if it is the drawn one.
+    `masses_g`: of each layer of one unit, trimmed; `skin_g`: of its skin. `slot_height`: of the slot as the slicer
+    makes the tongue (mm), None if it is the drawn one.
     """
     spec, dims, off, exit = moulds.spec, moulds.plan.dimensions, eccentricity(moulds), moulds.plan.dimensions.exit
     over = f", with the skin {shown(dims.heights[-1] + dims.skin, 2)} mm" if dims.skin else ""
@@ -669,7 +669,10 @@ def measurements(
     closed = f", with the skin {shown(sum(masses_g) + skin_g)} g" if skin_g else ""
     weighed = f"Weigh one {moulds.makes}, trimmed{without}: {weights} g{closed}."
     if moulds.design.laid_in:
-        weighed = f"The silicone of one unit, trimmed, weighs {weights} g{closed}. What was laid in comes on top: weigh it before."
+        weighed = (
+            f"The silicone of one unit, trimmed, weighs {weights} g{closed}. What was laid in comes on top: weigh that "
+            "before."
+        )
     yield f"{weighed} Less means air{low}."
 
 
