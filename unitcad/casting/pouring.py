@@ -14,6 +14,7 @@ from unitcad.casting.figures import (
     LIFT_MIN,
     MIXING_MIN,
     MOST_ERROR_PCT,
+    OVER_ALL,
     PEEL_MIN,
     PULL_MIN,
     STRIKE_AGAIN_MIN,
@@ -24,6 +25,7 @@ from unitcad.casting.figures import (
     at_room,
     eccentricity,
     pouring_min,
+    unit_heights,
     window_length,
 )
 from unitcad.casting.preparation import inner
@@ -644,8 +646,12 @@ def measurements(
     makes the tongue (mm), None if it is the drawn one.
     """
     spec, dims, off, exit = moulds.spec, moulds.plan.dimensions, eccentricity(moulds), moulds.plan.dimensions.exit
-    over = f", with the skin {shown(dims.heights[-1] + dims.skin, 2)} mm" if dims.skin else ""
-    yield f"Height over all: {shown(dims.heights[-1], 2)} mm{over}."
+    layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
+    drawn = dims.heights[-1]
+    high = next((each.printed_mm for each in unit_heights(moulds) if each.what == OVER_ALL), drawn)
+    by_layers = f" ({shown(drawn, 2)} drawn, printed {layers})" if high != drawn else ""
+    over = f", with the skin {shown(high + dims.skin, 2)} mm" if dims.skin else ""
+    yield f"Height over all: {shown(high, 2)} mm{by_layers}{over}."
     if moulds.plan.concentric:
         yield f"Diameter at the skin: {shown(2 * dims.outer_radius, 2)} mm, in two directions."
         pushed = "" if off.ribs else " unless both cups were pushed the same way"
@@ -658,7 +664,6 @@ def measurements(
         yield moulds.across
     if exit:
         opening = "notch" if exit.high >= dims.heights[0] else "slot"
-        layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
         printed = f" ({shown(slot_height, 2)} if the tongue was printed {layers})" if slot_height else ""
         size = f"{shown(exit.width, 2)} wide, {shown(exit.height, 2)} high{printed}"
         yield f"The {opening}: {size}, open all the way."
