@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 
 from unitcad.casting.steps import in_short
@@ -16,8 +16,11 @@ from unitcad.spec import Spec, assumed_lengths, said_of
 from unitcad.text import listed, number
 
 
-def summary(spec: Spec, built: Built) -> Iterator[str]:
-    """Yield a line each: size and mass, times, grams, checks, the edge level, the page. What was not made has none."""
+def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[str]:
+    """Yield a line each: size and mass, times, grams, checks, the edge level, the page. What was not made has none.
+
+    A length that is `given`, by its path, counts as measured.
+    """
     manifest = built.manifest
     columns = row(spec, manifest)
     boxes = [part["bbox_mm"] for part in manifest["parts"] if part["role"] == "unit"]
@@ -28,7 +31,8 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         cells = json.loads((built.folder / "casting.json").read_bytes())["cells"] if manifest["casting"] else 1
         each = f"{cells} units, each " if cells > 1 else ""
         yield f"{each}{_across(spec, manifest['parts'])} mm across, {number(height, 3)} mm high{silicone}"
-    if assumed := assumed_lengths(spec):
+    assumed = {key: how for key, how in assumed_lengths(spec).items() if key not in given}
+    if assumed:
         lengths = (f"{said_of(spec, key)} ({how})" for key, how in assumed.items())
         yield f"measure first; assumed: {listed(lengths)}"
     if manifest["casting"]:
