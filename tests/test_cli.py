@@ -191,7 +191,7 @@ def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(
 def test_the_summary_of_a_gang_speaks_of_each_unit(tmp_path: Path) -> None:
     gang = ("--set", "moulds.cavities=[2,1]", "--only", "unit,casting", "--no-report", "--set", "motor.thickness_mm=2")
     done = run("build", "embedded", *gang, "-o", str(tmp_path))
-    assert done.stderr.startswith("embedded: 2 units, each 14 mm across")
+    assert done.stderr.startswith("embedded: 2 units, each 14 mm across, 2.11 mm high with its circuit, 2 without, ")
     assert "measure first; assumed: fpcb.thickness_mm = 0.11 (usual stock)\n" in done.stderr
 
 
