@@ -123,7 +123,10 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("output.formats=3", r"takes a list such as \[\"stl\"\]$"),
         ("moulds.cavities=3", r"takes a text or a list such as \[1, 1\]; nearest accepted: \[3, 3\]$"),
         ("layers.0=3", r"^layers\.0 = 3: takes a table"),
-        ("layers.7.wall_mm=1.0", r"^layers\.7\.wall_mm = 1: no entry 7: the list has the entries 0 to 1$"),
+        (
+            "layers.7.wall_mm=1.0",
+            r"^layers\.7\.wall_mm = 1: no entry 7: the list has the entries 0 to 1; Layer 1 is layers\.0$",
+        ),
         ("name=''", "must not be empty"),
         (f"name='{'x' * 121}'", "at most 120 characters"),
         ("name=2026-01-01", "date or time"),
