@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from unitcad.casting.bill import Item, grouped, in_words, to_csv
+from unitcad.casting.bill import Item, grouped, in_words, plural, to_csv
 from unitcad.casting.drawings import cast_colour
 from unitcad.casting.figures import OVER_ALL
 from unitcad.casting.preparation import MEASURED_MM
@@ -148,7 +148,8 @@ def _listed_items(items: Iterable[Item]) -> Iterator[str]:
     """Yield a line for each item with its note, silicones with both parts in one; one line for all without a note."""
     plain, parts = list[str](), dict[str, list[str]]()
     for item in items:
-        name, much = markdown(item.item), number(item.quantity, 3)
+        several = item.quantity != 1 and not item.unit.startswith(("strip", "pair"))
+        name, much = markdown(plural(item.item) if several else item.item), number(item.quantity, 3)
         silicone, part, letter = name.partition(" part ")
         if part:
             parts.setdefault(silicone, []).append(f"{much} g of part {letter}")
