@@ -189,9 +189,10 @@ def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(
 
 
 def test_the_summary_of_a_gang_speaks_of_each_unit(tmp_path: Path) -> None:
-    gang = ("--set", "moulds.cavities=[2,1]", "--only", "unit,casting", "--no-report")
+    gang = ("--set", "moulds.cavities=[2,1]", "--only", "unit,casting", "--no-report", "--set", "motor.thickness_mm=2")
     done = run("build", "embedded", *gang, "-o", str(tmp_path))
-    assert done.stderr.startswith("embedded: 2 units, each 14 mm across")
+    assert done.stderr.startswith("embedded: 2 units, each 14 mm across, 2.11 mm high with its circuit, 2 without, ")
+    assert "measure first; assumed: fpcb.thickness_mm = 0.11 (usual stock)\n" in done.stderr
 
 
 def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_output(tmp_path: Path) -> None:
@@ -209,7 +210,9 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     )
     assert lines[2].startswith(f"print moulds/moulds.3mf: about {duration(procedure['printing']['minutes'])}, at most ")
     assert lines[3] == "mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
-    assert lines[4].startswith(f"ready {duration(procedure['earliest_finish_min'])} after the print")
+    out = duration(procedure["earliest_finish_min"])
+    assert lines[4].startswith(f"out of the mould {out} after the print: 2 pours, ")
+    assert lines[4].endswith(" at the bench; motor in 24 h 5 min later")
     assert f"{len(manifest['mould_checks'])} of {len(manifest['mould_checks'])} mould checks passed" in lines[5]
     assert lines[6:8] == manifest["estimate"]["lines"]
     assert lines[8] == f"open {folder / 'bench.html'} to cast"

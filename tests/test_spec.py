@@ -123,7 +123,10 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("output.formats=3", r"takes a list such as \[\"stl\"\]$"),
         ("moulds.cavities=3", r"takes a text or a list such as \[1, 1\]; nearest accepted: \[3, 3\]$"),
         ("layers.0=3", r"^layers\.0 = 3: takes a table"),
-        ("layers.7.wall_mm=1.0", r"^layers\.7\.wall_mm = 1: no entry 7: the list has the entries 0 to 1$"),
+        (
+            "layers.7.wall_mm=1.0",
+            r"^layers\.7\.wall_mm = 1: no entry 7: the list has the entries 0 to 1; Layer 1 is layers\.0$",
+        ),
         ("name=''", "must not be empty"),
         (f"name='{'x' * 121}'", "at most 120 characters"),
         ("name=2026-01-01", "date or time"),
@@ -171,6 +174,8 @@ def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are() -> None
         load("encapsulating", ["layers.0.walls_mm=1"])
     with pytest.raises(Refusal, match=r"unknown key at the top; known: layers\.0\.wall_mm$"):
         load("encapsulating", ["wall_mm=1"])
+    with pytest.raises(Refusal, match=r"unknown key; skin_mm belongs above the first \[table\]$"):
+        load("encapsulating", {"layers.1.skin_mm": 0.4})
 
 
 def test_a_custom_design_without_its_text_is_refused() -> None:

@@ -57,6 +57,7 @@ def test_a_place_takes_like_too() -> None:
     ("change", "field", "words"),
     [
         ("unit.like=nope", "unit.like", "unknown name"),
+        ("motor.thickness_mm=2", "motor", "unknown key; closest: unit.motor.thickness_mm"),
         ("unit.like=3", "unit.like", "takes a text"),
         ("unit=nope.toml", "unit", "there is no file nope.toml"),
     ],

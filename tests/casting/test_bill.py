@@ -7,6 +7,7 @@ import re
 import pytest
 
 from tests.sample_bodies import LEADLESS
+from unitcad.casting.bill import plural
 from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.written import to_markdown
@@ -122,6 +123,12 @@ def test_the_sheet_begins_with_what_to_measure() -> None:
     wires = {size.key for size in casting("no-fpcb").printing.sizes}
     assert "wires.diameter_mm" in wires
     assert "fpcb.thickness_mm" not in wires
+
+
+def test_several_of_an_item_are_plural() -> None:
+    names = ["flexible circuit", "pad of stacked card", "filament stub, straight", "LCM0720A3463F"]
+    several = ["flexible circuits", "pads of stacked card", "filament stubs, straight", "LCM0720A3463F"]
+    assert [plural(name) for name in names] == several
 
 
 def test_a_length_that_is_given_is_not_assumed() -> None:

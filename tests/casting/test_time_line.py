@@ -112,5 +112,5 @@ def test_in_short_names_the_pours_whose_bubbles_stay() -> None:
     lines = list(in_short(asdict(casting("encapsulating"))))
     assert lines[0].startswith("print moulds/moulds.3mf: about ")
     assert lines[1] == "mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
-    assert lines[2].startswith("ready ")
+    assert lines[2].startswith("out of the mould ")
     assert len(lines) == 3

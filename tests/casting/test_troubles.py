@@ -26,7 +26,11 @@ def test_a_set_lists_what_it_can_have() -> None:
     """An embedded unit has neither tongue nor filament, one with wires no circuit that a slot must pass."""
     every = {trouble.sign for trouble in troubles()}
     assert signs("encapsulating") == every
-    assert every - signs("embedded") == {"The unit sticks on the core", "A film closes the slot"}
+    slots = {"A film closes the slot", "The circuit won't pass the slot"}
+    assert every - signs("embedded") == {"The unit sticks on the core", *slots}
+    for vacuum in (True, False):
+        page = troubles_markdown(troubles(MouldSet(load("embedded", {"casting.vacuum": vacuum}))))
+        assert ("casting.vacuum = true" in page) != vacuum
     assert every - signs("no-fpcb") == {"The circuit won't pass the slot"}
 
 

@@ -1,13 +1,16 @@
 """A film that closes the skin side: drawn below z = 0, cast in a tray, its silicone bought, its steps at the end."""
 
 import math
+import re
 from pathlib import Path
 
+import msgspec
 import pytest
 from casting_rules import broken_rules
 from faulty_sets import mesh_findings, set_of, with_fault
 
 from unitcad.casting.procedure import procedure
+from unitcad.casting.steps import in_short
 from unitcad.casting.views import picture_path, views
 from unitcad.checks import check_moulds, overlap
 from unitcad.checks.balance import findings as balance
@@ -18,6 +21,7 @@ from unitcad.validation import load, templates, warnings
 
 SETS = [
     ("encapsulating", "skin_mm=0.5"),
+    ("encapsulating", "skin_mm=20"),  # thicker than its floor, and than the unit
     ("embedded", "skin_mm=0.3", "moulds.cavities=[2,2]"),
     ("no-fpcb", "skin_mm=1.0", "motor.lip_mm=0.3", "moulds.draft_deg=2"),
     ("three-layer", "skin_mm=0.6", "moulds.printer=sla", "moulds.pour=injected"),
@@ -49,6 +53,8 @@ def test_the_procedure_ends_with_the_skin(source):
     moulds = set_of(*source)
     made = procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
     assert broken_rules(made) == []
+    assert (made.later_mixes, made.last) == (1, "Motor in and skin on")
+    assert "; motor in and skin on, with 1 more mix, " in [*in_short(msgspec.to_builtins(made))][2]
     on, cure = made.assembly[-2:]
     assert (on.title, cure.title) == ("Skin on", "Let the skin cure")
     assert on.picture == picture_path("skin-on")
@@ -57,6 +63,10 @@ def test_the_procedure_ends_with_the_skin(source):
     assert cure.wait_min == pytest.approx(60 * made.pours[-1].cure_h)
     bought = sum(i.quantity for i in made.bill if i.item.startswith(f"{last} part"))
     poured = sum(p.part_a_g + p.part_b_g for p in made.pours if p.material == last)
+    weighed, mixed, *_ = (step for step in made.assembly if step.title in ("Weigh for the skin", "Mix"))
+    assert made.assembly.index(mixed) == made.assembly.index(weighed) + 1
+    grams = [float(text) for text in re.findall(r"([\d.]+) g of", weighed.text)]
+    assert sum(grams) == pytest.approx(bought - poured, rel=0.01)
     film = cells * math.pi * (moulds.spec.diameter_mm / 2) ** 2 * moulds.spec.skin_mm / 1000
     assert bought - poured >= max(2.0, 1.5 * film)
     assert "skin tray" in {item.item for item in made.bill}

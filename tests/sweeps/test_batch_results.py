@@ -267,8 +267,10 @@ def test_init_writes_a_spec_that_names_every_key(tmp_path):
             assert re.search(rf"\b{path.rpartition('.')[2]}\b", text), path
     # Taking away one # changes one value, without another word.
     changed = text.replace("# [moulds]", "[moulds]").replace('# printer = "fdm-0.4"', 'printer = "fdm-0.4"')
-    (tmp_path / "changed.toml").write_text(changed.replace("# fill = false", "fill = true"))
+    changed = changed.replace("# skin_mm = 0.0", "skin_mm = 0.4").replace("# fill = false", "fill = true")
+    (tmp_path / "changed.toml").write_text(changed)
     assert load(str(tmp_path / "changed.toml")).motor.fill
+    assert load(str(tmp_path / "changed.toml")).skin_mm == 0.4
     assert unitcad("init", "my-unit", cwd=tmp_path).returncode == 2
     assert unitcad("init", "../x", cwd=tmp_path).returncode == 2
     assert unitcad("init", "y", "--template", "nonsense", cwd=tmp_path).returncode == 2

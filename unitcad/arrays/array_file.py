@@ -32,6 +32,7 @@ from unitcad.shape import mm
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import fields_of
+from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import text_of
 from unitcad.spec.toml_lines import line_of
 from unitcad.text import listed
@@ -39,7 +40,7 @@ from unitcad.validation import custom_templates, default_template, from_data, te
 from unitcad.validation.dotted import ABSENT, at
 from unitcad.validation.load import changed, override
 from unitcad.validation.shipped_files import named_file, shipped_files
-from unitcad.validation.suggestions import every_fault
+from unitcad.validation.suggestions import every_fault, numbers
 from unitcad.validation.tables import Changes, changes_of
 
 
@@ -265,6 +266,10 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
         table, kind = layout_of(asked)
     except UnknownKey as key:
         limit = key.limit.replace("`unitcad schema`", "`unitcad schema array`")
+        if key.field in fields_of(RawSpec):
+            below = next(numbers(key.value), ("", 0))[0]
+            limit = f"unknown key; closest: unit.{key.field}{below and f'.{below}'}"
+            raise UnknownKey(key.field, key.value, limit) from None
         raise UnknownKey(key.field, key.value, limit, key.nearest) from None
     way = construction_of(asked.array, asked.limb.cast)
     if way.cast == "curved" and asked.limb.radius_mm is None:

@@ -475,6 +475,7 @@ def pocket_procedure(
         bill=pocket_bill(moulds, batch, [*prepared, *poured, *out, *together], units),
         makes="sheet",
         last="Units in",
+        castings=sum(castings(count, unit) for count, unit in zip(counts(array), units.values(), strict=True)),
     )
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache, partial
 from pathlib import Path
@@ -131,8 +131,8 @@ class Arrayed(Compound):
     ) -> None:
         estimate_arrays(names, sets, hertz, masses, details, as_json)
 
-    def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
-        return array_summary(self.of, folder, manifest)
+    def summary(self, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
+        return array_summary(self.of, folder, manifest, given)
 
     @property
     def moulds(self) -> PatchMoulds:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +23,23 @@ from unitcad.cli.output import console, print_json, progress
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
-from unitcad.text import number
+from unitcad.spec import assumed_lengths, said_of
+from unitcad.text import listed, number
 from unitcad.validation import compound_kind
 
 
-def array_summary(array: Array, folder: Path, manifest: Manifest) -> Iterator[str]:
-    """Yield a line each: units and size, casting, checks, crosstalk, the page."""
+def array_summary(array: Array, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
+    """Yield a line each: units and size, lengths to measure, casting, checks, crosstalk, the page; `given`: as for
+    a unit's summary.
+    """
     box = array.sheet.outline
     size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
     yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {number(array.sheet.thickness_mm, 3)} mm thick"
+    unit = array.units[0]
+    assumed = {key: how for key, how in assumed_lengths(unit).items() if f"unit.{key}" not in given}
+    if assumed:
+        lengths = listed(f"unit.{said_of(unit, key)} ({how})" for key, how in assumed.items())
+        yield f"measure first; assumed: {lengths}; build with yours: --set unit.{next(iter(assumed))}=MM"
     if manifest["casting"]:
         told = {f"warning: {line}" for line in manifest["warnings"]}
         lines = in_short(json.loads((folder / "casting.json").read_bytes()))

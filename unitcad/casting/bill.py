@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -60,6 +61,15 @@ def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
     return tuple(
         item if item.unit == "g" or item.quantity == 1 else replace(item, unit=f"{item.unit}s") for item in items
     )
+
+
+_COUNTED = "flexible circuit", "filament stub", "pad", "wire", "lead wire", "syringe", "own motor"
+
+
+def plural(item: str) -> str:
+    """Return the name of several of an item; parts keep their number, and sets and pairs their words."""
+    noun = next((noun for noun in _COUNTED if re.match(rf"{noun}\b", item)), "")
+    return f"{noun}s{item.removeprefix(noun)}" if noun else item
 
 
 def grouped(items: Iterable[Item]) -> dict[str, list[Item]]:

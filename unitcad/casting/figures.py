@@ -493,6 +493,9 @@ def off_grid(moulds: MouldSet) -> list[OffGrid]:
     ]
 
 
+OVER_ALL = "height over all"
+
+
 def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
     """Return the cavity's depth and every layer's height over its ground, if the printer's layers change them."""
     dims, concentric, layer = moulds.plan.dimensions, moulds.plan.concentric, moulds.spec.moulds.layer_mm
@@ -504,7 +507,7 @@ def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
         low, drawn_low = below if capped else (0.0, 0.0)
         heights.append((f"layer {i}'s {'cap' if capped else 'height'}", asked - low, printed - drawn_low))
         below = asked, printed
-    heights.append(("height over all", *below))
+    heights.append((OVER_ALL, *below))
     off = ((what, round(asked, 4), round(printed, 4)) for what, asked, printed in heights)
     return [UnitHeight(*each) for each in off if abs(each[1] - each[2]) > NEAR * layer]
 

@@ -14,6 +14,7 @@ from unitcad.casting.figures import (
     LIFT_MIN,
     MIXING_MIN,
     MOST_ERROR_PCT,
+    OVER_ALL,
     PEEL_MIN,
     PULL_MIN,
     STRIKE_AGAIN_MIN,
@@ -24,6 +25,7 @@ from unitcad.casting.figures import (
     at_room,
     eccentricity,
     pouring_min,
+    unit_heights,
     window_length,
 )
 from unitcad.casting.preparation import inner
@@ -358,13 +360,19 @@ def mixed(batch: Batch) -> Iterator[BenchStep]:
     )
     yield BenchStep(
         "Mix",
-        f"Mix for {number(MIXING_MIN, 3)} min, scraping walls and bottom, until no streak is left. The pot life of "
-        f"{number(batch.pot_min, 2)} min runs from now. Keep the mixing cup.",
+        f"{_mixing(batch.pot_min)} Keep the mixing cup.",
         kind="mix",
         minutes=MIXING_MIN,
     )
     if batch.vacuum:
         yield BenchStep("Degas", batch.verdict, minutes=DEGASSING_MIN)
+
+
+def _mixing(pot_min: float) -> str:
+    return (
+        f"Mix for {number(MIXING_MIN, 3)} min, scraping walls and bottom, until no streak is left. The pot life of "
+        f"{number(pot_min, 2)} min runs from now."
+    )
 
 
 def injected(batch: Batch, picture: str) -> Iterator[BenchStep]:
@@ -501,7 +509,10 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     if moulds.design.laid_in or moulds.spec.motor.absent:
         return
     fittings, casting = assembly(moulds), moulds.spec.casting
+    later = {each.use: each for each in after_pours(moulds, silicones)}
     for i, fitting in enumerate(fittings):
+        if fitting.mixed:
+            yield from _mixed_later(later[fitting.mixed], moulds.spec)
         title = f"Motor in, {i + 1} of {len(fittings)}" if len(fittings) > 1 else "Motor in"
         path = picture_path("motor-home" if i or fed_through(moulds) else "motor-in")
         minutes = LAY_IN_MIN * len(moulds.plan.layout.cells)
@@ -511,7 +522,7 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     if ring:
         (silicone,) = _by_layer(silicones, [ring.silicone])
         hours = at_room(float(silicone.cure_h), casting.room_c)
-        what, said = ring.mixed, f"{silicone.name} is mixed as for a pour and cures {number(hours, 2)} h."
+        what, said = ring.mixed, f"{silicone.name} cures {number(hours, 2)} h."
     elif any(ADHESIVE in fitting.needs for fitting in fittings):
         what, hours = "adhesive", ADHESIVE_CURE_H
         said = f"{number(hours, 2)} h, or as its tube says."
@@ -528,19 +539,26 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
 
 def skin_on(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
     """Describe how a film closes the skin side, the motor already in."""
-    skin, spec, cells = moulds.dimensions.skin, moulds.spec, len(moulds.plan.layout.cells)
-    if not skin:
+    spec, cells = moulds.spec, len(moulds.plan.layout.cells)
+    film = next((each for each in after_pours(moulds, silicones) if each.use == "skin"), None)
+    if not film:
         return
-    material, blade = silicones[-1], "the blade" if moulds.plan.of_kind("blade") else "a straight edge"
-    hours = at_room(float(material.cure_h), spec.casting.room_c)
+    blade = "the blade" if moulds.plan.of_kind("blade") else "a straight edge"
+    hours = at_room(float(film.silicone.cure_h), spec.casting.room_c)
+    yield from _mixed_later(film, spec)
+    yield BenchStep(
+        "Fill the skin tray",
+        f"Level the skin tray, fill it and draw {blade} along its rim. Prick bubbles with a pin.",
+        picture_path("skin-on"),
+        minutes=pouring_min(cells),
+        needs=("level", "pin"),
+    )
     yield BenchStep(
         "Skin on",
-        f"Mix {material.name} as for a pour. Level the skin tray, fill it and draw {blade} along its rim. Lower the "
-        "unit onto the wet film, skin side down, one edge first so that no air stays, and press it down lightly. No "
-        "release agent on its skin side.",
+        "Lower the unit onto the wet film, skin side down, one edge first so that no air stays, and press it down "
+        "lightly. No release agent on its skin side.",
         picture_path("skin-on"),
-        minutes=MIXING_MIN + WEIGH_MIN + LAY_IN_MIN * cells,
-        needs=("level",),
+        minutes=LAY_IN_MIN * cells,
     )
     yield BenchStep(
         "Let the skin cure",
@@ -554,6 +572,21 @@ def skin_on(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchSt
     )
 
 
+def _mixed_later(mix: AfterPours, spec: Spec) -> Iterator[BenchStep]:
+    """Describe the way from the bottles to a mix after the pours; the bench page has no fields for it."""
+    ratio = float(mix.silicone.mix_ratio)
+    part_b = mix.grams / (1 + ratio)
+    pot_min = at_room(float(mix.silicone.pot_life_min), spec.casting.room_c)
+    yield BenchStep(
+        f"Weigh for the {mix.use}",
+        f"Weigh {shown(mix.grams - part_b)} g of {mix.silicone.name} part A and {shown(part_b)} g of part B.",
+        minutes=WEIGH_MIN,
+    )
+    yield BenchStep("Mix", _mixing(pot_min), minutes=MIXING_MIN)
+    if spec.casting.vacuum:
+        yield BenchStep("Degas", "Degas as for a pour.", minutes=DEGASSING_MIN)
+
+
 def after_pours(moulds: MouldSet, silicones: Sequence[Material]) -> list[AfterPours]:
     """Return the silicones that are mixed after the pours, for rings round motors and for skins, one batch each."""
     cells, casting, dims = len(moulds.plan.layout.cells), moulds.spec.casting, moulds.dimensions
@@ -562,12 +595,17 @@ def after_pours(moulds: MouldSet, silicones: Sequence[Material]) -> list[AfterPo
         (each.mixed, _by_layer(silicones, [each.silicone])[0], each.volume_mm3) for each in fittings if each.mixed
     ]
     if dims.skin:
-        wanted.append(("skin", silicones[-1], math.pi * dims.outer_radius**2 * dims.skin))
+        wanted.append(("skin", silicones[-1], film_mm3(moulds)))
     found = []
     for use, material, volume in wanted:
         net = cells * volume * float(material.density_g_cm3) / 1000
         found.append(AfterPours(material, use, max(net * (1 + casting.waste), casting.minimum_mix_g)))
     return found
+
+
+def film_mm3(moulds: MouldSet) -> float:
+    """Return the volume of the film over one unit's skin side; 0 if it has none."""
+    return math.pi * moulds.dimensions.outer_radius**2 * moulds.dimensions.skin
 
 
 def _by_layer(silicones: Sequence[Material], layers: Iterable[int]) -> list[Material]:
@@ -599,15 +637,21 @@ def assembly(moulds: MouldSet) -> tuple[Fitting, ...]:
     )
 
 
-def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float | None) -> Iterator[str]:
+def measurements(
+    moulds: MouldSet, masses_g: Sequence[float], skin_g: float, slot_height: float | None
+) -> Iterator[str]:
     """Name the measures of the first part, and their expected values.
 
-    `masses_g`: of each layer of one unit, trimmed. `slot_height`: of the slot as the slicer makes the tongue (mm), None
-    if it is the drawn one.
+    `masses_g`: of each layer of one unit, trimmed; `skin_g`: of its skin. `slot_height`: of the slot as the slicer
+    makes the tongue (mm), None if it is the drawn one.
     """
     spec, dims, off, exit = moulds.spec, moulds.plan.dimensions, eccentricity(moulds), moulds.plan.dimensions.exit
-    over = f", with the skin {shown(dims.heights[-1] + dims.skin, 2)} mm" if dims.skin else ""
-    yield f"Height over all: {shown(dims.heights[-1], 2)} mm{over}."
+    layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
+    drawn = dims.heights[-1]
+    high = next((each.printed_mm for each in unit_heights(moulds) if each.what == OVER_ALL), drawn)
+    by_layers = f" ({shown(drawn, 2)} drawn, printed {layers})" if high != drawn else ""
+    over = f", with the skin {shown(high + dims.skin, 2)} mm" if dims.skin else ""
+    yield f"Height over all: {shown(high, 2)} mm{by_layers}{over}."
     if moulds.plan.concentric:
         yield f"Diameter at the skin: {shown(2 * dims.outer_radius, 2)} mm, in two directions."
         pushed = "" if off.ribs else " unless both cups were pushed the same way"
@@ -620,7 +664,6 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
         yield moulds.across
     if exit:
         opening = "notch" if exit.high >= dims.heights[0] else "slot"
-        layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
         printed = f" ({shown(slot_height, 2)} if the tongue was printed {layers})" if slot_height else ""
         size = f"{shown(exit.width, 2)} wide, {shown(exit.height, 2)} high{printed}"
         yield f"The {opening}: {size}, open all the way."
@@ -628,10 +671,12 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
     low = "" if spec.moulds.pour == "injected" else " or a low strike"
     motor = "motor" if moulds.makes == "unit" else "motors"
     without = "" if spec.motor.absent else f", without {motor} and circuit"
-    weighed = f"Weigh one {moulds.makes}, trimmed{without}: {weights} g."
+    closed = f", with the skin {shown(sum(masses_g) + skin_g)} g" if skin_g else ""
+    weighed = f"Weigh one {moulds.makes}, trimmed{without}: {weights} g{closed}."
     if moulds.design.laid_in:
         weighed = (
-            f"The silicone of one unit, trimmed, weighs {weights} g. What was laid in comes on top: weigh it before."
+            f"The silicone of one unit, trimmed, weighs {weights} g{closed}. What was laid in comes on top: weigh that "
+            "before."
         )
     yield f"{weighed} Less means air{low}."
 

@@ -26,6 +26,7 @@ from unitcad.casting.pouring import (
     after_pours,
     agent_faces,
     bond_faces,
+    film_mm3,
     measurements,
     motor_in,
     pour_steps,
@@ -72,7 +73,8 @@ class Procedure:
     `earliest_finish_min`: from the first step, the pieces just printed, until the units are out of the mould, of which
     `bench_min` with a person at the bench; `time_line` goes on until the motor is in.
 
-    `makes`: the product; `last`: the purpose of `assembly`.
+    `makes`: the product; `last`: the purpose of `assembly`, for which silicone is mixed `later_mixes` times.
+    `castings`: how often moulds of units are filled, if units are cast apart from the sheet.
     `bonds` are the tools' faces that must never get release agent.
     `tunnels`: the cups whose windows resin may cure shut.
     `eccentricity` is that of the cups on the core, `without_ribs` the one without ribs or pins; None without cups.
@@ -104,6 +106,8 @@ class Procedure:
     troubles: tuple[Trouble, ...] = ()
     makes: str = "unit"
     last: str = "Motor in"
+    later_mixes: int = 0
+    castings: int = 0
 
 
 def pour_of(batch: Batch, steps: Iterable[BenchStep], agent: Sequence[Face] = ()) -> Pour:
@@ -141,9 +145,13 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
     pours = tuple(pour_of(batch, pour_steps(batch, shown), agent_faces(moulds, batch.step)) for batch in batches)
     silicones = [batch.silicone for batch in batches]
     grams = [batch.volume_mm3 * float(batch.silicone.density_g_cm3) / 1000 for batch in batches]
+    skin_g = film_mm3(moulds) * float(silicones[-1].density_g_cm3) / 1000
     prepared = tuple(preparation(moulds, list(dict.fromkeys(silicones))))
     out = tuple(release(moulds, silicones[0]))
-    motor = *motor_in(moulds, silicones), *skin_on(moulds, silicones)
+    motor, skin = tuple(motor_in(moulds, silicones)), tuple(skin_on(moulds, silicones))
+    last = " and ".join(["motor in"] * bool(motor or not skin) + ["skin on"] * bool(skin))
+    motor += skin
+    after = after_pours(moulds, silicones)
     edges = tuple(off_grid(moulds))
     printed = any(tool.made == "printed" for tool in plan.of_kind("tongue"))
     slot = next((edge.nearest_mm for edge in edges if edge.piece == "tongue" and printed), None)
@@ -154,7 +162,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         cells=cells,
         vacuum=spec.casting.vacuum,
         tunnels=tunnels(moulds),
-        **times(prepared, pours, out, "motor in", motor),
+        **times(prepared, pours, out, last, motor),
         printing=printing(moulds, printed_mm3),
         preparation=prepared,
         off_grid=edges,
@@ -163,14 +171,16 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         bonds=bond_faces(moulds),
         release=out,
         assembly=motor,
-        measure=tuple(measurements(moulds, grams, slot)),
+        measure=tuple(measurements(moulds, grams, skin_g, slot)),
         eccentricity=eccentricity(moulds),
         without_ribs=eccentricity(moulds, with_ribs=False),
         walls=walls(moulds) if plan.concentric else (),
         warnings=tuple(warnings(spec)) if moulds.makes == "unit" else (),
         troubles=troubles(moulds),
         makes=moulds.makes,
-        bill=bill(moulds, batches, every, after_pours(moulds, silicones)),
+        bill=bill(moulds, batches, every, after),
+        last=last.capitalize(),
+        later_mixes=len(after),
     )
 
 

@@ -139,13 +139,19 @@ def in_short(procedure: Mapping[str, Any]) -> Iterator[str]:
         if item["unit"] == "g":
             grams[item["item"].removesuffix(" part A").removesuffix(" part B")] += item["quantity"]
     total, bench = duration(procedure["earliest_finish_min"]), duration(procedure["bench_min"])
-    pours = procedure["pours"]
+    pours, castings, mixes = procedure["pours"], procedure["castings"], procedure["later_mixes"]
     count = f"{len(pours)} pour{'s' if len(pours) > 1 else ''}"
+    if castings:
+        count = f"{castings} casting{'s' if castings > 1 else ''} of units and {count} of the sheet"
+    later = procedure["time_line"][-1]
+    more = later["start_min"] + later["bench_min"] + later["wait_min"] - procedure["earliest_finish_min"]
+    mixed = f", with {mixes} more mix{'es' if mixes > 1 else ''}," if mixes else ""
+    then = f"; {procedure['last'].lower()}{mixed} {duration(more)} later" if procedure["assembly"] else ""
     printing = procedure["printing"]
     time, volume = duration(printing["minutes"]), number(printing["cm3"], 2)
     yield f"print {listed(printing['plates'])}: about {time}, at most {volume} cm3 of {printing['of']}"
     yield "mix " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams.items())
-    yield f"ready {total} after the print: {count}, {bench} at the bench"
+    yield f"out of the mould {total} after the print: {count}, {bench} at the bench{then}"
     yield from (f"warning: {line}" for line in pour_warnings(pours))
 
 

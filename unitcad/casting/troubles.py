@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from unitcad.moulds.mould_set import MouldSet
 
 TROUBLES = "troubleshooting.md"
 """The file of a result that has them."""
-_Part = Literal["cup", "tongue", "stub", "fpcb", "motor"]
+_Part = Literal["cup", "tongue", "stub", "slot", "motor"]
+_VACUUM = "casting.vacuum = true, or "
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ _KNOWN: tuple[tuple[Trouble, _Part | None], ...] = (
             "Silicone is torn",
             "It was opened too early, lifted over a tongue, or levered on one side alone.",
             "Close a small tear with silicone adhesive. Cast again if it runs through the slot or into the bond.",
-            "layers.0.wall_mm larger, or a silicone with more elongation at break.",
+            "the torn layer's wall_mm larger (Layer 1 is layers.0), or a silicone with more elongation at break.",
         ),
         None,
     ),
@@ -67,7 +68,7 @@ _KNOWN: tuple[tuple[Trouble, _Part | None], ...] = (
             "A bubble opens at the skin",
             "Air stayed in the mix or in the corner of the seat.",
             "Fill the hole with a drop of the same mix, strike it off and let it cure.",
-            "casting.vacuum = true, or a silicone that flows more easily.",
+            f"{_VACUUM}a silicone that flows more easily.",
         ),
         None,
     ),
@@ -78,7 +79,7 @@ _KNOWN: tuple[tuple[Trouble, _Part | None], ...] = (
             "Cut the film. Wet the tail with isopropanol. Solder a wide end on after the tail is through.",
             "moulds.slot_width_clearance_mm or moulds.slot_height_mm larger.",
         ),
-        "fpcb",
+        "slot",
     ),
     (
         Trouble(
@@ -115,8 +116,14 @@ def troubles(moulds: MouldSet | None = None) -> tuple[Trouble, ...]:
     spec = moulds and moulds.spec
     there = {tool.kind for tool in moulds.plan.tools} if moulds else set[str]()
     if spec:
-        there |= {*([] if spec.motor.absent else ["motor"]), *(["fpcb"] if spec.fpcb else [])}
-    return tuple(trouble for trouble, part in _KNOWN if not moulds or part is None or part in there)
+        there |= {*([] if spec.motor.absent else ["motor"])}
+        there |= {"slot"} if spec.fpcb and "tongue" in there else set()
+    had = spec is not None and spec.casting.vacuum
+    return tuple(
+        replace(trouble, spec=trouble.spec.removeprefix(_VACUUM)) if had else trouble
+        for trouble, part in _KNOWN
+        if not moulds or part is None or part in there
+    )
 
 
 def troubles_markdown(these: Iterable[Trouble]) -> str:

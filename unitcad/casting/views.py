@@ -162,8 +162,7 @@ def _views(moulds: MouldSet) -> Views:
         down = 1.2 * (moulds.dimensions.core_height - bottom)
         x, y = plan.layout.cells[0].x, -plan.layout.plate[1]
         names = Name("filament", (x, y * 0.8, bottom - down)), Name("groove", (x, y * 0.7, bottom))
-        # Next to the upright ends: in front of the bent ends the plate would hide them.
-        up = tuple(arrow((0, 0, 1), c.x + 4.0, c.y - 4.0, bottom - down / 2, 7.0) for c in plan.layout.cells)
+        up = _beside_filaments(moulds, 1)
         yield "filament", View((*base, *placed(stubs, z=-down)), up, UNDER, "under", names=names, way=0)
     standing, on = (*base, *placed(stubs)), level_on(moulds)
     yield "level", _level((*standing, Placed(on.cup)), cup_x, on.rim, plan.layout.plate, bottom)
@@ -332,6 +331,13 @@ def _injected(
     yield "filled", View(closed, held, group=group, names=(Name("touch here", vent, ring=True),))
 
 
+def _beside_filaments(moulds: MouldSet, up: int) -> tuple[Extra, ...]:
+    """Draw an arrow, up (1) or down (-1), next to each upright end: the plate would hide one at a bent end."""
+    bottom = moulds.plate[0]
+    z = bottom - 0.6 * (moulds.dimensions.core_height - bottom)
+    return tuple(arrow((0, 0, up), cell.x + 4.0, cell.y - 4.0, z, 7.0) for cell in moulds.plan.layout.cells)
+
+
 def _corner(moulds: MouldSet, z: float) -> Name:
     """Name the cut corner of a cup whose rim is at `z`."""
     x, y = moulds.plan.layout.cup
@@ -346,7 +352,8 @@ def _way_out(moulds: MouldSet) -> Views:
     stays = () if any(removal.piece == last.cup for removal in last.removals) else (Placed(last.cup),)
     if stubs := plan.of_kind("stub"):
         away = placed(stubs, z=1.2 * (bottom - moulds.dimensions.core_height))
-        yield "filament-out", View((*placed((*base, *cast)), *stays, *away), (), UNDER, "under", way=1)
+        out = _beside_filaments(moulds, -1)
+        yield "filament-out", View((*placed((*base, *cast)), *stays, *away), out, UNDER, "under", way=0)
     up = last.rim + CLEAR
     raised = placed(cast, z=up)
     if not stays:

@@ -9,8 +9,9 @@ from typing import Any
 
 import msgspec
 
-from unitcad.casting.bill import Item, grouped, in_words, to_csv
+from unitcad.casting.bill import Item, grouped, in_words, plural, to_csv
 from unitcad.casting.drawings import cast_colour
+from unitcad.casting.figures import OVER_ALL
 from unitcad.casting.preparation import MEASURED_MM
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import BenchStep, Phase, duration, shortened
@@ -147,7 +148,8 @@ def _listed_items(items: Iterable[Item]) -> Iterator[str]:
     """Yield a line for each item with its note, silicones with both parts in one; one line for all without a note."""
     plain, parts = list[str](), dict[str, list[str]]()
     for item in items:
-        name, much = markdown(item.item), number(item.quantity, 3)
+        several = item.quantity != 1 and not item.unit.startswith(("strip", "pair"))
+        name, much = markdown(plural(item.item) if several else item.item), number(item.quantity, 3)
         silicone, part, letter = name.partition(" part ")
         if part:
             parts.setdefault(silicone, []).append(f"{much} g of part {letter}")
@@ -207,8 +209,10 @@ def _appendix(procedure: Procedure) -> Iterator[str]:
     for o in procedure.off_grid:
         height, by = number(o.height_mm, 3), number(o.moved_mm, 2)
         yield f"- {spaced(o.piece)}, {o.edge}: {height} mm, which whole layers move by {by} mm"
-    heights = (f"{h.what} {number(h.printed_mm, 3)} for {number(h.asked_mm, 3)}" for h in procedure.unit_heights)
-    if procedure.unit_heights:
+    # The height over all is among the measures.
+    inside = [height for height in procedure.unit_heights if height.what != OVER_ALL]
+    heights = (f"{h.what} {number(h.printed_mm, 3)} for {number(h.asked_mm, 3)}" for h in inside)
+    if inside:
         yield f"- in whole layers, mm: {', '.join(heights)}"
     yield from ("", "All figures: casting.json.", "", "</details>")
 

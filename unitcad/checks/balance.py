@@ -15,6 +15,7 @@ from unitcad.moulds.cavities import BALANCE, Cavity
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.skin_tray import films
 from unitcad.shape import cylinder, moved
+from unitcad.shape.column import extent
 
 SHRUNK = 2e-4
 """Share of a length by which cast and cured layer may differ after shrinking: the grid moves either by 1/2048 mm."""
@@ -31,11 +32,12 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     for tray in moulds.plan.of_kind("tray"):
         solid, dims = moulds.mesh(tray), moulds.plan.dimensions
         rim, reach = dims.heights[-1], dims.outer_radius + moulds.spec.moulds.land_mm / 2
+        floor = extent(tray.shape)[2]
         for i, (cell, drawn) in enumerate(
             zip(moulds.plan.layout.cells, films(dims, moulds.plan.layout), strict=True), 1
         ):
             film = moulds.mesh_of(drawn)
-            column = realise(moved(cylinder(reach, rim - 2 * dims.skin, rim), cell.x, cell.y), moulds.segments)
+            column = realise(moved(cylinder(reach, floor, rim), cell.x, cell.y), moulds.segments)
             hollow = column - solid
             differ = hollow.volume() + film.volume() - 2 * (hollow ^ film).volume()
             yield at_most("C100", f"{tray.name} cell {i}", differ / film.volume(), BALANCE, "share of the film")

@@ -37,7 +37,9 @@ from unitcad.pipeline.subjects import Compound, load_subject
 from unitcad.pipeline.write import PAGE, Built, held
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
-from unitcad.validation import confirm_known
+from unitcad.spec import read_toml
+from unitcad.validation import confirm_known, every_template
+from unitcad.validation.suggestions import numbers
 
 
 def build(
@@ -110,6 +112,7 @@ def _built(
     allow_code(code)
     # Every spec is validated before the first one is built.
     wanted = [load_subject(spec, changes, chosen) for spec in specs]
+    given = [_given(spec, changes) for spec in specs]
     for spec in wanted if slicing else ():
         check_slicing(spec.unit, chosen)
     results: list[Built] = []
@@ -131,17 +134,24 @@ def _built(
         for i, (spec, result) in enumerate(zip(wanted, results, strict=True)):
             _print_faults(result.manifest)
             # Standard output has the folder alone, for a script to take.
-            lines = [*_summary(spec, result), *printing[i : i + 1]]
+            lines = [*_summary(spec, result, given[i]), *printing[i : i + 1]]
             for line in sorted(lines, key=lambda line: line.startswith("open ")):  # what to open comes last
                 warn(f"{spec.name}: {line}")
             typer.echo(str(result.folder))
     return all(result.ok for result in results)
 
 
-def _summary(of: Subject, built: Built) -> Iterator[str]:
-    """Return the lines of a result."""
+def _given(source: str, changes: list[str]) -> set[str]:
+    """Return the paths of the numbers that a person gave, by --set or in a file that is no template."""
+    own = {} if source in every_template() else read_toml(Path(source))
+    return {change.partition("=")[0].strip() for change in changes} | {path for path, _ in numbers(own)}
 
-    return of.summary(built.folder, built.manifest) if isinstance(of, Compound) else summary(of.unit, built)
+
+def _summary(of: Subject, built: Built, given: set[str]) -> Iterator[str]:
+    """Return the lines of a result; `given`: see `_given`."""
+    if isinstance(of, Compound):
+        return of.summary(built.folder, built.manifest, given)
+    return summary(of.unit, built, given)
 
 
 def _print_faults(manifest: Manifest) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from pathlib import Path
 
 from unitcad.casting.steps import in_short
@@ -16,19 +16,24 @@ from unitcad.spec import Spec, assumed_lengths, said_of
 from unitcad.text import listed, number
 
 
-def summary(spec: Spec, built: Built) -> Iterator[str]:
-    """Yield a line each: size and mass, times, grams, checks, the edge level, the page. What was not made has none."""
+def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[str]:
+    """Yield a line each: size and mass, times, grams, checks, the edge level, the page. What was not made has none.
+
+    A length that is `given`, by its path, counts as measured.
+    """
     manifest = built.manifest
     columns = row(spec, manifest)
-    boxes = [part["bbox_mm"] for part in manifest["parts"] if part["role"] == "unit"]
-    if boxes:
-        height = max(box[5] for box in boxes) - min(box[2] for box in boxes)
+    parts = [part for part in manifest["parts"] if part["role"] == "unit"]
+    if parts:
+        high, alone = _height(parts), _height([part for part in parts if part["made"] != "bought"])
+        circuit = f" with its circuit, {alone} without" if alone != high and spec.fpcb else ""
         mass = columns.get("silicone_mass_g")
         silicone = f", {number(mass, 3)} g of silicone" if isinstance(mass, float) else ""
         cells = json.loads((built.folder / "casting.json").read_bytes())["cells"] if manifest["casting"] else 1
         each = f"{cells} units, each " if cells > 1 else ""
-        yield f"{each}{_across(spec, manifest['parts'])} mm across, {number(height, 3)} mm high{silicone}"
-    if assumed := assumed_lengths(spec):
+        yield f"{each}{_across(spec, manifest['parts'])} mm across, {high} mm high{circuit}{silicone}"
+    assumed = {key: how for key, how in assumed_lengths(spec).items() if key not in given}
+    if assumed:
         lengths = (f"{said_of(spec, key)} ({how})" for key, how in assumed.items())
         yield f"measure first; assumed: {listed(lengths)}"
     if manifest["casting"]:
@@ -48,6 +53,11 @@ def to_open(folder: Path) -> Iterator[str]:
     for name, use in ((BENCH, " to cast"), (PAGE, "")):
         if (folder / name).is_file():
             yield f"open {shlex.quote(str(folder / name))}{use}"
+
+
+def _height(parts: list[PartRecord]) -> str:
+    boxes = [part["bbox_mm"] for part in parts]
+    return number(max((box[5] for box in boxes), default=0.0) - min((box[2] for box in boxes), default=0.0), 3)
 
 
 def _across(spec: Spec, parts: list[PartRecord]) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -64,8 +64,11 @@ class Compound(Subject):
         """Print the estimate of one or several. `hertz`: one frequency, or a band. Raises Refusal."""
 
     @abstractmethod
-    def summary(self, folder: Path, manifest: Manifest) -> Iterator[str]:
-        """Yield the lines that a person reads at the end of a build, from the result's folder and manifest."""
+    def summary(self, folder: Path, manifest: Manifest, given: Container[str] = ()) -> Iterator[str]:
+        """Yield the lines that a person reads at the end of a build, from the result's folder and manifest.
+
+        A length that is `given`, by its path, counts as measured.
+        """
 
 
 def subject(of: Any) -> Subject:

@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from unitcad.errors import Refusal, UnknownKey, unknown_key, unknown_name
-from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, named_in, notes, table_in
+from unitcad.spec.fields import alternatives, entry_in, fields_of, is_value, meaning, named_in, notes, table_in
 from unitcad.text import invisible, printable, without_invisible
 
 T = TypeVar("T")
@@ -51,7 +51,13 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError:
-        raise next(_refusals(data, kind, field)) from None
+        refusal = next(_refusals(data, kind, field))
+        key = refusal.field.rpartition(".")[2]
+        top = fields_of(table).get(key) if not field and (table := table_in(kind)) else None
+        if isinstance(refusal, UnknownKey) and key != refusal.field and top and is_value(top.type):
+            limit = f"unknown key; {key} belongs above the first [table]"
+            raise UnknownKey(refusal.field, refusal.value, limit) from None
+        raise refusal from None
 
 
 def check_plain(node: Any, field: str = "", depth: int = 0) -> None:

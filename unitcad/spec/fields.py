@@ -45,6 +45,11 @@ def named_in(kind: Any) -> Any:
     return next((typing.get_args(k)[1] for k in alternatives(kind) if typing.get_origin(k) is dict), None)
 
 
+def is_value(kind: Any) -> bool:
+    """Tell whether `kind` takes no table, nor a list of tables: its key stands above every header of a file."""
+    return not (table_in(kind) or named_in(kind) or table_in(entry_in(kind)))
+
+
 def entry_in(kind: Any, index: int = 0) -> Any:
     """Return the kind of entry `index` of a list that `kind` allows; None if it allows no list so long."""
     for member in alternatives(kind):

@@ -77,4 +77,5 @@ def _index(node: list[Any], step: str, path: str, value: Any) -> int:
 def no_entry(path: str, value: Any, step: str, count: int) -> Refusal:
     """Return the refusal of a path with a step that names no entry of a list of `count` entries."""
     has = f"has the entries 0 to {count - 1}" if count > 1 else "has the entry 0 alone" if count else "is empty"
-    return Refusal(path, value, f"no entry {step}: the list {has}")
+    first = "; Layer 1 is layers.0" if path.startswith("layers.") else ""
+    return Refusal(path, value, f"no entry {step}: the list {has}{first}")

@@ -10,7 +10,7 @@ from typing import Any
 from msgspec import NODEFAULT, Struct
 from msgspec.structs import FieldInfo
 
-from unitcad.spec.fields import entry_in, fields_of, meaning, table_in
+from unitcad.spec.fields import entry_in, fields_of, is_value, meaning, table_in
 from unitcad.spec.toml import read_toml
 
 _NOT_OFFERED = ("design_source", "fit_source")
@@ -36,19 +36,26 @@ def commented(template: Path, name: str, model: type[Struct], schema: str) -> st
 
 def _further_keys(section: str, there: dict[str, Any], model: type[Struct]) -> str:
     """Return the keys that a table of the template leaves out, commented out."""
+    if not section.startswith("["):
+        tables = {name for name, field in fields_of(model).items() if not is_value(field.type)}
+        return "".join(f"{line}\n" for line in _keys(model, {*there, *tables, *_told(section)}))
     header = re.match(r"\[(\w+)\]", section)
     field = fields_of(model).get(header[1]) if header else None
     table = table_in(field.type) if field else None
     if not field or not table:
         return ""
-    told = {*there[field.name], *re.findall(r"^# (\w+) =", section, re.MULTILINE)}
+    told = {*there[field.name], *_told(section)}
     return "".join(f"{line}\n" for line in _keys(table, told))
+
+
+def _told(section: str) -> list[str]:
+    return re.findall(r"^# (\w+) =", section, re.MULTILINE)
 
 
 def _further_tables(told: set[str], model: type[Struct]) -> str:
     lines: list[str] = []
     for name, field in fields_of(model).items():
-        if name in told or name in _NOT_OFFERED:
+        if name in told or name in _NOT_OFFERED or is_value(field.type):
             continue
         table = table_in(field.type) or table_in(entry_in(field.type))
         about = f"  # {(table.__doc__ or '').partition(chr(10))[0]}" if table else _note(field)

@@ -201,7 +201,7 @@ def _suggested(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: M
 
 def culprit_of(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> dict[str, object]:
     """Return another value for the one key that is to blame: with it data are accepted; {} if there is none."""
-    unusual = ((path, given) for path, given in _numbers(data) if given != at(sound, path))
+    unusual = ((path, given) for path, given in numbers(data) if given != at(sound, path))
     for path, given in islice(unusual, _MOST_OTHERS):
         for good in good_numbers(data, path, judge, sound):
             return {path: nearest_number(data, path, good, given, judge)}
@@ -231,7 +231,7 @@ def good_numbers(data: Mapping[str, Any], path: str, judge: Judge, sound: Mappin
             yield good
 
 
-def _numbers(node: object, path: str = "") -> Iterator[tuple[str, float]]:
+def numbers(node: object, path: str = "") -> Iterator[tuple[str, float]]:
     """Yield the numbers in data by their paths."""
     entries: Iterable[tuple[object, object]] = ()
     if isinstance(node, Mapping):
@@ -243,7 +243,7 @@ def _numbers(node: object, path: str = "") -> Iterator[tuple[str, float]]:
         if is_number(value):
             yield below, value
         else:
-            yield from _numbers(value, below)
+            yield from numbers(value, below)
 
 
 def _is_typed(refusal: Refusal, data: Mapping[str, Any]) -> bool:

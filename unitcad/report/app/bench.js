@@ -184,7 +184,7 @@
     return section("plan", "Time",
       el("p", {}, el("strong", {}, duration(casting.earliest_finish_min)), ` from the printed pieces to the ${casting.makes} out of the mould, of which ${duration(casting.bench_min)} at the bench.`),
       el("div", { className: "fields screen" }, el("label", { className: "field" }, el("span", {}, "Must be ready"), ready),
-        casting.assembly.length > 0 && el("label", { className: "field" }, motor, el("span", {}, casting.makes === "unit" ? "with the motor in" : `with ${casting.time_line.at(-1).name}`))), out);
+        casting.assembly.length > 0 && el("label", { className: "field" }, motor, el("span", {}, `with the ${casting.last.toLowerCase()}`))), out);
   }
 
   // Step 0: the lengths of bought parts, and the command that builds with those that were measured.

@@ -70,7 +70,7 @@
       el("ol", {}, assumed.length > 0 && el("li", {}, `Measure first. Assumed: ${assumed.join("; ")}.`),
         el("li", {}, "Print ", plates.map((path, i) => [i ? ", " : "", link(path)]), `: ${takes} of ${of}.`),
         el("li", {}, `Mix ${[...grams].map(([name, mass]) => `${number(mass, 3)} g of ${name}`).join(", ")}.`),
-        el("li", {}, "Cast by ", link("bench.html"), `: ready ${duration(data.earliest_finish_min)} after the print, of which ${duration(data.bench_min)} at the bench.`)));
+        el("li", {}, "Cast by ", link("bench.html"), `: out of the mould ${duration(data.earliest_finish_min)} after the print, of which ${duration(data.bench_min)} at the bench.`)));
   }
 
   const besides = (folder, name) => [folder, name].filter(Boolean).join("/").split("/").map(encodeURIComponent).join("/");
