@@ -23,7 +23,10 @@ COMMANDS = {
     "build Embedded": "SPEC = 'Embedded': unknown name; closest: embedded, single-embedded; "
     "nearest accepted: 'embedded'",
     "build folder": "SPEC = 'folder': is a folder; name a TOML file in it",
-    "build ./folder": "folder: is a folder, not a regular file",
+    "build ./folder": "SPEC = './folder': is a folder; name a TOML file in it",
+    "estimate made": "SPEC = 'made': is a folder; name a TOML file in it; nearest accepted: 'made/spec.toml'",
+    "build ./part.step": "SPEC = './part.step': is a body: write design = \"./part.step\" in a spec",
+    "build README.md": "README.md: no such file",
     "build part.csv": "SPEC = 'part.csv': is not a TOML file, whose name ends in .toml",
     "build gone.toml": "gone.toml: no such file",
     "build empty.toml": "SPEC = 'empty.toml': is empty; `unitcad schema spec` lists its keys",
@@ -56,13 +59,17 @@ COMMANDS = {
     "estimate unit.toml --frequency 100-200": "--frequency = '100-200': must be HZ or FROM:TO:STEP, numbers above 0; "
     "nearest accepted: '100:200:10'",
     "check part.csv --select TT": "--select = 'TT': unknown code; unitcad check --list-rules lists all",
+    "check unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
+    "check --diff a.stl b.stl": "--diff = 'a.stl': no such file",
     "check part.csv --jobs 0": "--jobs = 0: must be at least 1; nearest accepted: 1",
     "check a.stl --printer ender": "--printer = 'ender': unknown name; closest: ender-3; nearest accepted: 'ender-3'",
     "check part.csv --report sarif": "--report = 'sarif': must be FORMAT=FILE; nearest accepted: 'sarif=report.sarif'",
     "material part.csv": "--like: is required: 'part' is no shipped silicone, and a curve gives only a modulus; known: "
     + SILICONES,
-    "material unit.toml --like ecoflex-00-30": "unit.toml: no reader for this ending; known: .h5, .hdf5, .mat, .tdms, "
-    ".csv, .txt, .tsv, .asc, .dat, .lvm, .tab, .uff, .unv, .wav",
+    "material part.csv --like ecoflex-00-30": "part.csv: needs two lines or more of the same count of numbers",
+    "material unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
+    "measure part.csv": "CAMPAIGN = 'part.csv': is not a TOML file, whose name ends in .toml",
+    "measure gone": "gone: no such file",
     "measure unit.toml": "CAMPAIGN = 'unit.toml': is a spec: run unitcad build unit.toml",
     "fit unit.toml": "LAB = 'unit.toml': is a spec: run unitcad build unit.toml",
     "fit nowhere": "LAB = 'nowhere': unknown name; known: synthetic-bench",
@@ -76,6 +83,7 @@ COMMANDS = {
     "init unit": "unit.toml: is there already; choose another name",
     "coupon prusa": "PRINTER = 'prusa': unknown name; closest: prusa-mk4, prusa-mk3s; nearest accepted: 'prusa-mk4'",
     "cache gc --limit 1GB": "--limit = '1GB': takes a number (MB), such as 4096",
+    "serve sweep.toml": "SPEC = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
     "report unit.toml": "unit.toml: is not a folder",
 }
 FILES = {
@@ -143,8 +151,10 @@ def answer(words, capsys, monkeypatch):
 @pytest.mark.parametrize("line", COMMANDS)
 def test_a_mistake_in_a_command_is_answered_in_one_line(line, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "folder").mkdir()
-    for name, text in {"unit.toml": GOOD, "empty.toml": "", "part.csv": "a,b\n"}.items():
+    for folder in ("folder", "made"):
+        (tmp_path / folder).mkdir()
+    files = {"unit.toml": GOOD, "made/spec.toml": GOOD, "empty.toml": "", "part.csv": "a,b\n", "part.step": ""}
+    for name, text in files.items():
         (tmp_path / name).write_text(text)
     (tmp_path / "binary.toml").write_bytes(b"\xff\x00\x80")
     (tmp_path / "sweep.toml").write_text(shipped_files("sweeps")["thickness"].read_text())

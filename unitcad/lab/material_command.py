@@ -20,6 +20,8 @@ from unitcad.lab.columns import declared
 from unitcad.lab.dynamic import DynamicResult, evaluate_dynamic, read_dynamic
 from unitcad.lab.readers import Layout
 from unitcad.lab.tensile import Specimen, TensileResult, evaluate, read_curve
+from unitcad.rooms import expect_none_but
+from unitcad.spec import read_toml
 
 _DELIMITERS = {"tab": "\t", "space": " "}
 _LENGTH: dict[str, Any] = {"metavar": "MM", "min": 0.001, "max": 10000, "callback": finite}
@@ -103,6 +105,8 @@ def material(
     for path in [*(curves or []), *([dma] if dma else [])]:
         if not path.exists():
             raise files.NotThere(f"{path}: no such file")
+        if path.suffix == ".toml":
+            expect_none_but("", read_toml(path), str(path), "FILE")
     shipped = catalogue.materials()
     named = name or _slug((curves or [dma])[0])  # type: ignore[arg-type]
     base = like or named
