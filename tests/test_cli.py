@@ -98,12 +98,8 @@ def test_estimate_says_that_build_would_refuse_the_moulds(setting: str, field: s
 
 WRONG = {
     "build --nope": "--nope: unknown option; see unitcad build --help",
-    "build --jobs 4": "--jobs: unknown option; see unitcad build --help",
-    "build --format stl": "--format: unknown option; closest: --formats",
     "build": "SPEC...: is required; see unitcad build --help",
-    "bild": "COMMAND = 'bild': unknown name; closest: build; nearest accepted: 'build'",
-    "build a --out": "Option '--out' requires an argument; see unitcad --help",
-    "check --jobs 0": "--jobs = 0: must be at least 1; nearest accepted: 1",
+    "build a --out": "--out: requires an argument; see unitcad build --help",
     "cache gc --limit -1": "--limit = -1: must be from 0 to 1e+12; nearest accepted: 0",
 }
 

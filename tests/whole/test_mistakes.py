@@ -16,7 +16,13 @@ THIN = "the motor (7), 0.1 of clearance and walls of 2.5 a side need 12.2 mm; ne
 
 COMMANDS = {
     "biuld unit.toml": "COMMAND = 'biuld': unknown name; closest: build; nearest accepted: 'build'",
-    "build unit.toml --jobs 4": "--jobs: unknown option; see unitcad build --help",
+    "version": "COMMAND = 'version': is an option; nearest accepted: '--version'",
+    "build unit.toml --jobs 4": "--jobs: unknown option; unitcad batch and unitcad check take it",
+    "build unit.toml --set diameter_mm 14": "--set = 'diameter_mm': needs the form path=value in one word, such as "
+    "layers.0.wall_mm=1.0",
+    "build unit.toml --formats stl step": "SPEC = 'step': is a format; several take commas: --formats stl,step",
+    "check --diff a.stl": "--diff: requires 2 arguments; see unitcad check --help",
+    "init new.txt": "NAME = 'new.txt': is the name of a TOML file; nearest accepted: 'new.toml'",
     "build unit.toml --format stl": "--format: unknown option; closest: --formats",
     "build encapsulatng": "SPEC = 'encapsulatng': unknown name; closest: encapsulating, single-encapsulating; "
     "nearest accepted: 'encapsulating'",
@@ -33,8 +39,8 @@ COMMANDS = {
     "build binary.toml": "binary.toml: not UTF-8 (byte 0)",
     "build sweep.toml": "SPEC = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
     "build target.toml": "SPEC = 'target.toml': is a target: run unitcad design target.toml",
-    "build unit.toml --set 'diameter_mm 15'": "--set = 'diameter_mm 15': needs the form path=value, such as "
-    "layers.0.wall_mm=1.0",
+    "build unit.toml --set 'diameter_mm 15'": "--set = 'diameter_mm 15': needs the form path=value in one word, such "
+    "as layers.0.wall_mm=1.0",
     "build unit.toml --set diameter_mm=14,5": "diameter_mm = '14,5': takes a number; nearest accepted: 14.5",
     "build unit.toml --set diameter_mm=1.45cm": "diameter_mm = '1.45cm': takes a number; nearest accepted: 14.5",
     "build unit.toml --set diameter_mm=1.4": f"diameter_mm = 1.4: {THIN}",
@@ -47,7 +53,7 @@ COMMANDS = {
     "name a lab-fit.toml of unitcad fit",
     "build unit.toml -o part.csv": "part.csv: is a file, not a folder; choose another with -o",
     "build unit.toml --set moulds.cavities=2x5": "moulds.cavities = '2x5': unknown name; known: fill or a list such as "
-    "[1, 1]",
+    "[1, 1]; nearest accepted: [2, 5]",
     "build forearm-patch --set layout.pitch_mm=x": "layout.pitch_mm = 'x': takes a number or a list such as [1.5, 1.5]",
     "batch unit.toml": "SWEEP = 'unit.toml': is a spec: run unitcad build unit.toml",
     "batch sweep.toml -j two": "--jobs = 'two': takes a whole number, such as 1",

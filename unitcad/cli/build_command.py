@@ -37,6 +37,7 @@ from unitcad.pipeline.subjects import Compound, load_subject
 from unitcad.pipeline.write import PAGE, Built, held
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
+from unitcad.spec.raw import FORMATS
 from unitcad.validation import confirm_known
 
 
@@ -68,6 +69,9 @@ def build(
     as_json: AsJson = False,
 ) -> None:
     """Make a unit and its casting moulds, or an array of units. The last line printed is the folder."""
+    for spec in specs:
+        if spec in FORMATS:
+            raise WrongArgument("spec", spec, "is a format; several take commas: --formats stl,step")
     specs = [confirm_known(spec) for spec in specs]
     once = partial(_built, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
     if not watch:

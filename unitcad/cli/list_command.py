@@ -20,7 +20,9 @@ from unitcad.validation.shipped_files import shipped_of
 
 
 def list_(
-    kind: Annotated[str, typer.Argument(help="Kind to list. Default: the kinds.", metavar="[KIND]")] = "",
+    kind: Annotated[
+        str, typer.Argument(help=f"Kind to list: {', '.join(_kinds())}. Default: the kinds.", metavar="[KIND]")
+    ] = "",
     as_json: AsJson = False,
 ) -> None:
     """List what is shipped, each value with its source and status."""

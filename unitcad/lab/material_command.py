@@ -20,6 +20,7 @@ from unitcad.lab.columns import declared
 from unitcad.lab.dynamic import DynamicResult, evaluate_dynamic, read_dynamic
 from unitcad.lab.readers import Layout
 from unitcad.lab.tensile import Specimen, TensileResult, evaluate, read_curve
+from unitcad.lab.units import COLUMN_UNITS
 from unitcad.rooms import expect_none_but
 from unitcad.spec import read_toml
 
@@ -45,7 +46,12 @@ def material(
     ] = "",
     column: Annotated[
         list[str] | None,
-        typer.Option(metavar="QUANTITY=COLUMN[:UNIT]", help="Column of a quantity, by name or number, and its unit."),
+        typer.Option(
+            metavar="QUANTITY=COLUMN[:UNIT]",
+            help="Column of a quantity by name or number, such as force=2:N. Quantities: "
+            + ", ".join(COLUMN_UNITS)
+            + ".",
+        ),
     ] = None,
     delimiter: Annotated[
         str, typer.Option(metavar="SIGN", help="Delimiter of the columns: , ; tab or space. Default: as in the file.")
