@@ -60,9 +60,9 @@ class _Commands(TyperGroup):
                 formatter.write_dl(rows)
 
 
-def _described(parameter: Any, context: Any) -> tuple[str, str]:
+def _described(parameter: Any, ctx: Any) -> tuple[str, str]:
     """Return Typer's line of a parameter for a help, with default and range as sentences."""
-    names, text = type(parameter).get_help_record(parameter, context)
+    names, text = type(parameter).get_help_record(parameter, ctx)
     text = re.sub(r"  \[default: ([^];]*?)\.?(?:; (.*))?\]$", r" Default: \1.  [\2]", text)
     text = re.sub(r"  \[(?:(\S+)<=)?x[<>]=(\S+)\]$", _range, text)
     return names, text.removesuffix("  []")
