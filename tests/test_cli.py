@@ -151,21 +151,6 @@ def test_help_and_version() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "field"),
-    [
-        (["build", "encapsulatin"], "SPEC = 'encapsulatin'"),
-        (["build", "encapsulating", "--only", "units"], "--only = 'units'"),
-        (["build", "encapsulating", "--set", "x"], "--set = 'x'"),
-    ],
-)
-def test_a_refused_argument_is_called_as_in_the_help(words: list[str], field: str, tmp_path: Path) -> None:
-    done = run(*words, "--json", cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"error: {field}: ")
-    assert json.loads(done.stdout)["error"]["field"] == field.partition(" ")[0]
-
-
-@pytest.mark.parametrize(
     ("words", "said"),
     [
         (["--only", "estimate"], "--only = 'estimate': has no moulds, which --slice is for; nearest accepted"),
