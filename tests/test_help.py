@@ -36,6 +36,9 @@ def test_a_parameter_says_what_goes_in_and_what_holds_without_it(parameter):
     text = parameter.help
     assert text[0].isupper() or text.startswith("manifest.json")
     assert text.endswith(".")
+    told = parameter.get_help_record(CONTEXT)[1]
+    assert "[default" not in told
+    assert "x>=" not in told
     assert is_flag(parameter) or parameter.metavar, "needs a metavar"
     open_flag = is_flag(parameter) and parameter.default is None
     if open_flag or not (is_flag(parameter) or parameter.required or parameter.multiple or parameter.nargs == -1):

@@ -37,3 +37,11 @@ def check_number(name: str, given: object, least: float, most: float, whole: boo
     if number is None or isinstance(given, bool) or not least <= cast("float", number) <= most:
         noun = "a whole number" if whole else "a number"
         raise WrongArgument(name, given, f"must be {noun} from {least:g} to {most:g}", least)
+
+
+def confirm_form(text: str) -> str:
+    """Return a change as it is. Raises WrongArgument for one that has another form than path=value."""
+    path, equals, _ = text.partition("=")
+    if not equals or not path.strip():
+        raise WrongArgument("set", text, "needs the form path=value in one word, such as layers.0.wall_mm=1.0")
+    return text

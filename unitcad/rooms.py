@@ -6,8 +6,9 @@ and the kinds of TOML files that it knows.
 
 from __future__ import annotations
 
+import shlex
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -15,6 +16,8 @@ from typing import Any
 
 import msgspec
 from msgspec import Struct, field
+
+from unitcad.errors import Refusal
 
 _CORE = "cli"
 """The package whose additions come first."""
@@ -87,3 +90,18 @@ def stored_spec() -> Callable[[Path, str], str] | None:
 def file_kinds() -> tuple[FileKind, ...]:
     """Return the kinds of TOML files."""
     return tuple(kind for room in _rooms() for kind in room.files)
+
+
+def expect_none_but(
+    wanted: str, data: Mapping[str, object], source: str, field: str, refused: type[Refusal] = Refusal
+) -> None:
+    """Raise `refused`, of a field, for a file of another kind than `wanted`, known by the keys of its data."""
+    found = next((kind for kind in file_kinds() if kind.keys and all(key in data for key in kind.keys)), None)
+    if found and found.name != wanted and found.command:
+        raise of_other_kind(found, field, source, refused)
+
+
+def of_other_kind(found: FileKind, field: str, source: str, refused: type[Refusal]) -> Refusal:
+    """Return the refusal of a file by its kind, with the command that takes it."""
+    article = "an" if found.name[0] in "aeiou" else "a"
+    return refused(field, source, f"is {article} {found.name}: run {found.command} {shlex.quote(source)}")

@@ -154,3 +154,10 @@ def test_of_beds_a_tenth_less_than_the_one_offered_is_refused(bed: float) -> Non
 def test_a_strap_slot_as_long_as_wide_is_a_round_hole(name: str) -> None:
     moulds = patch_moulds(load_array(name, {"sheet.strap_slot_mm": [3, 3]}))
     assert moulds.plan
+
+
+def test_the_name_that_was_meant_is_offered_before_another_one() -> None:
+    limit, nearest = "unknown name; closest: pockets; then its units are held with their own circuits", "pockets"
+    with pytest.raises(Refusal) as refused:
+        load_array("forearm-patch", {"array": "pocket"})
+    assert (refused.value.limit.partition("; [")[0], refused.value.nearest) == (limit, nearest)

@@ -17,11 +17,12 @@ from unitcad.errors import Refusal
 from unitcad.estimating import estimate_spec
 from unitcad.kernels.mesh import realise
 from unitcad.lab.phantom import bench, phantom_files, phantom_set
-from unitcad.lab.phantom.recipe import PhantomTable, load_phantom, modulus_by_table, phantoms
+from unitcad.lab.phantom.recipe import PhantomTable, load_phantom, modulus_by_table
 from unitcad.shape import box, exact_volume
 from unitcad.shape.lettering import engraving
 from unitcad.spec import convert
 from unitcad.validation import load
+from unitcad.validation.shipped_files import shipped_files
 
 DATA = Path(__file__).parent / "data" / "phantom-material-database" / "phantoms_table.csv"
 LAYERS = [
@@ -197,7 +198,7 @@ def test_what_can_not_be_is_refused(changed, field, part):
 
 def test_a_refused_phantom_leaves_no_folder(tmp_path):
     file = tmp_path / "p.toml"
-    file.write_text(phantoms()["skin"].read_text("utf-8").replace('"fdm-0.4"', '"sla"'), "utf-8")
+    file.write_text(shipped_files("phantoms")["skin"].read_text("utf-8").replace('"fdm-0.4"', '"sla"'), "utf-8")
     with pytest.raises(Refusal, match="known: skin"):
         load_phantom("nope")
     done = CliRunner().invoke(app, ["phantom", str(file), "-o", str(tmp_path / "out")])

@@ -15,7 +15,8 @@ from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
 from unitcad.search.candidates import candidates
 from unitcad.search.proposals import leads_block
-from unitcad.search.target_file import load_target, shipped, target_of
+from unitcad.search.target_file import load_target, target_of
+from unitcad.validation.shipped_files import shipped_files
 
 
 @pytest.mark.parametrize(
@@ -66,8 +67,8 @@ def test_a_fault_of_a_table_for_every_spec_is_named() -> None:
 
 
 def test_shipped_targets_load_and_are_listed(run: Any) -> None:
-    assert set(shipped()) == {"amplify", "published", "quiet-edge"}
-    for name in shipped():
+    assert set(shipped_files("targets")) == {"amplify", "published", "quiet-edge"}
+    for name in shipped_files("targets"):
         assert load_target(name).name == name
         assert name in run("list", "targets").stdout
 
@@ -90,7 +91,7 @@ def test_a_target_to_start_from(run: Any, tmp_path: Path) -> None:
 def test_the_schema_takes_the_shipped_targets(run: Any) -> None:
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads(run("schema", "target").stdout)
-    for path in shipped().values():
+    for path in shipped_files("targets").values():
         jsonschema.validate(tomllib.loads(path.read_text("utf-8")), schema)
 
 

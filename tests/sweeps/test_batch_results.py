@@ -14,6 +14,7 @@ from unitcad.spec import to_toml
 from unitcad.sweeps import BatchOptions, load_sweep, run
 from unitcad.sweeps.executors import SerialExecutor
 from unitcad.validation import from_data, load, read
+from unitcad.validation.shipped_files import shipped_files
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 
@@ -240,10 +241,9 @@ def test_the_schema_holds_the_specs_and_sweeps_that_are_shipped():
     import tomllib
 
     jsonschema = pytest.importorskip("jsonschema")
-    from unitcad.sweeps.sweep import shipped
     from unitcad.validation import templates
 
-    for kind, files in (("spec", templates()), ("sweep", shipped())):
+    for kind, files in (("spec", templates()), ("sweep", shipped_files("sweeps"))):
         done = unitcad("schema", kind)
         assert done.returncode == 0
         validator = jsonschema.Draft202012Validator(json.loads(done.stdout))

@@ -15,8 +15,9 @@ from unitcad.pipeline.subjects import subject
 from unitcad.sweeps import load_sweep
 from unitcad.sweeps.paths import known_paths
 from unitcad.sweeps.run import counted
-from unitcad.sweeps.sweep import Range, from_file, shipped
+from unitcad.sweeps.sweep import Range, from_file
 from unitcad.validation import load, read
+from unitcad.validation.shipped_files import shipped_files
 
 SOFT, STIFF = "ecoflex-00-10", "dragon-skin-30"
 
@@ -86,7 +87,7 @@ def test_shipped_sweeps_hold_what_they_say(name, count, geometries):
     assert sweep.count == count
     specs = [sweep.spec(i) for i in range(count)]
     assert len({build_key(spec, ("unit", "moulds"), True) for spec in specs}) == geometries
-    assert set(shipped()) == {"published", "thickness", "all-materials"}
+    assert set(shipped_files("sweeps")) == {"published", "thickness", "all-materials"}
 
 
 def test_the_paper_sweep_has_every_measured_unit():

@@ -16,22 +16,31 @@ THIN = "the motor (7), 0.1 of clearance and walls of 2.5 a side need 12.2 mm; ne
 
 COMMANDS = {
     "biuld unit.toml": "COMMAND = 'biuld': unknown name; closest: build; nearest accepted: 'build'",
-    "build unit.toml --jobs 4": "--jobs: unknown option; see unitcad build --help",
+    "version": "COMMAND = 'version': is an option; nearest accepted: '--version'",
+    "build unit.toml --jobs 4": "--jobs: unknown option; unitcad batch and unitcad check take it",
+    "build unit.toml --set diameter_mm 14": "--set = 'diameter_mm': needs the form path=value in one word, such as "
+    "layers.0.wall_mm=1.0",
+    "build unit.toml --formats stl step": "SPEC = 'step': is a format; several take commas: --formats stl,step",
+    "check --diff a.stl": "--diff: requires 2 arguments; see unitcad check --help",
+    "init new.txt": "NAME = 'new.txt': is the name of a TOML file; nearest accepted: 'new.toml'",
     "build unit.toml --format stl": "--format: unknown option; closest: --formats",
     "build encapsulatng": "SPEC = 'encapsulatng': unknown name; closest: encapsulating, single-encapsulating; "
     "nearest accepted: 'encapsulating'",
     "build Embedded": "SPEC = 'Embedded': unknown name; closest: embedded, single-embedded; "
     "nearest accepted: 'embedded'",
     "build folder": "SPEC = 'folder': is a folder; name a TOML file in it",
-    "build ./folder": "folder: is a folder, not a regular file",
+    "build ./folder": "SPEC = './folder': is a folder; name a TOML file in it",
+    "estimate made": "SPEC = 'made': is a folder; name a TOML file in it; nearest accepted: 'made/spec.toml'",
+    "build ./part.step": "SPEC = './part.step': is a body: write design = \"./part.step\" in a spec",
+    "build README.md": "README.md: no such file",
     "build part.csv": "SPEC = 'part.csv': is not a TOML file, whose name ends in .toml",
     "build gone.toml": "gone.toml: no such file",
     "build empty.toml": "SPEC = 'empty.toml': is empty; `unitcad schema spec` lists its keys",
     "build binary.toml": "binary.toml: not UTF-8 (byte 0)",
     "build sweep.toml": "SPEC = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
     "build target.toml": "SPEC = 'target.toml': is a target: run unitcad design target.toml",
-    "build unit.toml --set 'diameter_mm 15'": "--set = 'diameter_mm 15': needs the form path=value, such as "
-    "layers.0.wall_mm=1.0",
+    "build unit.toml --set 'diameter_mm 15'": "--set = 'diameter_mm 15': needs the form path=value in one word, such "
+    "as layers.0.wall_mm=1.0",
     "build unit.toml --set diameter_mm=14,5": "diameter_mm = '14,5': takes a number; nearest accepted: 14.5",
     "build unit.toml --set diameter_mm=1.45cm": "diameter_mm = '1.45cm': takes a number; nearest accepted: 14.5",
     "build unit.toml --set diameter_mm=1.4": f"diameter_mm = 1.4: {THIN}",
@@ -44,7 +53,7 @@ COMMANDS = {
     "name a lab-fit.toml of unitcad fit",
     "build unit.toml -o part.csv": "part.csv: is a file, not a folder; choose another with -o",
     "build unit.toml --set moulds.cavities=2x5": "moulds.cavities = '2x5': unknown name; known: fill or a list such as "
-    "[1, 1]",
+    "[1, 1]; nearest accepted: [2, 5]",
     "build forearm-patch --set layout.pitch_mm=x": "layout.pitch_mm = 'x': takes a number or a list such as [1.5, 1.5]",
     "batch unit.toml": "SWEEP = 'unit.toml': is a spec: run unitcad build unit.toml",
     "batch sweep.toml -j two": "--jobs = 'two': takes a whole number, such as 1",
@@ -56,19 +65,28 @@ COMMANDS = {
     "estimate unit.toml --frequency 100-200": "--frequency = '100-200': must be HZ or FROM:TO:STEP, numbers above 0; "
     "nearest accepted: '100:200:10'",
     "check part.csv --select TT": "--select = 'TT': unknown code; unitcad check --list-rules lists all",
+    "check unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
+    "check --diff a.stl b.stl": "--diff = 'a.stl': no such file",
     "check part.csv --jobs 0": "--jobs = 0: must be at least 1; nearest accepted: 1",
     "check a.stl --printer ender": "--printer = 'ender': unknown name; closest: ender-3; nearest accepted: 'ender-3'",
     "check part.csv --report sarif": "--report = 'sarif': must be FORMAT=FILE; nearest accepted: 'sarif=report.sarif'",
     "material part.csv": "--like: is required: 'part' is no shipped silicone, and a curve gives only a modulus; known: "
     + SILICONES,
-    "material unit.toml --like ecoflex-00-30": "unit.toml: no reader for this ending; known: .h5, .hdf5, .mat, .tdms, "
-    ".csv, .txt, .tsv, .asc, .dat, .lvm, .tab, .uff, .unv, .wav",
+    "material part.csv --like ecoflex-00-30": "part.csv: needs two lines or more of the same count of numbers",
+    "material unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
+    "measure part.csv": "CAMPAIGN = 'part.csv': is not a TOML file, whose name ends in .toml",
+    "measure gone": "gone: no such file",
     "measure unit.toml": "CAMPAIGN = 'unit.toml': is a spec: run unitcad build unit.toml",
     "fit unit.toml": "LAB = 'unit.toml': is a spec: run unitcad build unit.toml",
     "fit nowhere": "LAB = 'nowhere': unknown name; known: synthetic-bench",
     "score part.csv": "part.csv:1: header = 'a,b': must be unit,distance_mm,value,error,source",
     "score unit.toml": "FIGURE = 'unit.toml': is not a CSV file",
     "phantom skn": "PHANTOM = 'skn': unknown name; closest: skin; nearest accepted: 'skin'",
+    "build sweep": "SPEC = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
+    "estimate thickness": "SPEC = 'thickness': is a sweep: run unitcad batch thickness",
+    "batch forearm-patch": "SWEEP = 'forearm-patch': is an array: run unitcad build forearm-patch",
+    "design sweep": "TARGET = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
+    "phantom unit": "PHANTOM = 'unit.toml': is a spec: run unitcad build unit.toml",
     "design quiet": "TARGET = 'quiet': unknown name; closest: quiet-edge; nearest accepted: 'quiet-edge'",
     "list motor": "KIND = 'motor': unknown name; closest: motors; nearest accepted: 'motors'",
     "schema sweeps": "KIND = 'sweeps': unknown name; closest: sweep; nearest accepted: 'sweep'",
@@ -76,6 +94,7 @@ COMMANDS = {
     "init unit": "unit.toml: is there already; choose another name",
     "coupon prusa": "PRINTER = 'prusa': unknown name; closest: prusa-mk4, prusa-mk3s; nearest accepted: 'prusa-mk4'",
     "cache gc --limit 1GB": "--limit = '1GB': takes a number (MB), such as 4096",
+    "serve sweep.toml": "SPEC = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
     "report unit.toml": "unit.toml: is not a folder",
 }
 FILES = {
@@ -143,8 +162,10 @@ def answer(words, capsys, monkeypatch):
 @pytest.mark.parametrize("line", COMMANDS)
 def test_a_mistake_in_a_command_is_answered_in_one_line(line, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "folder").mkdir()
-    for name, text in {"unit.toml": GOOD, "empty.toml": "", "part.csv": "a,b\n"}.items():
+    for folder in ("folder", "made"):
+        (tmp_path / folder).mkdir()
+    files = {"unit.toml": GOOD, "made/spec.toml": GOOD, "empty.toml": "", "part.csv": "a,b\n", "part.step": ""}
+    for name, text in files.items():
         (tmp_path / name).write_text(text)
     (tmp_path / "binary.toml").write_bytes(b"\xff\x00\x80")
     (tmp_path / "sweep.toml").write_text(shipped_files("sweeps")["thickness"].read_text())

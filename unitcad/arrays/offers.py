@@ -54,6 +54,9 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapp
     if field.endswith(_OF_TAIL) and (wider := _wider(_present_pitches(data), data, judge)):
         limit += f"; with {listed(wider, 'and')} it is accepted as it is"
     changes, met = followed(refusal, data, judge)
+    if isinstance(refusal.nearest, str) and changes.get(field) not in (None, refusal.nearest):
+        own = [one.limit for one in met if one.field == field]
+        return Refusal(field, refusal.value, f"{limit}; then {own[-1]}", refusal.nearest)
     if set(changes) != {field}:
         pitches = {path: value for path, value in changes.items() if path.startswith(_PITCH) and is_number(value)}
         if not pitches and field.startswith(_PITCH) and is_number(refusal.nearest):

@@ -44,7 +44,7 @@ def check(
     ] = None,
     unit: Annotated[
         str | None,
-        typer.Option(metavar="UNIT", help="Unit of files that name none: mm, cm, m, in, ft ... Default: mm."),
+        typer.Option(metavar="UNIT", help="Unit of files that name none: mm, cm, m, in, ft or micron. Default: mm."),
     ] = None,
     shells: Annotated[
         int | None, typer.Option(metavar="N", min=0, help="Expected number of shells (G005). Default: any.")
@@ -73,7 +73,7 @@ def check(
     ] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Worker processes.")] = Asked.jobs,
     max_faces: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Most faces in a file. Default: 10000000.")
+        int | None, typer.Option(metavar="N", min=1, help="Most faces in a file. Default: 10,000,000.")
     ] = None,
     timeout: Annotated[
         float | None, typer.Option(metavar="SECONDS", min=0.001, help="Time limit for a file. Default: 600.")
@@ -82,7 +82,7 @@ def check(
         int | None, typer.Option(metavar="MB", min=200, help="Most address space of a process. Default: 8000.")
     ] = None,
     all_locations: Annotated[
-        bool, typer.Option("--all-locations", help="List every location of a finding, up to 10000.")
+        bool, typer.Option("--all-locations", help="List every location of a finding, up to 10,000.")
     ] = False,
     baseline: Annotated[
         str | None, typer.Option(metavar="FILE", help="Known findings, which do not fail. Default: none.")

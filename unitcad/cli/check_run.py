@@ -22,6 +22,8 @@ from unitcad.meshcheck.output import FORMATS, render
 from unitcad.meshcheck.rules.registry import check_prefixes, rules
 from unitcad.meshcheck.rules.registry import explain as explanation
 from unitcad.meshcheck.rules.s_scale import unit_named
+from unitcad.rooms import expect_none_but
+from unitcad.spec.toml import read_toml
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,6 +104,9 @@ def run(asked: Asked) -> int:
         locations=MOST if asked.all_locations or base is not None or asked.show is not None else SHOWN,
         draw=asked.show is not None,
     )
+    for name in asked.files or ():
+        if name.endswith(".toml") and Path(name).is_file():
+            expect_none_but("", read_toml(Path(name)), name, "FILE")
     if asked.diff is not None:
         if asked.files or asked.manifest is not None or base is not None:
             raise UnitcadError("--diff compares its two names alone: leave out other files, --manifest and --baseline")

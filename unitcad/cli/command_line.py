@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from difflib import get_close_matches
+from functools import partial
 from typing import Annotated, Any, cast
 
 import typer
@@ -11,7 +12,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from unitcad import __version__
-from unitcad.cli.output import Form, form_of, say_error
+from unitcad.cli.output import form_of, say_error
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.rooms import commands, load
 
@@ -32,6 +33,8 @@ class _Commands(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         known = commands()
+        if cmd_name in ("help", "version"):
+            raise Refusal("COMMAND", cmd_name, "is an option", f"--{cmd_name}")
         if cmd_name not in known:
             raise unknown_name("COMMAND", cmd_name, known)
         command = load(known[cmd_name].run)
@@ -42,7 +45,10 @@ class _Commands(TyperGroup):
         made = get_command(command)
         made.name = cmd_name
         for one in (made, *getattr(made, "commands", {}).values()):
-            one.epilog = "\n".join(["\b", "Examples:", *(f"  {line}" for line in known[cmd_name].examples)])
+            lines = [f"  {line}" for line in known[cmd_name].examples if one is made or one.name in line.split()]
+            one.epilog = "\n".join(["\b", "Examples:", *lines])
+            for parameter in one.params:
+                parameter.get_help_record = partial(_described, parameter)
         return made
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -52,6 +58,19 @@ class _Commands(TyperGroup):
         for group, rows in groups.items():
             with formatter.section(group):
                 formatter.write_dl(rows)
+
+
+def _described(parameter: Any, ctx: Any) -> tuple[str, str]:
+    """Return Typer's line of a parameter for a help, with default and range as sentences."""
+    names, text = type(parameter).get_help_record(parameter, ctx)
+    text = re.sub(r"  \[default: ([^];]*?)\.?(?:; (.*))?\]$", r" Default: \1.  [\2]", text)
+    text = re.sub(r"  \[(?:(\S+)<=)?x[<>]=(\S+)\]$", _range, text)
+    return names, text.removesuffix("  []")
+
+
+def _range(ends: re.Match[str]) -> str:
+    low, high = (end and f"{float(end):,.15g}" for end in ends.groups())
+    return f" From {low} to {high}." if low else f" At least {high}."
 
 
 def _version(wanted: bool) -> None:
@@ -84,18 +103,18 @@ def run(words: list[str]) -> int:
     try:
         return app(words, prog_name="unitcad", standalone_mode=False) or 0
     except WrongArguments as error:
-        _refuse(error, form_of(words))
+        _refuse(error, words)
         return error.exit_code
 
 
-def _refuse(error: Any, form: Form) -> None:
+def _refuse(error: Any, words: list[str]) -> None:
     """Print an error of Typer's as one line, with the command whose help says more."""
-    context = getattr(error, "ctx", None)
+    context, form = getattr(error, "ctx", None), form_of(words)
     message = error.format_message()
     if context and message == context.get_help() and form == "text":  # a command alone that needs another one after it
         error.show()
         return
-    say_error(_in_style(error, context.command_path if context else "unitcad"), form)
+    say_error(_in_style(error, context.command_path if context else f"unitcad {words[0]}"), form)
 
 
 def _in_style(error: Any, command: str) -> UnitcadError:
@@ -104,7 +123,9 @@ def _in_style(error: Any, command: str) -> UnitcadError:
     parameter, option, more = getattr(error, "param", None), getattr(error, "option_name", ""), f"see {command} --help"
     if parameter is None:
         if getattr(error, "possibilities", None) is None:
-            return UnitcadError(f"{error.format_message().rstrip('.')}; {more}")
+            return UnitcadError(re.sub("Option '(.*?)'", r"\1:", f"{text}; {more}"))
+        if option == "--jobs":
+            more = "unitcad batch and unitcad check take it"
         known = {name.lstrip("-"): name for one in error.ctx.command.params for name in one.opts}
         close = [known[name] for name in get_close_matches(option.lstrip("-"), known, cutoff=0.6)]
         return Refusal(option, None, f"unknown option; {'closest: ' + ', '.join(close) if close else more}")

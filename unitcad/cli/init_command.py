@@ -24,7 +24,7 @@ def init(
         str | None,
         typer.Option(
             metavar="TEMPLATE",
-            help="Shipped file to start from (unitcad list templates). Default: the default design's template.",
+            help=f"Shipped file to start from (unitcad list templates). Default: {default_template()}.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -42,6 +42,8 @@ def init(
     if not re.fullmatch(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9_-])?", stem):
         near = re.sub(r"[^A-Za-z0-9._-]+", "-", stem)[:60].strip("-._") or "my-unit"
         raise Refusal("NAME", name, "must be letters, digits, dots and dashes", near)
+    if Path(stem).suffix in (".txt", ".json", ".yaml", ".yml"):
+        raise Refusal("NAME", name, "is the name of a TOML file", f"{Path(stem).stem}.toml")
     if names_device(stem):
         raise Refusal("NAME", name, "is the name of a device on Windows", f"my-{stem}")
     path = Path(f"{stem}.toml")

@@ -19,8 +19,22 @@ from unitcad.rooms import file_kinds
 from unitcad.validation.shipped_files import shipped_of
 
 
+def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
+    """Return the kinds in the order of the list, each with the function that returns its entries by name."""
+    return {
+        **{kind.plural: lambda kind=kind: _first_comments(shipped_of(kind)) for kind in file_kinds() if kind.plural},
+        "designs": lambda: {name: design.about for name, design in designs().items()},
+        "materials": lambda: _values(catalogue.materials()),
+        "motors": lambda: _values(catalogue.motors()),
+        "printers": lambda: _values(catalogue.printers()),
+        "rules": lambda: {code: rule.title for code, rule in rules().items()},
+    }
+
+
 def list_(
-    kind: Annotated[str, typer.Argument(help="Kind to list. Default: the kinds.", metavar="[KIND]")] = "",
+    kind: Annotated[
+        str, typer.Argument(help=f"Kind to list: {', '.join(_kinds())}. Default: the kinds.", metavar="[KIND]")
+    ] = "",
     as_json: AsJson = False,
 ) -> None:
     """List what is shipped, each value with its source and status."""
@@ -43,18 +57,6 @@ def list_(
             how = f"; {value['method']}" if "method" in value else ""
             bounds = f" ({value['low']:g} to {value['high']:g})" if "low" in value else ""
             typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}{how}")
-
-
-def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
-    """Return the kinds in the order of the list, each with the function that returns its entries by name."""
-    return {
-        **{kind.plural: lambda kind=kind: _first_comments(shipped_of(kind)) for kind in file_kinds() if kind.plural},
-        "designs": lambda: {name: design.about for name, design in designs().items()},
-        "materials": lambda: _values(catalogue.materials()),
-        "motors": lambda: _values(catalogue.motors()),
-        "printers": lambda: _values(catalogue.printers()),
-        "rules": lambda: {code: rule.title for code, rule in rules().items()},
-    }
 
 
 def _values(entries: dict[str, Any]) -> dict[str, Any]:

@@ -16,7 +16,12 @@ from unitcad.rooms import file_kinds, load
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(metavar="[KIND]", help="Kind of file: spec, array, sweep ...")] = "spec",
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="[KIND]", help=f"Kind of file: {', '.join(one.name for one in file_kinds() if one.model)}."
+        ),
+    ] = "spec",
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="FILE", help="File for an editor. Default: print the schema.")
     ] = None,

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from unitcad.arguments import confirm_form
 from unitcad.errors import unknown_name
 from unitcad.spec import custom_code
 from unitcad.spec.raw import FORMATS, OUTPUTS
@@ -16,7 +17,12 @@ from unitcad.spec.raw import FORMATS, OUTPUTS
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 Sets = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the spec, such as diameter_mm=15."),
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        callback=lambda sets: [confirm_form(text) for text in sets or ()],
+        help="Change a value of the spec, such as diameter_mm=15. May be repeated.",
+    ),
 ]
 Fit = Annotated[
     Path | None,
@@ -30,6 +36,7 @@ Only = Annotated[
     str | None,
     typer.Option(
         metavar="NAMES",
+        callback=lambda names: None if names == "all" else names,
         help="Outputs: unit,moulds,estimate,casting. Default: all. In a batch, estimate makes one table.",
     ),
 ]

@@ -122,7 +122,7 @@ class Campaign(Table, frozen=True, kw_only=True):
 
 def read_campaign(path: Path) -> Campaign:
     """Return the campaign of a TOML file. Raises Refusal with every value that is not valid, and its line."""
-    return load_file(path, "campaign", _campaign_of)
+    return load_file(path, "campaign", lambda data, _: _campaign_of(data))
 
 
 def _campaign_of(data: dict[str, Any]) -> Campaign:

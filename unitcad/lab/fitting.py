@@ -39,7 +39,6 @@ from unitcad.lab.unit_files import Cavity, file_of, measured_walls, source_file,
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.raw import Table
 from unitcad.validation import from_data
-from unitcad.validation.shipped_files import named_file, shipped_files
 from unitcad.validation.typed_files import load_file
 
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
@@ -120,18 +119,12 @@ class FitLab:
     inputs: tuple[InputFile, ...]
 
 
-def shipped_fits() -> dict[str, Path]:
-    """Return the shipped labs by name."""
-    return shipped_files("fits")
-
-
 def load_fit_lab(source: str) -> FitLab:
     """Return the lab of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
 
     Raises Refusal with every value that is not valid, and its line, or UnitcadError.
     """
-    path = named_file(source, shipped_fits(), "LAB")
-    return load_file(path, "fit", lambda data: _lab_of(data, path))
+    return load_file(source, "fit", _lab_of)
 
 
 def _lab_of(data: dict[str, Any], path: Path) -> FitLab:

@@ -20,6 +20,9 @@ from unitcad.lab.columns import declared
 from unitcad.lab.dynamic import DynamicResult, evaluate_dynamic, read_dynamic
 from unitcad.lab.readers import Layout
 from unitcad.lab.tensile import Specimen, TensileResult, evaluate, read_curve
+from unitcad.lab.units import COLUMN_UNITS
+from unitcad.rooms import expect_none_but
+from unitcad.spec import read_toml
 
 _DELIMITERS = {"tab": "\t", "space": " "}
 _LENGTH: dict[str, Any] = {"metavar": "MM", "min": 0.001, "max": 10000, "callback": finite}
@@ -43,7 +46,12 @@ def material(
     ] = "",
     column: Annotated[
         list[str] | None,
-        typer.Option(metavar="QUANTITY=COLUMN[:UNIT]", help="Column of a quantity, by name or number, and its unit."),
+        typer.Option(
+            metavar="QUANTITY=COLUMN[:UNIT]",
+            help="Column of a quantity by name or number, such as force=2:N. Quantities: "
+            + ", ".join(COLUMN_UNITS)
+            + ".",
+        ),
     ] = None,
     delimiter: Annotated[
         str, typer.Option(metavar="SIGN", help="Delimiter of the columns: , ; tab or space. Default: as in the file.")
@@ -103,6 +111,8 @@ def material(
     for path in [*(curves or []), *([dma] if dma else [])]:
         if not path.exists():
             raise files.NotThere(f"{path}: no such file")
+        if path.suffix == ".toml":
+            expect_none_but("", read_toml(path), str(path), "FILE")
     shipped = catalogue.materials()
     named = name or _slug((curves or [dma])[0])  # type: ignore[arg-type]
     base = like or named

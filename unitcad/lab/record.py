@@ -300,7 +300,6 @@ def _own_rate(
 LEAST_GAIN = 0.9
 HIGHEST_HZ = 500.0
 """If a record's spectrum ends, in Hz."""
-SAME_LINE_HZ = 0.5
 MOST_SCATTER = MOST_DRIFT = 0.05
 LEAST_PERIODS, NO_PERIODS = 20, 5
 MOST_MASKED = 0.1

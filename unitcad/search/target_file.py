@@ -26,12 +26,11 @@ from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
 from unitcad.designs import shipped as designs
-from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
+from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import read_text
 from unitcad.spec import convert
 from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
 from unitcad.validation.fit_text import lab_fit
-from unitcad.validation.shipped_files import named_file, shipped_files
 from unitcad.validation.typed_files import load_file
 
 Level = Annotated[float, Meta(ge=0.001, le=2, description="of the motor's amplitude, at the unit's edge")]
@@ -182,18 +181,12 @@ class Target:
         return convert(self.entries["casting"], CastingTable, "spec.casting")
 
 
-def shipped() -> dict[str, Path]:
-    """Return the shipped targets by name."""
-    return shipped_files("targets")
-
-
 def load_target(source: str | os.PathLike[str]) -> Target:
     """Return the target of a shipped name or of a file.
 
     Raises Refusal with every value that is not valid, and its line, or UnitcadError.
     """
-    path = named_file(os.fspath(source), shipped(), "target", WrongArgument)
-    return load_file(path, "target", lambda data: target_of(data, path.stem, path.parent))
+    return load_file(source, "target", lambda data, path: target_of(data, path.stem, path.parent))
 
 
 def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path()) -> Target:

@@ -13,6 +13,7 @@ import typer
 from unitcad.cli.shared_options import AllowCode
 from unitcad.errors import missing_extra
 from unitcad.serve.addresses import TOKEN
+from unitcad.validation import default_template
 
 
 def serve(
@@ -20,7 +21,7 @@ def serve(
         str | None,
         typer.Argument(
             metavar="[SPEC]",
-            help="Spec, array or campaign file, template, or folder of results. Default: the default template.",
+            help=f"Spec, array or campaign file, template, or folder of results. Default: {default_template()}.",
         ),
     ] = None,
     out: Annotated[

@@ -17,7 +17,7 @@ from unitcad.files import read_text
 from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
-from unitcad.rooms import FileKind, file_kinds
+from unitcad.rooms import FileKind, expect_none_but, file_kinds
 from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown
 from unitcad.serve.answers import answers_about
 from unitcad.serve.application import Live, Setting, application
@@ -64,6 +64,8 @@ def serve(
     data = parse_toml(text, str(path))  # a file that is no TOML is refused at once
     folder = path.parent.resolve() if is_own(source) else Path.cwd()
     kind = _page_kind(data)
+    if not kind and not compound_kind(data):
+        expect_none_but("spec", data, str(path), "spec", WrongArgument)
     campaign = (path.resolve(), kind.page) if kind else None
     trusted = [_trusted(data, path, code)]
     plain = {name: each for name, each in every_template().items() if name not in custom_templates()}

@@ -24,7 +24,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from msgspec import Meta, Struct, field, structs
 
 from unitcad.cache import digest
-from unitcad.errors import Refusal, UnitcadError, WrongArgument
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device, read_text
 from unitcad.pipeline.subjects import subject_of_data
 from unitcad.rooms import load
@@ -34,7 +34,7 @@ from unitcad.sweeps.paths import check_path, label
 from unitcad.text import some
 from unitcad.validation import compound_kind, confirm_known, every_template, override, put, read
 from unitcad.validation.load import all_faults
-from unitcad.validation.shipped_files import is_path, named_file, shipped_files
+from unitcad.validation.shipped_files import is_path
 from unitcad.validation.typed_files import load_file
 
 T = TypeVar("T", bound=Struct)
@@ -243,18 +243,12 @@ def _unoffered(refusal: Refusal) -> Refusal:
     return Refusal(refusal.field, refusal.value, refusal.limit)
 
 
-def shipped() -> dict[str, Path]:
-    """Return the shipped sweeps by name."""
-    return shipped_files("sweeps")
-
-
 def load_sweep(source: str | os.PathLike[str]) -> Sweep:
     """Load the sweep of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
 
     Raises Refusal or UnitcadError for an unknown base or path, lists of unequal lengths in a zip, an empty sweep.
     """
-    path = named_file(os.fspath(source), shipped(), "sweep", WrongArgument)
-    return load_file(path, "sweep", lambda data: from_file(data, path.parent, path.stem))
+    return load_file(source, "sweep", lambda data, path: from_file(data, path.parent, path.stem))
 
 
 def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:

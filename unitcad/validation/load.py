@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from unitcad.arguments import confirm_form
 from unitcad.designs import default_design
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
 from unitcad.files import read_text
@@ -191,9 +192,7 @@ def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any
     check_plain(data)
     result: dict[str, Any] = copy.deepcopy(dict(data))
     for text in overrides:
-        path, equals, raw = text.partition("=")
-        if not equals or not path.strip():
-            raise WrongArgument("set", text, "needs the form path=value, such as layers.0.wall_mm=1.0")
+        path, _, raw = confirm_form(text).partition("=")
         put(result, path.strip(), _parsed(raw.strip()))
     return result
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
 
 from unitcad.errors import Refusal, WrongArgument, unknown_name
-from unitcad.rooms import FileKind, file_kinds, load
+from unitcad.rooms import FileKind, expect_none_but, file_kinds, load, of_other_kind
+from unitcad.spec.custom_code import is_body_file
 
 
 def shipped_files(kind: str = "") -> dict[str, Path]:
@@ -35,37 +35,29 @@ def spelled(text: str, known: Iterable[str]) -> str:
     return own if text not in known and not is_path(text) and os.path.isfile(own) else text
 
 
-def kind_of(data: Mapping[str, object]) -> FileKind | None:
-    """Return the kind of a TOML file by its top-level keys."""
-    return next((kind for kind in file_kinds() if kind.keys and all(key in data for key in kind.keys)), None)
-
-
 def expect_kind(data: Mapping[str, object], source: str, kind: str) -> None:
     """Raise WrongArgument for an empty file, and for one of another kind, with the command that takes it."""
     if not data:
         raise WrongArgument(kind, source, f"is empty; `unitcad schema {kind}` lists its keys")
-    found = kind_of(data)
-    if found and found.name != kind and found.command:
-        raise _other_kind(found, kind, source, WrongArgument)
-
-
-def _other_kind(found: FileKind, field: str, source: str, kind: type[Refusal]) -> Refusal:
-    article = "an" if found.name[0] in "aeiou" else "a"
-    return kind(field, source, f"is {article} {found.name}: run {found.command} {shlex.quote(source)}")
+    expect_none_but(kind, data, source, kind, WrongArgument)
 
 
 def named_file(text: str, known: Mapping[str, Path], field: str, kind: type[Refusal] = Refusal) -> Path:
-    """Return the file that a text names, see `spelled`. Raises `kind`, of that field, for any other text."""
+    """Return the file that a text names, see `spelled`, there or not. Raises `kind`, of that field, for other text."""
     text = spelled(text, known)
     if text in known:
         return known[text]
-    if is_path(text):
-        return Path(text)
+    path = Path(text)
+    if os.path.isdir(text):
+        own = [file for file in (path / "spec.toml", path / "array.toml") if file.is_file()]
+        raise kind(field, text, "is a folder; name a TOML file in it", str(own[0]) if own else None)
+    if path.suffix != ".toml" and os.path.isfile(text) and (path.suffix or not is_path(text)):
+        if is_body_file(text):
+            raise kind(field, text, f'is a body: write design = "{text}" in a spec')
+        raise kind(field, text, "is not a TOML file, whose name ends in .toml")
+    if is_path(text) or path.suffix or not known:
+        return path
     for other in file_kinds():
         if other.command and other.plural and text in shipped_of(other):
-            raise _other_kind(other, field, text, kind)
-    if Path(text).is_dir():
-        raise kind(field, text, "is a folder; name a TOML file in it")
-    if Path(text).is_file():
-        raise kind(field, text, "is not a TOML file, whose name ends in .toml")
+            raise of_other_kind(other, field, text, kind)
     raise unknown_name(field, text, known, kind)

@@ -8,7 +8,6 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,9 +16,8 @@ from msgspec import Meta, Struct
 from unitcad.attenuation.layered import FractionalKelvinVoigt
 from unitcad.catalogue import Material, materials
 from unitcad.catalogue import entries as kinds
-from unitcad.errors import Refusal, WrongArgument, unknown_name
+from unitcad.errors import Refusal, unknown_name
 from unitcad.spec import convert
-from unitcad.validation.shipped_files import named_file, shipped_files
 from unitcad.validation.typed_files import load_file
 
 LEAST_LAYER, MOST_DEPTH = 0.5, 100.0
@@ -70,15 +68,9 @@ class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         return sum(layer.thickness_mm for layer in self.layers)
 
 
-def phantoms() -> dict[str, Path]:
-    """Return the shipped phantoms by name."""
-    return shipped_files("phantoms")
-
-
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
     """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for an invalid one."""
-    path = named_file(os.fspath(source), phantoms(), "phantom", WrongArgument)
-    return load_file(path, "phantom", lambda data: convert(data, PhantomTable))
+    return load_file(source, "phantom", lambda data, _: convert(data, PhantomTable))
 
 
 THINNER_DENSITY = 0.97

@@ -167,7 +167,7 @@ def _block(path: Path, lines: list[str], layout: Layout) -> Block:
     longest = max(runs, key=lambda run: run.lines, default=None)
     best = whole if whole and longest and 2 * whole.lines >= longest.lines else longest
     if best is None or best.lines < 2:
-        raise Unreadable(str(path), None, "has no block of lines with the same count of numbers")
+        raise Unreadable(str(path), None, "needs two lines or more of the same count of numbers")
     if not layout.decimal:
         quoted = [_quoted(line.strip(" "), best.delimiter) for line in lines[best.start :] if '"' in line]
         fields = [field.strip() for line in quoted for field in line if "," in field]

@@ -53,7 +53,6 @@ LEVEL = float(np.cos(np.radians(45.0)))  # normals steeper than this belong to a
 SLACK = 0.995  # of the floor: a wall drawn at the floor passes after rounding and tessellation
 _SAMPLES = 40_000
 _FINEST = 6  # a face has at most _FINEST (_FINEST + 1) / 2 points
-_ROUNDING_MM = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
