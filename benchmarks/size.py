@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (542_800, 402, 67_750),
-    "core": (270_000, 221, 34_750),
-    "tests": (408_200, 0, 0),
+    "total": (545_500, 402, 68_000),
+    "core": (272_300, 221, 35_000),
+    "tests": (409_500, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900
