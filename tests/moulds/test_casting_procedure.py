@@ -257,7 +257,7 @@ def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said() -> None:
     assert unit_heights(set_of("embedded")) == []
     sheet = written.to_markdown(procedure("encapsulating"))
     assert "layer 1's cap 1.2 for 1.25" in sheet
-    assert "- Height over all: 4.60 mm (4.61 drawn, printed in layers of 0.2)." in sheet
+    assert "- Height over all: 4.60 mm (4.61 drawn, in layers of 0.2)." in sheet
 
 
 def test_flats_of_the_printed_pieces_end_whole_layers() -> None:

@@ -59,6 +59,7 @@ def test_windows_and_tongue_have_their_widths():
     assert "12" in blade
     assert f"slot 0.4 × {slot:g}" in unit
     assert "8.11" in base
+    assert base.count("A") == 2
 
 
 def test_the_same_bytes_and_lines_alone(tmp_path):

@@ -46,7 +46,8 @@ COMMANDS = {
     "build unit.toml --set diameter_mm=1.4": f"diameter_mm = 1.4: {THIN}",
     "build unit.toml --set diameter_mm=-14": f"diameter_mm = -14: must be at least 1, and {THIN}",
     "build unit.toml --set wall_mm=2": "wall_mm = 2: unknown key at the top; known: layers.0.wall_mm",
-    "build unit.toml --set layers.5.wall_mm=2": "no entry 5: the list has the entries 0 to 1; Layer 1 is layers.0",
+    "build unit.toml --set layers.5.wall_mm=2": "layers.5.wall_mm = 2: no entry 5: the list has the entries 0 to 1; "
+    "Layer 1 is layers.0",
     "build unit.toml --only mould": "--only = 'mould': unknown name; closest: moulds; nearest accepted: 'moulds'",
     "build unit.toml --formats STL": "--formats = 'STL': unknown name; closest: stl; nearest accepted: 'stl'",
     "build unit.toml --fit unit.toml": "estimate.fit: design = 'encapsulating': unknown key; "

@@ -649,7 +649,7 @@ def measurements(
     layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
     drawn = dims.heights[-1]
     high = next((each.printed_mm for each in unit_heights(moulds) if each.what == OVER_ALL), drawn)
-    by_layers = f" ({shown(drawn, 2)} drawn, printed {layers})" if high != drawn else ""
+    by_layers = f" ({shown(drawn, 2)} drawn, {layers})" if high != drawn else ""
     over = f", with the skin {shown(high + dims.skin, 2)} mm" if dims.skin else ""
     yield f"Height over all: {shown(high, 2)} mm{by_layers}{over}."
     if moulds.plan.concentric:

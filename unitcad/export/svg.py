@@ -105,11 +105,12 @@ def section(
     px_per_mm: float = 0.0,
     named: bool = True,
     level: float = 0.0,
+    both_ends: bool = False,
 ) -> str:
     """Draw `regions`, every one with its name if `named`, and the measures.
 
-    `ground`: the name of the line at z = `level` (mm), "" for none. `px_per_mm`: 0 for a fixed width. The same
-    arguments give the same text.
+    `ground`: the name of the line at z = `level` (mm), "" for none; `both_ends`: at either end of it. `px_per_mm`: 0
+    for a fixed width. The same arguments give the same text.
     """
     labels = [*notes]
     if named:
@@ -117,7 +118,7 @@ def section(
         labels += (Note(region.name, at) for region, at in zip(regions, anchors, strict=True))
     page = _Page(regions, measures, labels, px_per_mm)
     marks = [page.region(region) for region in regions]
-    marks += page.frame(ground, level)
+    marks += page.frame(ground, level, both_ends)
     for side in ("below", "left", "right"):
         marks += page.measures([m for m in measures if m.side == side])
     marks += page.labels(labels) if labels else []
@@ -241,14 +242,15 @@ class _Page:
         fill = xml_attribute(colour_hex(region.colour))
         return f'<path d="{path}" fill={fill} fill-rule="evenodd"><title>{xml_text(region.name)}</title></path>'
 
-    def frame(self, ground: str, level: float) -> list[str]:
+    def frame(self, ground: str, level: float, both_ends: bool) -> list[str]:
         """Draw the line z = `level` and the axis, if they pass through the drawing."""
         skin = self.at((self.low[0], level)), self.at((self.high[0], level))
         top, bottom = self.at((0.0, self.high[1])), self.at((0.0, self.low[1]))
         marks = []
         if self.low[1] <= level <= self.high[1]:
             marks.append(_line(*skin, "skin"))
-            marks += [_text(ground, (skin[1][0], skin[1][1] + TEXT_PX * 0.8), "end")] if ground else []
+            ends = (("start", skin[0]), ("end", skin[1]))[not both_ends :] if ground else ()
+            marks += [_text(ground, (x, y + TEXT_PX * 0.8), anchor) for anchor, (x, y) in ends]
         if self.low[0] <= 0 <= self.high[0]:
             marks.append(_line((top[0], top[1] - 12), (bottom[0], bottom[1] + 12), "axis"))
         return marks

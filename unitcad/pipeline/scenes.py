@@ -259,4 +259,5 @@ def _plan_view(solid: Manifold, y: float) -> Callable[[float], str]:
     deep = [one for one in deep if one.end - one.start < y1 - y0 - sheet.SAME_MM]
     for one in (*deep, svg.Measure(number(y1 - y0, 2), y0, y1, "left", len(deep), x0)):
         size.append(replace(one, side="left", reach=max(one.reach, x0)))
-    return lambda scale: svg.section(seen, size, title="from above", ground="A", px_per_mm=scale, named=False, level=y)
+    above = partial(svg.section, seen, size, title="from above", ground="A", named=False, level=y, both_ends=True)
+    return lambda scale: above(px_per_mm=scale)

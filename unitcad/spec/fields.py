@@ -46,7 +46,7 @@ def named_in(kind: Any) -> Any:
 
 
 def is_value(kind: Any) -> bool:
-    """Tell whether `kind` takes no table, nor a list of tables: a file has its key above every header."""
+    """Tell whether `kind` takes no table, nor a list of tables: its key comes before every header of a file."""
     return not (table_in(kind) or named_in(kind) or table_in(entry_in(kind)))
 
 

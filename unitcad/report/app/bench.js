@@ -317,7 +317,7 @@
     const walls = data.casting.pours.map((pour) => `layer ${pour.index} ${short} ${short} ${short} ${short} mm`).join("; ");
     const units = Array.from({ length: data.casting.cells }, (_, i) => el("p", { className: "unit" },
       `Unit${engraved(i + 1)}: height ${short} mm, diameters ${short} ${short} mm, mass ${short} g; walls: ${walls}`));
-    return el("div", { className: "paper" }, el("p", {}, `Date ${blank}`), table(["", "", "", "", "", "", ""], rows, { label: "To write down" }), units);
+    return el("div", { className: "paper" }, el("h2", {}, `Cast record, date ${blank}`), table(["", "", "", "", "", "", ""], rows, { label: "To write down" }), units);
   }
 
   function draw() {
