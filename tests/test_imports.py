@@ -38,10 +38,9 @@ FLOORS = [
     {"meshcheck"},
     {"catalogue"},
     {"files", "arguments"},
-    {"workers"},
+    {"workers", "rooms"},
     {"errors"},
     {"text", "json_text", "notebook", "geometry"},
-    {"rooms"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 LIVE = {Path(importlib.util.find_spec(kind.page).origin or "") for kind in file_kinds() if kind.page}

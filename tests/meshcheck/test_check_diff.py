@@ -105,7 +105,7 @@ def test_a_hole_in_another_place_is_a_new_finding(tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (["a.stl", "folder"], "must be two files or two folders"),
-        (["a.stl", "none.stl"], "must exist"),
+        (["a.stl", "none.stl"], "no such file"),
         (["a.stl", "a.stl", "--output-format", "sarif"], "markdown"),
         (["a.stl", "a.stl", "a.stl"], "leave out other files"),
     ],

@@ -16,7 +16,7 @@ THIN = "the motor (7), 0.1 of clearance and walls of 2.5 a side need 12.2 mm; ne
 
 COMMANDS = {
     "biuld unit.toml": "COMMAND = 'biuld': unknown name; closest: build; nearest accepted: 'build'",
-    "version": "COMMAND = 'version': is an option; nearest accepted: '--version'",
+    "version": "COMMAND = 'version': unknown name; closest: --version, design; nearest accepted: '--version'",
     "build unit.toml --jobs 4": "--jobs: unknown option; unitcad batch and unitcad check take it",
     "build unit.toml --set diameter_mm 14": "--set = 'diameter_mm': needs the form path=value in one word, such as "
     "layers.0.wall_mm=1.0",

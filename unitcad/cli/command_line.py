@@ -33,10 +33,8 @@ class _Commands(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         known = commands()
-        if cmd_name in ("help", "version"):
-            raise Refusal("COMMAND", cmd_name, "is an option", f"--{cmd_name}")
         if cmd_name not in known:
-            raise unknown_name("COMMAND", cmd_name, known)
+            raise unknown_name("COMMAND", cmd_name, [*known, "--help", "--version"])
         command = load(known[cmd_name].run)
         if not isinstance(command, typer.Typer):
             alone = typer.Typer(**_PLAIN)

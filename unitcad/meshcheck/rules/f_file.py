@@ -104,7 +104,7 @@ F012 = Rule("""
     if a folder was named). A warning if a solid of a STEP file has no closed mesh: its overlap and print are not
     judged.
     Example: `unitcad check prat.stl` for the file part.stl.
-    Fix: Check the path and its permissions; for STEP, install the extra step.
+    Fix: Check the path and its permissions. If the message says that STEP needs an extra, install it.
 """)
 
 F013 = Rule("""
