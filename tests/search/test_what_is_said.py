@@ -63,7 +63,10 @@ def test_a_frequency_that_nobody_measured_at_is_said() -> None:
 def test_what_the_evidence_ranks_and_what_not_is_said(quiet: Inversion) -> None:
     said = head_lines(quiet.data)
     assert said[1].startswith("probabilities by rule, fitted to the paper's nine levels; they rank design, which side")
-    assert said[2] == "they do not rank walls, caps, diameter, frequency, and silicones with the same side soft"
+    assert (
+        said[2]
+        == "they do not rank walls, caps, diameter, frequency, and silicones with the same side soft, but by an assumed line below a ratio of 16.7"
+    )
     second = lines(quiet.data["proposals"][1])
     assert second[0] == "as likely as number 1: the order among equals is how easily they are made"
     page = contents(quiet, "x")
@@ -173,6 +176,7 @@ def test_what_is_typed_in_per_cent_has_a_nearest() -> None:
     assert (refused.value.field, refused.value.nearest) == (FIELD, 0.06)
 
 
-def test_an_unknown_key_points_at_the_targets_schema() -> None:
+def test_an_unknown_key_points_at_the_targets_schema(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("[target]\nedge_max = 0.06\nxyz = 0.3\n")
     with pytest.raises(UnknownKey, match="`unitcad schema target` lists all"):
-        target_of({"target": {"edge_max": 0.06, "crosstalk": 0.3}})
+        load_target(tmp_path / "mine.toml")
