@@ -217,7 +217,7 @@ def test_wires_that_cannot_be() -> None:
         from_data({**read("encapsulating"), "wires": WIRES})
     with pytest.raises(Refusal, match="half the motor") as refused:
         from_data({**wired("encapsulating"), "wires": {"diameter_mm": 1.2}})
-    assert refused.value.nearest == 1.0
+    assert refused.value.nearest == 0.8
     with pytest.raises(Refusal, match="side by side"):
         from_data({**wired("encapsulating"), "wires": {"diameter_mm": 0.9, "count": 8}})
     with pytest.raises(Refusal) as refused:
@@ -243,7 +243,7 @@ def test_a_connector_that_would_tear_the_slot() -> None:
         (["moulds.cavities=full"], "moulds.cavities", "fill"),
         (["moulds.pour=injected", "moulds.sprue_mm=30"], "moulds.sprue_mm", 9.3),
         (["moulds.bed_x_mm=20"], "moulds.bed_x_mm", 36.3),
-        (["moulds.window_clearance_mm=5"], "moulds.window_clearance_mm", 2.005),
+        (["moulds.window_clearance_mm=5"], "moulds.window_clearance_mm", 0.36),
     ],
 )
 def test_nearest_value_leads_out(overrides: list[str], field: str, nearest: object) -> None:

@@ -2,7 +2,7 @@
 
 Ribs count as crushed: C220 looks at them. A pocket counts as stretched round its unit: C310 looks at its strain. In
 bodies from a file films of facets are ignored: two facets reach into each other by their distances from the true
-surface. A pocket of coarse facets for a bought part passes with a note.
+surface. In a mesh file a pocket of coarse facets for a bought part passes with a note.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from unitcad.moulds.congruence import MARGIN, column_round
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape import Shape, union
-from unitcad.spec.custom_code import is_custom
+from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.text import number
 
 POCKET = 0.05
@@ -68,7 +68,9 @@ def _explained(moulds: MouldSet, found: MouldFinding) -> MouldFinding:
     if not (bought and cast and is_custom(moulds.spec.design)):
         return found
     shared = moulds.mesh(bought) ^ moulds.mesh(cast)
-    if not thick_pieces(shared, POCKET):
+    # How far the facets of a mesh file are from the surface that was meant is not known; a STEP file has surfaces.
+    coarse = is_body_file(moulds.spec.design) and not moulds.spec.design.lower().endswith((".step", ".stp"))
+    if coarse and not thick_pieces(shared, POCKET):
         film = max(found.value, POCKET * float(shared.surface_area()) / 2)
         note = f"{cast.name} is at most {POCKET} mm narrower than its {bought.name}, as facets are: it gives way"
         return replace(found, ok=True, limit=film, advice=note)
