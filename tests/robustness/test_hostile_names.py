@@ -150,7 +150,7 @@ def _judge(name, folder):
     """Whether a name is text in each of a variant's files."""
     manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
     assert manifest["name"] == name
-    assert re.fullmatch(r"[a-z0-9-]+-[0-9a-f]{12}", folder.name)
+    assert re.fullmatch(r"[a-z0-9-]+(\.[0-9][a-z0-9-]*)*-[0-9a-f]{12}", folder.name)
     tokens = MarkdownIt("commonmark", {"html": True}).enable("table").parse((folder / "casting.md").read_text("utf-8"))
     fold = {"<details>\n<summary>Figures and sources</summary>\n", "</details>\n"}
     tokens = [token for token in tokens if token.type != "html_block" or token.content not in fold]
