@@ -97,6 +97,7 @@ def judge(data: dict[str, Any]) -> None:
         if (
             type(refusal) is Refusal
             and refusal.nearest is not None
+            and not refusal.others  # each then meets its own limit
             and not re.search("also needs|; then", refusal.limit)
         ):
             assert patch_moulds(load_array(data, {refusal.field: refusal.nearest})).plan

@@ -34,7 +34,7 @@ def folder(tmp_path):
         ('"e1.wav"', '"m1.wav"', "unit.0.edge.1", None),
         ('"e1.wav"', '"gone.wav"', "unit.0.edge.1", None),
         ('"e1.wav"', '"x.svd"', "unit.0.edge.1", None),
-        ('"e1.wav"', '"x.odd"', "unit.0.edge.1", ".csv"),
+        ('"e1.wav"', '"x.odd"', "unit.0.edge.1", None),
         ('name = "a"', 'name = "a"\nspec = "encapsulatign"', "unit.0.spec", "encapsulating"),
         ('name = "a"', 'name = "a"\nspec = "gone.toml"', "unit.0.spec", None),
         ("[[unit]]", '[chain]\nuse = ["line", "line"]\n[[unit]]', "chain.use", ["line"]),

@@ -23,7 +23,7 @@ def test_its_result_is_short_and_holds_no_script(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: batch("publishd"), "^sweep = 'publishd': not known"),
+        (lambda: batch("publishd"), "^sweep = 'publishd': unknown name"),
         (lambda: batch(None), "^sweep: takes a path, not NoneType$"),  # type: ignore[arg-type]
         (lambda: batch("published", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
         (lambda: batch("published", limit=0), "^limit = 0: must be a whole number from 1 "),

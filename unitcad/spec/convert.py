@@ -141,7 +141,7 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
         unknown = unknown_name(field, value, words)
         others = [_name(plain, kind) for plain in _NAMES if plain in known - {str}]
         meant = [int(one) for one in re.findall(r"\d+", value)] if list in known else None
-        nearest = meant if _fits(meant, kind) else unknown.nearest
+        nearest = meant if meant is not None and _fits(meant, kind) else unknown.nearest
         return Refusal(field, value, " or ".join([unknown.limit, *others]), nearest)
     if not (given in known or (given is int and float in known)):
         names = [_name(plain, kind) for plain in _NAMES if plain in known]
