@@ -7,10 +7,15 @@ from typing import Any
 from unitcad.errors import Refusal
 from unitcad.spec.fields import index_in
 
+MOST_PARTS = 200
+"""Parts of a path at most; a name may have dots of its own."""
+
 
 def put(data: dict[str, Any], path: str, value: Any) -> None:
-    """Set `value` at a dotted path, making tables on the way but no list entries. Raises Refusal where none leads."""
+    """Set `value` at a dotted path, making tables on the way but no list entries. Raises Refusal if none leads there."""
     steps = path.split(".")
+    if len(steps) > MOST_PARTS:
+        raise Refusal(path, value, f"a path has at most {MOST_PARTS} parts, not {len(steps)}")
     node: Any = data
     while (count := _steps(node, steps)) < len(steps):
         step = ".".join(steps[:count])
