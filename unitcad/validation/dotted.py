@@ -12,10 +12,10 @@ MOST_PARTS = 200
 
 
 def put(data: dict[str, Any], path: str, value: Any) -> None:
-    """Set `value` at a dotted path, making tables on the way but no list entries. Raises Refusal if none leads there."""
+    """Set `value` at a dotted path, making tables on the way but no list entries. Raises Refusal if none can."""
     steps = path.split(".")
     if len(steps) > MOST_PARTS:
-        raise Refusal(path, value, f"a path has at most {MOST_PARTS} parts, not {len(steps)}")
+        raise Refusal(f"{path[:40]}...", value, f"a path has at most {MOST_PARTS} parts, not {len(steps)}")
     node: Any = data
     while (count := _steps(node, steps)) < len(steps):
         step = ".".join(steps[:count])
