@@ -272,7 +272,7 @@ def test_what_is_no_file_in_a_folder_is_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--show", "hole.stl"], "--show = 'hole.stl': must name a folder; this is a file"),
+        (["--pictures", "hole.stl"], "--pictures = 'hole.stl': must name a folder; this is a file"),
         (["--json", "--output-format", "sarif"], "--output-format = 'sarif': --json asks for another one"),
     ],
 )

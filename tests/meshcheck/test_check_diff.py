@@ -73,7 +73,7 @@ def versions(tmp_path: Path) -> tuple[Path, Path]:
 
 def test_only_new_findings_fail(versions: tuple[Path, Path], tmp_path: Path) -> None:
     old, new = (str(folder) for folder in versions)
-    result = run("--diff", old, new, "--show", str(tmp_path / "pictures"))
+    result = run("--diff", old, new, "--pictures", str(tmp_path / "pictures"))
     assert result.returncode == 0
     said = result.stdout
     assert "plate.stl: largest distance 3 mm, to 0.29 mm\n  volume, mm3: 1600 -> 1487" in said

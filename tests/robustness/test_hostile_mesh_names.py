@@ -21,7 +21,7 @@ NAMES = [
     "::error file=x::boo", "a\n::error::boo", "a\r\n::set-output name=x::y", "##[error]x", "a%0A::error::x",
     "a,line=3::x", "\x1b[31mred\x1b[0m", "\x1b]8;;x\x07", "a\x9b2Jb", "tab\tbell\x07", "gnp.\u202elts", "a\u2028b",
     "\ufeffa", "\udce4\udcff", "<script>x<script>", "\"><x y='", "]]><!--", "&amp;&#60;", "[red]x[red]", "{{7*7}}${x}",
-    "#?%20 a b", "-rf", "--show", "*?[x]", "C:\\x", "..", "é日本🙂", "'; drop", "$(x)`x`", "a|b;c&d",
+    "#?%20 a b", "-rf", "--pictures", "*?[x]", "C:\\x", "..", "é日本🙂", "'; drop", "$(x)`x`", "a|b;c&d",
 ]  # fmt: skip
 _PIECES = [piece for name in NAMES for piece in re.findall(r"\w+|\W", name)]
 

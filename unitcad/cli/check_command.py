@@ -92,7 +92,9 @@ def check(
     ] = False,
     show: Annotated[
         str | None,
-        typer.Option(metavar="DIR", help="Folder for pictures of findings and coloured 3MF files. Default: none."),
+        typer.Option(
+            "--pictures", metavar="DIR", help="Folder for pictures of findings and coloured 3MF files. Default: none."
+        ),
     ] = None,
     diff: Annotated[
         tuple[str, str] | None,

@@ -77,7 +77,7 @@ def run(asked: Asked) -> int:
         why = "--json asks for another one: leave one of them out, or have both with --report json=FILE"
         raise Refusal("--output-format", asked.output_format, why)
     if asked.show is not None and Path(asked.show).exists() and not Path(asked.show).is_dir():
-        raise Refusal("--show", asked.show, "must name a folder; this is a file")
+        raise Refusal("--pictures", asked.show, "must name a folder; this is a file")
     copies = [_copy(given, FORMATS) for given in asked.report or []]
     configuration = check_settings.find(asked.config, wanted=not asked.no_config)
     fail_on = asked.fail_on or configuration.value("fail_on") or "error"

@@ -1,4 +1,4 @@
-"""Pictures of a check's findings, for `unitcad check --show`.
+"""Pictures of a check's findings, for `unitcad check --pictures`.
 
 For each file with findings a folder with
 

@@ -1,4 +1,4 @@
-"""`unitcad check --show`: a picture a finding and a coloured 3MF, without CAD, a display or a GPU."""
+"""`unitcad check --pictures`: a picture a finding and a coloured 3MF, without CAD, a display or a GPU."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_each_finding_has_a_picture_of_the_part_and_of_the_place(tmp_path: Path)
     (tmp_path / "a.stl").write_bytes(stl(CROSSED))
     (tmp_path / "good.stl").write_bytes(stl(box()))
     plain = run(".", "--json", cwd=tmp_path)
-    result = run(".", "--json", "--show", "pictures", cwd=tmp_path)
+    result = run(".", "--json", "--pictures", "pictures", cwd=tmp_path)
     assert (result.stdout, result.returncode) == (plain.stdout, 1)
     folder = tmp_path / "pictures"
     assert [entry.name for entry in folder.iterdir()] == ["a.stl"]
@@ -64,7 +64,7 @@ def test_each_finding_has_a_picture_of_the_part_and_of_the_place(tmp_path: Path)
     assert "Fix: Unite the bodies" in text
     assert re.search(r"faces \d+ and \d+", text)
     first = text
-    run(".", "--jobs", "2", "--show", "pictures", cwd=tmp_path)
+    run(".", "--jobs", "2", "--pictures", "pictures", cwd=tmp_path)
     assert (folder / "a.stl" / "G001.svg").read_text("utf-8") == first
 
 
@@ -77,7 +77,7 @@ def test_the_faces_concerned_are_seen_in_the_near_view(
     tmp_path: Path, name: str, code: str, triangles: np.ndarray
 ) -> None:
     (tmp_path / "a.stl").write_bytes(stl(triangles))
-    run("a.stl", "--select", code, "--printer", "fdm-0.4", "--show", "p", cwd=tmp_path)
+    run("a.stl", "--select", code, "--printer", "fdm-0.4", "--pictures", "p", cwd=tmp_path)
     _, near = views(tmp_path / "p" / "a.stl" / f"{code}.svg")
     coloured = np.ptp(near.astype(int), axis=2) > 100
     assert coloured.mean() > 0.005
@@ -85,17 +85,17 @@ def test_the_faces_concerned_are_seen_in_the_near_view(
 
 def test_a_hidden_place_is_seen_through_a_cut(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(stl(CAVITY))
-    run("a.stl", "--select", "G006", "--show", "p", cwd=tmp_path)
+    run("a.stl", "--select", "G006", "--pictures", "p", cwd=tmp_path)
     path = tmp_path / "p" / "a.stl" / "G006.svg"
     assert "cut open in front of it" in path.read_text("utf-8")
     (tmp_path / "b.stl").write_bytes(stl(box()[:, ::-1]))
-    run("b.stl", "--select", "T008", "--show", "p", cwd=tmp_path)
+    run("b.stl", "--select", "T008", "--pictures", "p", cwd=tmp_path)
     assert "cut open" not in (tmp_path / "p" / "b.stl" / "T008.svg").read_text("utf-8")
 
 
 def test_the_marked_sides_are_the_holes(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(stl(box()[2:]))
-    run("a.stl", "--show", "p", cwd=tmp_path)
+    run("a.stl", "--pictures", "p", cwd=tmp_path)
     root = ET.parse(tmp_path / "p" / "a.stl" / "T001.svg").getroot()
     for view in root.findall(f"{SVG}svg"):
         marked = "".join(p.get("d", "") for p in view.iter(f"{SVG}path") if "mark" in (p.get("class") or ""))
@@ -118,7 +118,7 @@ def painted(data: bytes) -> list[list[tuple[str, ...]]]:
 def test_the_3mf_has_the_faces_in_the_colour_of_the_worst_severity(tmp_path: Path) -> None:
     path = tmp_path / "a.stl"
     path.write_bytes(stl(np.concatenate([box(), box()[4:5], box(at=(30, 0, 0))[2:]])))
-    result = run("a.stl", "--json", "--all-locations", "--show", "p", cwd=tmp_path)
+    result = run("a.stl", "--json", "--all-locations", "--pictures", "p", cwd=tmp_path)
     findings = json.loads(result.stdout)["files"][0]["findings"]
     worst: dict[int, str] = {}
     for found in sorted(findings, key=lambda item: ["info", "warning", "error"].index(item["severity"])):
@@ -138,7 +138,7 @@ def test_the_3mf_opens_elsewhere(tmp_path: Path) -> None:
     )
     build = '<build><item objectid="1"/><item objectid="2"/></build>'
     (tmp_path / "a.3mf").write_bytes(package(model_xml(resources, build)))
-    run("a.3mf", "--show", "p", cwd=tmp_path)
+    run("a.3mf", "--pictures", "p", cwd=tmp_path)
     made = tmp_path / "p" / "a.3mf" / "findings.3mf"
     report = check_file(made)
     assert {found.code for found in report.findings} == {"T001"}
@@ -160,7 +160,7 @@ def test_files_without_a_mesh_or_a_finding_have_no_picture(tmp_path: Path) -> No
     (tmp_path / "good.stl").write_bytes(stl(box()))
     (tmp_path / "cut.stl").write_bytes(stl(box())[:-80])
     (tmp_path / "nan.stl").write_bytes(stl(box((np.nan, 1, 1))))
-    result = run(".", "--show", "p", cwd=tmp_path)
+    result = run(".", "--pictures", "p", cwd=tmp_path)
     assert result.returncode == 1
     assert result.stderr == ""
     assert not (tmp_path / "p").exists()
@@ -168,7 +168,7 @@ def test_files_without_a_mesh_or_a_finding_have_no_picture(tmp_path: Path) -> No
 
 def test_a_finding_without_a_place_shows_the_whole_part(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(stl(box((0.2, 0.3, 0.4)), header=b"solid"))
-    run("a.stl", "--show", "p", cwd=tmp_path)
+    run("a.stl", "--pictures", "p", cwd=tmp_path)
     for code in ("F007", "S001"):
         assert len(views(tmp_path / "p" / "a.stl" / f"{code}.svg")) == 1
         assert "0.2 x 0.3 x 0.4 mm" in (tmp_path / "p" / "a.stl" / f"{code}.svg").read_text("utf-8")
@@ -188,14 +188,14 @@ def test_a_folder_that_cannot_be_written_is_one_error(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(stl(box()[2:]))
     (tmp_path / "p").write_text("a file")
     for jobs in ("1", "2"):
-        result = run("a.stl", "a.stl", "--show", "p", "--jobs", jobs, cwd=tmp_path)
+        result = run("a.stl", "a.stl", "--pictures", "p", "--jobs", jobs, cwd=tmp_path)
         assert (result.returncode, len(result.stderr.splitlines())) == (2, 1)
 
 
 def test_nothing_of_cad_and_no_display_is_needed(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(stl(box()[2:]))
     code = (
-        "import sys\nfrom unitcad.cli import main\nsys.argv = ['unitcad', 'check', 'a.stl', '--show', 'p']\n"
+        "import sys\nfrom unitcad.cli import main\nsys.argv = ['unitcad', 'check', 'a.stl', '--pictures', 'p']\n"
         "try:\n    main()\nexcept SystemExit as stop:\n    assert stop.code == 1, stop.code\n"
         "heavy = {'OCP', 'build123d', 'cadquery', 'matplotlib'} "
         "& {m.split('.')[0] for m in sys.modules}\nassert not heavy, heavy"
