@@ -181,22 +181,23 @@ def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tup
     """
     bed_x, bed_y = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
     filled: list[dict[Body, tuple[float, float]]] = []
-    tongue = next((body for body in bodies if body.kind == "tongue"), None)
-    spare = (replace(tongue, name=SPARE_TONGUE),) if tongue else ()
-    for body in (*bodies, *spare):
+
+    def has_room(plate: dict[Body, tuple[float, float]], size: tuple[float, float]) -> bool:
+        sizes = [*plate.values(), size]
+        ends = ((x + w, y + d) for (x, y), (w, d) in zip(layout(sizes, (bed_x, bed_y)), sizes, strict=True))
+        return all(x <= bed_x and y <= bed_y for x, y in ends)
+
+    for body in bodies:
         x0, y0, _, x1, y1, _ = extent(body.shape)
-        for plate in filled:
-            if body in spare and tongue not in plate:
-                continue
-            sizes = [*plate.values(), (x1 - x0, y1 - y0)]
-            ends = ((x + w, y + d) for (x, y), (w, d) in zip(layout(sizes, (bed_x, bed_y)), sizes, strict=True))
-            if all(x <= bed_x and y <= bed_y for x, y in ends):
-                break
-        else:
-            if body in spare:
-                break
+        size = x1 - x0, y1 - y0
+        plate = next((plate for plate in filled if has_room(plate, size)), None)
+        if plate is None:
             filled.append(plate := {})
-        plate[body] = x1 - x0, y1 - y0
+        plate[body] = size
+    if tongue := next((body for body in bodies if body.kind == "tongue"), None):
+        plate = next(plate for plate in filled if tongue in plate)
+        if has_room(plate, plate[tongue]):
+            plate[replace(tongue, name=SPARE_TONGUE)] = plate[tongue]
     names = [f"{stem}-{i + 1}.3mf" for i in range(len(filled))] if len(filled) > 1 else [f"{stem}.3mf"]
     return dict(zip(names, map(tuple, filled), strict=bool(filled)))
 

@@ -47,12 +47,10 @@ def answer(
     `too_far` from the measured ones). `p10`, `p50` and `p90`: the leading model's median and 80 % range, fractions of
     the motor's amplitude. `analytic`: the levels of the paper's model.
 
-    Errors are factors with the unit left out.
-    `held`: how many of the nine measured units lay in the range that was predicted without them. `class_mean` is
-    the baseline.
+    Errors are factors with the unit left out. `held`: how many of the nine measured units lay in the range that was
+    predicted without them. `class_mean` is the baseline.
 
-    With a lab's fit
-    `measured` and `nearest` are the lab's own; `elsewhere` is the paper's measurement of this unit.
+    With a lab's fit `measured` and `nearest` are the lab's own; `elsewhere` is the paper's measurement of this unit.
     """
     lead, errors = lead_of(variant.moduli, fit), left_out(variant.moduli, fit)
     expected = predictive_of([variant], fit)
