@@ -22,7 +22,7 @@ from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.models import MODELS, edge_levels
 from unitcad.attenuation.inputs import EstimateInput, TissueLayer, body
 from unitcad.attenuation.layered import UniformDisc
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
 RADII = np.geomspace(1e-4, 50e-3, 13)

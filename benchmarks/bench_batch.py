@@ -28,7 +28,7 @@ import psutil
 
 from unitcad.attenuation.edge.level import model_block
 from unitcad.cache import usage
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.sweeps import BatchOptions, estimate_table, run
 from unitcad.sweeps.executors import ProcessExecutor, SerialExecutor
 from unitcad.sweeps.sweep import Sweep, from_file

@@ -146,7 +146,9 @@ def _cured(procedure: Procedure) -> Iterator[str]:
             yield f"pour {pour.index}: cures for less than the silicone takes"
         elif TACK not in pour.steps[cures[0]].text:
             yield f"pour {pour.index}: nothing says how to tell cured silicone from tacky"
-    fixed = any("silicone adhesive" in step.needs or "fill the ring" in step.text for step in procedure.assembly)
+    fixed = any(
+        "silicone adhesive" in step.required_tools or "fill the ring" in step.text for step in procedure.assembly
+    )
     if fixed and procedure.assembly[-1].kind != "cure":
         yield "what holds the motor is not cured"
 
@@ -232,7 +234,7 @@ def _fixed(procedure: Procedure) -> Iterator[str]:
     silicones = [pour.material for pour in procedure.pours]
     hours = {pour.material: pour.cure_h for pour in procedure.pours}
     for step in procedure.assembly:
-        asked = 24.0 if "silicone adhesive" in step.needs else None
+        asked = 24.0 if "silicone adhesive" in step.required_tools else None
         if "fill the ring" in step.text:
             (said,) = layers_named([step.text])
             asked = hours[silicones[min(said, len(silicones) - 1)]]

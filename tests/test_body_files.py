@@ -13,7 +13,7 @@ import pytest
 from unitcad.checks import check_moulds
 from unitcad.designs import unit_bodies
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.export import printing
 from unitcad.kernels import mesh
 from unitcad.kernels.mesh import arrays, realise

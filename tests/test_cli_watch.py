@@ -18,7 +18,7 @@ import pytest
 from typer.testing import CliRunner
 
 from unitcad.cli import app
-from unitcad.cli.saves import saves
+from unitcad.cli.file_watcher import wait_for_saves
 from unitcad.errors import WrongArgument
 from unitcad.validation import templates
 
@@ -77,7 +77,7 @@ def test_files_that_a_spec_names_are_watched(tmp_path: Path) -> None:
     spec, design = tmp_path / "mine.toml", tmp_path / "mine.py"
     spec.write_text('design = "mine.py:mine"\n')
     design.write_text("a = 1\n")
-    told = saves([spec])
+    told = wait_for_saves([spec])
     next(told)
     threading.Timer(0.5, lambda: design.write_text("a = 12\n")).start()
     begun = time.monotonic()
@@ -95,7 +95,7 @@ def test_a_template_can_not_be_saved() -> None:
 def test_a_text_that_is_no_spec_is_watched_too(tmp_path: Path, text: str) -> None:
     spec = tmp_path / "mine.toml"
     spec.write_text(text)
-    told = saves([spec])
+    told = wait_for_saves([spec])
     next(told)
     threading.Timer(0.3, spec.unlink).start()
     next(told)

@@ -5,7 +5,7 @@ from unitcad.cli.estimate_tables import _inputs
 
 def test_the_bodys_inputs_are_said_to_change_the_curve():
     seen = {"by": {"diameter_mm": 1.0}, "not_seen": ["tissue damping"]}
-    data = {"models": {"divider": {"inputs_seen": seen}}, "layered": {}}
+    data = {"models": {"divider": {"sensitivities": seen}}, "layered": {}}
     found = _inputs(data)
     assert found
     assert found[1] == (

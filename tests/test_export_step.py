@@ -110,13 +110,13 @@ def test_copies_of_a_body_are_in_the_file_once(tmp_path):
     shape = tongue().shape
     places = [(0, 0, 0), (30, 0, 0), (0, 40.5, 2), (-30, 1.25, 0)]
     copies = [
-        Body(f"stub{i + 1}", "tool", "stub", moved(turned(shape, "z", i), *at), (0.5, 0.5, 0.5))
+        Body(f"filament{i + 1}", "tool", "filament", moved(turned(shape, "z", i), *at), (0.5, 0.5, 0.5))
         for i, at in enumerate(places)
     ]
-    others = [tube(), Body("stub", "tool", "stub", moved(shape, 0, 0, 50), (1, 0, 0))]
+    others = [tube(), Body("filament", "tool", "filament", moved(shape, 0, 0, 50), (1, 0, 0))]
     step.write(tmp_path / "a.step", [*copies, *others], "a")
     text = (tmp_path / "a.step").read_text()
-    assert re.findall(r" = PRODUCT\('([^']*)'", text) == ["a", "stub-1", others[0].name, "stub"]
+    assert re.findall(r" = PRODUCT\('([^']*)'", text) == ["a", "filament-1", others[0].name, "filament"]
     assert len(re.findall("MANIFOLD_SOLID_BREP", text)) == 3
     back = step_reader.read(tmp_path / "a.step")
     assert [(body.name, body.colour) for body in back] == [(body.name, body.colour) for body in (*copies, *others)]

@@ -27,7 +27,7 @@ FLOORS = [
     {"report"},
     {"pipeline"},
     {"casting", "checks"},
-    {"moulds", "estimating"},
+    {"moulds", "estimate_inputs"},
     {"validation"},
     {"export"},
     {"attenuation"},
@@ -179,7 +179,7 @@ def test_every_design_has_a_template_and_one_is_the_default() -> None:
 
 
 def test_no_piece_is_recognised_by_its_name() -> None:
-    kinds = ("base", "cup", "lid", "tongue", "stub", "blade", "layer", "wire", "motor")
+    kinds = ("base", "cup", "lid", "tongue", "filament", "blade", "layer", "wire", "motor")
     found = []
     for file in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text("utf-8"))):

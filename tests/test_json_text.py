@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from unitcad.casting.procedure import Procedure, procedure
-from unitcad.casting.written import to_json
+from unitcad.casting.procedure_text import to_json
 from unitcad.json_text import json_bytes
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation.load import load

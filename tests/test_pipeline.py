@@ -190,7 +190,7 @@ def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tm
         ("single-embedded", "second pour"),
         (LEADLESS, "tongue and slot"),
         ("embedded", "tongue and slot"),
-        ("embedded", "filament stub and hole"),
+        ("embedded", "filament and its hole"),
         ("embedded", "mould checks"),
         ("embedded", "boundary representation"),
     ],

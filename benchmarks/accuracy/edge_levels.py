@@ -23,7 +23,7 @@ from unitcad.attenuation.fem.motor_level import Setting, amplitude, motion, pres
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.spec import Spec
 from unitcad.validation import default_template, load
 

@@ -19,7 +19,7 @@ from unitcad.attenuation.fem.motor_level import Drive, Reading, Setting, amplitu
 from unitcad.attenuation.fem.unknowns import Draw, drawn
 from unitcad.catalogue import measurements
 from unitcad.designs import shipped
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.spec import Spec
 from unitcad.validation import from_data
 

@@ -17,7 +17,7 @@ from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Tabl
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import default_template, load
 
 OMEGA = 2 * math.pi * 125.0

@@ -20,7 +20,7 @@ from unitcad.attenuation.fem.unknowns import Draw, Setting, drawn
 from unitcad.attenuation.inputs import Drive, EstimateInput, body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import default_template, load
 
 DRIVES: tuple[Drive, ...] = ("flat", "axial")

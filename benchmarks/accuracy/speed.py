@@ -96,7 +96,7 @@ def run(quick: bool, say: Say) -> Result:
         title="Speed",
         text=(
             f"Ten bodies of the {default_template()} template with its moulds: two layers, motor, circuit, base, "
-            "two cups, tongue, filament stub and blade. The plain scripts draw the same parts as a user would, from "
+            "two cups, tongue, filament and blade. The plain scripts draw the same parts as a user would, from "
             "the same lengths, with one boolean after the other. The angle of their STL is chosen so that the "
             "largest volume error is near that of unitcad's meshes. Cold: a new process each, taken "
             "in turn. Warm times come from one process a script, so they are not interleaved. The benchmarks of "

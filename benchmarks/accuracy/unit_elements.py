@@ -16,7 +16,7 @@ from unitcad.attenuation.fem.unknowns import Draw, drawn
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import default_template, load
 
 SEED, DRAWS = 1, 128

@@ -131,7 +131,7 @@ def tongue(n: dict) -> Manifold:
     return slot(n, n["ledge"], x1 - 1, n["slot_width"] / 2, *n["slot_z"]) + box(x0, x1, -half, half, *n["slot_z"])
 
 
-def stub(n: dict) -> Manifold:
+def filament(n: dict) -> Manifold:
     r = n["filament"]
     elbow = -n["plinth_height"] - n["plate_thickness"] + r
     length = n["plate"] + 1 - r + n["stub_tail"] - 1
@@ -158,7 +158,7 @@ def make(n: dict[str, Any]) -> dict[str, Manifold]:
         "cup1": cup(n, 0),
         "cup2": cup(n, 1),
         "tongue": tongue(n),
-        "stub": stub(n),
+        "filament": filament(n),
         "blade": blade(n),
     }
 

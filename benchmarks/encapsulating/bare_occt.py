@@ -190,7 +190,7 @@ def tongue(n: dict) -> Any:
     return fuse(slot(n, n["ledge"], x1 - 1, n["slot_width"] / 2, *n["slot_z"]), box(x0, x1, -half, half, *n["slot_z"]))
 
 
-def stub(n: dict) -> Any:
+def filament(n: dict) -> Any:
     r = n["filament"]
     elbow = -n["plinth_height"] - n["plate_thickness"] + r
     length = n["plate"] + 1 - r + n["stub_tail"] - 1
@@ -214,7 +214,7 @@ def make(n: dict[str, Any]) -> dict[str, dict[str, Any]]:
         "motor": cylinder(n["motor"][0], 0, n["motor"][1]),
         "fpcb": circuit(n),
     }
-    moulds = {"base": base(n), "cup1": cup(n, 0), "cup2": cup(n, 1), "tongue": tongue(n), "stub": stub(n)}
+    moulds = {"base": base(n), "cup1": cup(n, 0), "cup2": cup(n, 1), "tongue": tongue(n), "filament": filament(n)}
     return {"unit": unit, "moulds": {**moulds, "blade": blade(n)}}
 
 

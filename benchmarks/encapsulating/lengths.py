@@ -14,7 +14,7 @@ from typing import Any
 from unitcad.designs.limits import filament_groove
 from unitcad.moulds.base import plate_bottom, pry_floor
 from unitcad.moulds.cup import window_section
-from unitcad.moulds.filament import FLARE, STUB_TAIL
+from unitcad.moulds.filament import FILAMENT_TAIL, FLARE
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN
 from unitcad.moulds.pieces import BLADE_EDGE, BLADE_THICKNESS
 from unitcad.moulds.ribs import ROOT, ribs
@@ -70,7 +70,7 @@ def lengths() -> dict:
         "flare_floor": plate_bottom(spec)
         + filament_groove(spec)
         - math.ceil(0.5 / moulds.layer_mm - 1e-6) * moulds.layer_mm,
-        "stub_tail": STUB_TAIL,
+        "stub_tail": FILAMENT_TAIL,
         "grip": [GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH],
         "blade": [BLADE_THICKNESS, BLADE_EDGE, 12.0],
         "engraving": moulds.engraving_depth_mm,

@@ -130,7 +130,7 @@ def tongue(n: dict) -> cq.Workplane:
     return strip.union(box(x0, x1, -half, half, *n["slot_z"]))
 
 
-def stub(n: dict) -> cq.Workplane:
+def filament(n: dict) -> cq.Workplane:
     r = n["filament"]
     elbow = -n["plinth_height"] - n["plate_thickness"] + r
     length = n["plate"] + 1 - r + n["stub_tail"] - 1
@@ -157,7 +157,7 @@ def make(n: dict[str, Any]) -> dict[str, cq.Workplane]:
         "cup1": cup(n, 0),
         "cup2": cup(n, 1),
         "tongue": tongue(n),
-        "stub": stub(n),
+        "filament": filament(n),
         "blade": blade(n),
     }
 

@@ -54,13 +54,13 @@ def assembly(spec, dims):
     return [
         Fitting(
             "Solder the motor to the circuit's pad, and try the motor: nothing of it can be reached later.",
-            needs=("soldering iron and solder",),
+            required_tools=("soldering iron and solder",),
         ),
         Fitting(
             "Brush a thin coat of the mix onto the middle of the film. Lay the circuit on it, its pad in the middle, "
             "the motor up, the tail on the base's rib. Press the pad down from its middle, so that no air stays under "
             "it.",
-            needs=("small brush",),
+            required_tools=("small brush",),
             mix=True,
         ),
     ]

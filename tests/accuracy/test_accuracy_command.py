@@ -22,7 +22,7 @@ from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.layered.response import Response
 from unitcad.cli import app
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.kernels.mesh import area_true
 from unitcad.pipeline.make import Subject
 from unitcad.pipeline.subjects import load_subject

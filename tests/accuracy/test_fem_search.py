@@ -16,7 +16,7 @@ from benchmarks.accuracy.fem_search import (
 )
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.fem.motor_level import level
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 
 MEASURED = measured_table().levels
 

@@ -12,7 +12,7 @@ from unitcad.attenuation.crosstalk import CONTACT, CONTACT_MM, contact, crosstal
 from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
 

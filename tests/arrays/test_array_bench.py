@@ -66,7 +66,7 @@ def test_the_pictures_of_arrays(test: Callable[..., None], source: tuple[str, ..
 def test_no_step_needs_a_pin_where_the_base_has_pins() -> None:
     made = planned(*PATCH)[1]
     (cups_on,) = (step for step in made.preparation if "one pin stands off" in step.text)
-    assert "pin" not in cups_on.needs
+    assert "pin" not in cups_on.required_tools
 
 
 def test_all_pieces_of_split_tools_lie_apart_on_the_bed() -> None:

@@ -24,7 +24,7 @@ from unitcad.arrays.arrayed import unit_folders
 from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.cache import MemoryStore
 from unitcad.casting.procedure import Procedure, procedure
-from unitcad.casting.steps import duration, in_short
+from unitcad.casting.steps import casting_summary, duration
 from unitcad.casting.views import picture_path, views
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
@@ -63,7 +63,7 @@ def _contents(folder: Path) -> dict[str, bytes]:
 
 def test_the_live_page_says_what_the_procedure_says(folder: Path) -> None:
     told = answered(Ask(what="moulds", text=(folder / "array.toml").read_text("utf-8")), Trusted([]))
-    assert told.lines[:-1] == [*in_short(json.loads((folder / "casting.json").read_bytes()))]
+    assert told.lines[:-1] == [*casting_summary(json.loads((folder / "casting.json").read_bytes()))]
 
 
 def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:

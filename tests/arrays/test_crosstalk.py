@@ -19,7 +19,7 @@ from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.receivers import neighbours_block
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 
 UNIT = {"like": "encapsulating", "fpcb": {"tail_length_mm": 1.0}}
 

@@ -247,7 +247,7 @@ def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> No
         )
         assert net == pytest.approx(volume * density / 1000, rel=1e-6)
     items = {item.item: item.quantity for item in made.bill}
-    assert items["filament stub"] == items["filament stub, straight"] == 9
+    assert items["filament"] == items["filament, straight"] == 9
     assert (items["syringe"], items["flexible circuit"], items["lid 2"]) == (1, 1, 1)
     assert (items["degassing container"], items["narrow pliers"]) == (1, 1)
     assert "flat pliers" not in items  # for tongues that are cut

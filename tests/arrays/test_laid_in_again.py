@@ -37,7 +37,7 @@ def test_a_layer_is_laid_in_elsewhere_only_once_it_was_taken_out() -> None:
     """Order by order, which of them can be done: the next pour is cast on Layer 1, or has it laid in anew."""
     first, last = patch().plan.steps
     elsewhere = replace(last, earlier=tuple(moved(shape, z=1.0) for shape in last.earlier))
-    out = tuple(Removal(stub.name, DOWN) for stub in patch().plan.of_kind("stub")), Removal(CAST, UP)
+    out = tuple(Removal(piece.name, DOWN) for piece in patch().plan.of_kind("filament")), Removal(CAST, UP)
     taken = replace(first, removals=(*first.removals, out[1]))
     for steps, wrong in (
         ((first, last), []),

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from unitcad.attenuation.edge.answer import percent
 from unitcad.attenuation.edge.models import assessments, stored
 from unitcad.cli import app
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.validation import load, templates
 
 

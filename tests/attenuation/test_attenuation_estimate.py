@@ -20,7 +20,7 @@ from unitcad.attenuation.edge.models import edge_levels
 from unitcad.cli import app
 from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input, estimate_spec, frequency_table_of_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec, frequency_table_of_spec
 from unitcad.validation import load
 
 SOFT, MEDIUM, STIFF = "ecoflex-00-10", "dragon-skin-10-medium", "dragon-skin-30"
@@ -323,7 +323,7 @@ def test_a_model_that_gives_no_estimate_is_refused_with_those_that_do(model):
 
 def test_estimate_loads_no_cad_and_no_optimiser():
     code = (
-        "import sys; from unitcad.validation import load; from unitcad.estimating import estimate_spec; "
+        "import sys; from unitcad.validation import load; from unitcad.estimate_inputs import estimate_spec; "
         "estimate_spec(load('encapsulating')); "
         "print([m for m in ('OCP', 'build123d', 'cadquery', 'trimesh', 'scipy.optimize', 'matplotlib') "
         "if m in sys.modules])"

@@ -22,7 +22,7 @@ from unitcad.attenuation.edge.models import (
 from unitcad.attenuation.edge.scores import assess
 from unitcad.catalogue import measurements
 from unitcad.designs import shipped
-from unitcad.estimating import FEM
+from unitcad.estimate_inputs import FEM
 from unitcad.spec.raw import Model
 
 E10, D10, D30 = 15e3, 250e3, 355e3

@@ -14,7 +14,7 @@ from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.edge.variant_units import merged
 from unitcad.attenuation.fem.motor_level import level as finite_elements
 from unitcad.attenuation.fem.prior_range import ALIKE
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import from_data
 
 MATERIALS = ("ecoflex-00-10", "ecoflex-00-30", "dragon-skin-10-medium", "dragon-skin-30")
@@ -133,7 +133,7 @@ def test_two_pieces_of_one_silicone_are_named_by_the_first() -> None:
     spec = from_data({**drawn(Random(1), 1), "design": "encapsulating", "layers": layers, "diameter_mm": 17.0})
     found = estimate_spec(spec)
     assert [layer["wall_mm"] for layer in found["variant"]["layers"]] == [1.4, 1.4]
-    seen = found["models"]["published"]["inputs_seen"]
+    seen = found["models"]["published"]["sensitivities"]
     assert {name for name in [*seen["by"], *seen["not_seen"]] if name.endswith(".wall_mm")} == {
         "layers.0.wall_mm",
         "layers.2.wall_mm",

@@ -15,7 +15,7 @@ from unitcad.attenuation.fem.harmonic_response import disc_response, motor_respo
 from unitcad.attenuation.fem.motor_level import Setting, motion, pressed_skin, unit_fields
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
 RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3

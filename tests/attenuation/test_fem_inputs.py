@@ -6,17 +6,17 @@ import pytest
 
 pytest.importorskip("skfem")
 
-from unitcad.attenuation.edge.inputs_seen import changed, inputs_seen
+from unitcad.attenuation.edge.sensitivities import changed, sensitivities
 from unitcad.attenuation.fem.motor_level import level
-from unitcad.attenuation.fem.sensitivities import STEP, fem_inputs
-from unitcad.estimating import estimate_input
+from unitcad.attenuation.fem.sensitivities import STEP, fem_sensitivities
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
 
 def test_slopes_of_both_readings_are_those_of_specs_that_were_changed() -> None:
     variant = estimate_input(load("embedded"))
     lines: list[str] = []
-    found = {one["reading"]: one for one in fem_inputs(variant, lines.append)}
+    found = {one["reading"]: one for one in fem_sensitivities(variant, lines.append)}
     assert set(found) == {"skin", "edge"}
     assert len(set(lines)) == len(changed(variant))
     for path, value in (("layers.0.wall_mm", 1.25), ("motor.thickness_mm", 2.0), ("estimate.frequency_hz", 125.0)):
@@ -28,7 +28,7 @@ def test_slopes_of_both_readings_are_those_of_specs_that_were_changed() -> None:
 
 
 def test_a_unit_without_a_modulus_has_no_slopes() -> None:
-    assert fem_inputs(estimate_input(load("embedded", ["layers.0.material=ecoflex-00-50"]))) == []
+    assert fem_sensitivities(estimate_input(load("embedded", ["layers.0.material=ecoflex-00-50"]))) == []
 
 
 def test_no_poisson_s_ratio_above_one_half_is_asked_for() -> None:
@@ -38,6 +38,6 @@ def test_no_poisson_s_ratio_above_one_half_is_asked_for() -> None:
         seen.extend(layer.poisson_ratio.middle for one in variants for layer in one.layers)
         return [one.layers[0].poisson_ratio.middle ** 2 for one in variants]
 
-    found = inputs_seen(estimate_input(load("embedded")), watch, STEP)
+    found = sensitivities(estimate_input(load("embedded")), watch, STEP)
     assert max(seen) <= 0.5
     assert found["by"] == {"layers.0.poisson_ratio": 2.0}

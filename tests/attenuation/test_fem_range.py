@@ -20,7 +20,7 @@ from unitcad.attenuation.fem.prior_range import DRAWS, range_block
 from unitcad.attenuation.fem.unknowns import CHOICES, Draw, drawn
 from unitcad.attenuation.inputs import Quantity
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import load
 
 UNIT = estimate_input(load("encapsulating"))
@@ -134,10 +134,10 @@ def test_it_is_made_only_when_it_is_asked_for(monkeypatch):
     from unitcad.attenuation.fem import sensitivities
 
     monkeypatch.setattr(prior_range, "range_block", lambda variant, say: {"draws": 0})
-    monkeypatch.setattr(sensitivities, "fem_inputs", lambda variant, say: [])
+    monkeypatch.setattr(sensitivities, "fem_sensitivities", lambda variant, say: [])
     assert "fem" not in estimate_spec(load("encapsulating"))
     data = estimate_spec(load("encapsulating"), models=("published", "fem"))
-    assert data["fem"] == {"draws": 0, "inputs_seen": []}
+    assert data["fem"] == {"draws": 0, "sensitivities": []}
     assert list(data["models"]) == ["published"]
 
 

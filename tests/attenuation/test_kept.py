@@ -6,7 +6,7 @@ import pytest
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import Point, UniformDisc
 from unitcad.attenuation.layered.loads import kept
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load as load_spec
 
 DISC = UniformDisc(3.5e-3)

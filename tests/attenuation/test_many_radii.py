@@ -9,7 +9,7 @@ from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import components
 from unitcad.attenuation.layered.response import MOST_SOLVED
 from unitcad.attenuation.receivers import Patch, influence
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
 UNIT = estimate_input(load("encapsulating"))

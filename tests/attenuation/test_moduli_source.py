@@ -12,7 +12,7 @@ from unitcad.attenuation.edge.closed_form import published_path
 from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table, whole_ratio
 from unitcad.catalogue import materials
 from unitcad.cli import app
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.validation import load
 
 SLOW = ["layers.0.wall_mm=1.3", "estimate.moduli=quasi-static"]

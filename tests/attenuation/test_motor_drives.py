@@ -9,7 +9,7 @@ from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.inputs import body
 from unitcad.catalogue import motors
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import from_data, load, read
 
 DRIVEN = {drive: estimate_input(load("encapsulating", [f"motor.drive={drive}"])) for drive in ("flat", "axial")}
@@ -44,11 +44,11 @@ def test_the_motor_s_drive_stands_first_and_changes_nothing_else() -> None:
     flat, axial = BLOCKS["flat"], BLOCKS["axial"]
     assert (list(flat["drives"]), list(axial["drives"])) == (["flat", "axial"], ["axial", "flat"])
     assert (flat["drive"], axial["drive"]) == ("flat", "axial")
-    seen = [block["inputs_seen"] for block in (flat, axial)]  # of the decay under the motor's drive
+    seen = [block["sensitivities"] for block in (flat, axial)]  # of the decay under the motor's drive
     assert [one["drive"] for one in seen] == ["flat", "axial"]
     assert seen[0]["by"].keys() == seen[1]["by"].keys()
     assert seen[0]["by"] != seen[1]["by"]
-    follow = {"drive", "inputs_seen"}
+    follow = {"drive", "sensitivities"}
     rest = [{key: value for key, value in block.items() if key not in follow} for block in (flat, axial)]
     assert rest[0] == rest[1]
 

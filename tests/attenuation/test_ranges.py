@@ -15,7 +15,7 @@ from unitcad.attenuation.edge.models import left_out_logs, stored
 from unitcad.attenuation.edge.nearest import LENGTHS, coordinates_of, nearest
 from unitcad.attenuation.edge.ranges import OF_THE_KIND, Predictive, lead_of, predictive_of
 from unitcad.attenuation.inputs import EstimateInput
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
 T90 = stats.t.ppf(0.9, 7)

@@ -13,7 +13,7 @@ from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, neig
 from unitcad.cli import app
 from unitcad.designs import unit_bodies
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.kernels.mesh import realise
 from unitcad.validation import load
 

@@ -21,7 +21,7 @@ from unitcad.attenuation.edge.models import (
     rules,
 )
 from unitcad.attenuation.edge.scores import bootstrap_range, choose_without, left_out_errors, sign_flip_p
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.validation import load
 
 TABLE = measured_table()

@@ -6,7 +6,7 @@ import pytest
 
 from unitcad.attenuation.inputs import Geometry, Quantity
 from unitcad.designs import unit_bodies
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.kernels.mesh import bounds, realise
 from unitcad.validation import load
 

@@ -88,7 +88,7 @@ def test_a_picture_shows_the_state_that_its_words_speak_of(source: tuple[str, ..
                 assert ARROW not in colours
                 assert not any(part.name == "blade" for part in view.parts)
     fit = next(step for step in casting.preparation if step.title == "Try every cup, dry")
-    assert not any(part.name.startswith("stub") for part in shown[fit.picture].parts)
+    assert not any(part.name.startswith("filament") for part in shown[fit.picture].parts)
 
 
 def seen(content: bytes) -> np.ndarray:

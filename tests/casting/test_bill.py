@@ -10,7 +10,7 @@ from tests.sample_bodies import LEADLESS
 from unitcad.casting.bill import plural
 from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.procedure import Procedure, procedure
-from unitcad.casting.written import to_markdown
+from unitcad.casting.procedure_text import to_markdown
 from unitcad.catalogue import materials
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import assumed_lengths
@@ -63,7 +63,7 @@ def test_a_pin_for_bubbles_is_bought_for_an_open_pour_only() -> None:
 
 def test_pictures_and_bill_count_pieces() -> None:
     gang = ("encapsulating", "moulds.cavities=[2,3]")
-    assert quantities(casting(*gang))["filament stub"] == 6
+    assert quantities(casting(*gang))["filament"] == 6
     bench = BenchPictures(moulds_of(*gang))
     bench.picture("pieces")
     assert {"6 filaments", "6 tongues"} <= {name.text for name in bench.written}
@@ -126,8 +126,8 @@ def test_the_sheet_begins_with_what_to_measure() -> None:
 
 
 def test_several_of_an_item_are_plural() -> None:
-    names = ["flexible circuit", "pad of stacked card", "filament stub, straight", "LCM0720A3463F"]
-    several = ["flexible circuits", "pads of stacked card", "filament stubs, straight", "LCM0720A3463F"]
+    names = ["flexible circuit", "pad of stacked card", "filament, straight", "LCM0720A3463F"]
+    several = ["flexible circuits", "pads of stacked card", "filaments, straight", "LCM0720A3463F"]
     assert [plural(name) for name in names] == several
 
 
@@ -145,7 +145,7 @@ def test_both_designs_fix_the_motor_by_the_same_words_and_bill() -> None:
         re.sub(r"where it touches [^:]*:", "where it touches ...:", step.text.split("thinly")[1].split(".")[0])
         for made in fixed.values()
         for step in made.assembly
-        if "adhesive" in step.needs or "silicone adhesive" in step.text
+        if "adhesive" in step.required_tools or "silicone adhesive" in step.text
     }
     assert len(sentences) == 1
     for made in fixed.values():

@@ -7,7 +7,7 @@ from dataclasses import asdict
 import pytest
 
 from unitcad.casting.procedure import Procedure, procedure
-from unitcad.casting.steps import BenchStep, duration, in_short, phases
+from unitcad.casting.steps import BenchStep, casting_summary, duration, phases
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load
 
@@ -101,15 +101,15 @@ def test_durations_in_words(minutes: float, text: str) -> None:
     assert duration(minutes) == text
 
 
-def test_in_short_names_the_pours_whose_bubbles_stay() -> None:
+def test_the_summary_names_the_pours_whose_bubbles_stay() -> None:
     """Ecoflex 00-10 and Dragon Skin 30 as the verdicts of their pours have it; nothing is said with a vacuum."""
     made = casting("encapsulating", "casting.vacuum=false")
-    *_, last = in_short(asdict(made))
+    *_, last = casting_summary(asdict(made))
     stay = [pour for pour in made.pours if "Such bubbles stay" in pour.verdict]
     assert stay
     assert last.startswith("warning: without a vacuum bubbles stay in pour ")
     assert all(f"pour {pour.index} ({pour.material})" in last for pour in stay)
-    lines = list(in_short(asdict(casting("encapsulating"))))
+    lines = list(casting_summary(asdict(casting("encapsulating"))))
     assert lines[0].startswith("print moulds/moulds.3mf: about ")
     assert lines[1] == "mix 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
     assert lines[2].startswith("out of the mould ")

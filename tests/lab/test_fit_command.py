@@ -20,7 +20,7 @@ from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.lab.fit_files import contents
 from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.validation import load
@@ -122,7 +122,7 @@ def test_levels_come_from_a_file_of_measure(tmp_path: Path) -> None:
         ({"unit": [{**UNITS[0], "level": {"value": 0.2, "low": 0.1}}]}, "unit.0.level.high"),
         ({"unit": [{**UNITS[0], "level": {"value": -0.2}}]}, "unit.0.level.value"),
         ({"unit": [{**UNITS[0], "frequency_hz": 0.1}]}, "unit.0.frequency_hz"),
-        ({"with_paper": False}, "unit"),
+        ({"include_paper_units": False}, "unit"),
         ({"moduli": "static"}, "moduli"),
         ({"between_labs": -1.0}, "between_labs"),
         ({"levels": 3}, "levels"),
@@ -170,7 +170,7 @@ def test_units_that_do_not_determine_q_are_named(tmp_path: Path) -> None:
         for i in (0, 1)
         for j in range(3)
     ]
-    result = fit_lab(load_fit_lab(_written(tmp_path, unit=units, with_paper=False)))
+    result = fit_lab(load_fit_lab(_written(tmp_path, unit=units, include_paper_units=False)))
     assert result.fit.model["rule"].at_bound == "q"
     assert result.fit.model["rule"].constants["q"] == 1.0
     assert "rule: the units do not determine q" in contents(result)["fit.md"]
@@ -241,7 +241,7 @@ def one_kind(folder: Path) -> str:
     for i, wall in enumerate(np.linspace(1.0, 4.0, 8)):
         changes = {"layers.0.wall_mm": wall, "layers.1.wall_mm": wall, "diameter_mm": 9.0 + 4 * wall}
         units.append({"name": f"u{i}", "spec": "embedded", "set": changes, "level": {"value": 0.2 / wall}})
-    return _written(folder, unit=units, with_paper=False)
+    return _written(folder, unit=units, include_paper_units=False)
 
 
 def test_a_lab_of_one_kind_of_unit_gives_a_fit_that_is_taken(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from unitcad.attenuation.edge.lab_fit import predictive
 from unitcad.attenuation.edge.models import stored
 from unitcad.cli import app
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input, estimate_spec, fit_of, frequency_table_of_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec, fit_of, frequency_table_of_spec
 from unitcad.lab.fit_files import fit_toml
 from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.validation import load
@@ -54,7 +54,7 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file: P
                 one["constants"]["s"] * one["constants"]["q"], rel=1e-5
             )
             g = np.ones(2)
-        scale = one["discrepancy"] * np.sqrt(1 + g @ np.array(one["covariance"]) @ g)
+        scale = one["model_error"] * np.sqrt(1 + g @ np.array(one["covariance"]) @ g)
         centre = np.log(block["edge_level"]["value"])
         ends = np.exp(stats.t.ppf([0.1, 0.9], one["degrees_of_freedom"], centre, scale))
         assert [block["predictive"]["p10"], block["predictive"]["p90"]] == pytest.approx(ends, rel=1e-7)
@@ -170,7 +170,7 @@ def _bad(text: str, *path: object, value: object) -> str:
         (("model", "published", "degrees_of_freedom"), 0, "degrees_of_freedom"),
         (("model", "divider", "covariance"), [[1.0]], "needs 2 rows"),
         (("model", "divider", "covariance"), [[1.0, 3.0], [3.0, 1.0]], "is no covariance"),
-        (("model", "published", "discrepancy"), 0.0, "discrepancy"),
+        (("model", "published", "model_error"), 0.0, "model_error"),
         (("format",), 2, "format"),
         (("moduli",), "quasi-static", "quasi-static moduli"),
         (("surprise",), 1, "surprise"),

@@ -15,7 +15,7 @@ from tests.robustness.test_bad_values import check_words_are_refused
 from unitcad.attenuation import FractionalKelvinVoigt
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.lab.columns import declared
 from unitcad.lab.dynamic import evaluate_dynamic, read_dynamic
 from unitcad.lab.tensile import Specimen, evaluate, header_of, read_curve

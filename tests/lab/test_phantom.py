@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.cli import app
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.kernels.mesh import realise
 from unitcad.lab.phantom import bench, phantom_files, phantom_set
 from unitcad.lab.phantom.recipe import PhantomTable, load_phantom, modulus_by_table

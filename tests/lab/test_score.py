@@ -13,7 +13,7 @@ from unitcad.attenuation.edge.models import MODELS, stored
 from unitcad.catalogue import figures
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.lab.scoring import COLUMNS, load_figure, score
 from unitcad.validation import load
 

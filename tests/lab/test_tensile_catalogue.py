@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from unitcad import catalogue
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.lab.columns import declared
 from unitcad.lab.tensile import Specimen, evaluate, read_curve
 from unitcad.validation import load

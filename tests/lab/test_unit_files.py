@@ -20,7 +20,7 @@ from unitcad.attenuation.edge.lab_fit import unit_key
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.cli import app
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.files import sha256
 from unitcad.lab.campaign import check_files, read_campaign
 from unitcad.lab.fitting import fit_lab, load_fit_lab
@@ -69,7 +69,7 @@ def test_measured_walls_stand_in_for_the_spec_s(tmp_path: Path) -> None:
     fit = fit_lab(lab).fit
     walls = ["layers.0.wall_mm=1.4", "layers.1.wall_mm=1.1"]
     own = 0.06 / float(published_path(nominal(estimate_input(load("encapsulating", walls))))[0])
-    weight = 1 / (1 + (one.error / fit.model["published"].discrepancy) ** 2)
+    weight = 1 / (1 + (one.error / fit.model["published"].model_error) ** 2)
     stored, found = fit.model["published"].stored["s"], fit.model["published"].constants["s"]
     assert np.log(found) == pytest.approx((0.9 * np.log(stored) + weight * np.log(own)) / (0.9 + weight), abs=2e-3)
     assert fit.measured[0].key == unit_key(estimate_input(load("encapsulating")))

@@ -15,7 +15,7 @@ from casting_rules import broken_rules
 from faulty_sets import set_of
 
 from tests.sample_bodies import LEADLESS
-from unitcad.casting import figures, pouring, written
+from unitcad.casting import figures, pouring, procedure_text
 from unitcad.casting import procedure as casting_procedure
 from unitcad.casting.figures import off_grid, unit_heights
 from unitcad.casting.pouring import Face
@@ -99,7 +99,7 @@ def test_not_degassing_breaks_a_rule() -> None:
 
 
 def test_nothing_of_a_vacuum_is_said_without_one() -> None:
-    files = written.files(procedure("encapsulating", "casting.vacuum=false"))
+    files = procedure_text.files(procedure("encapsulating", "casting.vacuum=false"))
     for text in (files["casting.md"], files["bom.csv"]):
         assert "inHg" not in text
         assert "container" not in text
@@ -171,24 +171,24 @@ def test_every_figure_has_a_source(name: str) -> None:
         )
         assert figure.source.startswith(known), figure
         assert math.isfinite(figure.value)
-    assert json.loads(written.to_json(casting))["label"] == casting.label
-    text = written.to_markdown(casting)
+    assert json.loads(procedure_text.to_json(casting))["label"] == casting.label
+    text = procedure_text.to_markdown(casting)
     assert text.isascii()
     plan = set_of(name).plan
     assert ("Tongue out FIRST" in text) == bool(plan.of_kind("tongue"))
-    assert ("never push it through" in text.lower()) == bool(plan.of_kind("stub"))
+    assert ("never push it through" in text.lower()) == bool(plan.of_kind("filament"))
     assert ("no release agent on it, ever" in text) == (len(plan.steps) > 1)
 
 
 def test_numbers_run_through_the_whole_text() -> None:
-    lines = written.to_markdown(procedure("three-layer")).splitlines()
+    lines = procedure_text.to_markdown(procedure("three-layer")).splitlines()
     numbers = [int(line.split(".")[0]) for line in lines if line.split(".")[0].isdigit()]
     assert numbers == list(range(1, len(numbers) + 1))
 
 
 @pytest.mark.parametrize(("name", "most"), [("encapsulating", 1800), ("embedded", 1450)])
 def test_a_sheet_has_no_more_words_than_a_maker_reads(name: str, most: int) -> None:
-    assert len(written.files(procedure(name))["casting.md"].split()) <= most
+    assert len(procedure_text.files(procedure(name))["casting.md"].split()) <= most
 
 
 def test_a_sentence_that_an_earlier_pour_has_is_said_once() -> None:
@@ -216,7 +216,7 @@ def test_order_of_the_hands() -> None:
 
 
 def test_resin_and_lid_have_their_own_words() -> None:
-    text = written.to_markdown(procedure("encapsulating", "moulds.printer=sla", "moulds.pour=injected"))
+    text = procedure_text.to_markdown(procedure("encapsulating", "moulds.printer=sla", "moulds.pour=injected"))
     for words in ("post-cure", "syringe", "from film or steel strip of 0.35 mm", "what held the lid down"):
         assert words in text
     assert "Strike off" not in text
@@ -225,10 +225,10 @@ def test_resin_and_lid_have_their_own_words() -> None:
 def test_bill_counts_pieces() -> None:
     casting = procedure("encapsulating", "moulds.cavities=[2,2]")
     lines = {item.item: item for item in casting.bill}
-    assert lines["tongue"].quantity == lines["filament stub"].quantity == lines["LCM0720A3463F"].quantity == 4
+    assert lines["tongue"].quantity == lines["filament"].quantity == lines["LCM0720A3463F"].quantity == 4
     assert lines["cup 1"].quantity == 1
     assert "upside down" in lines["cup 1"].made
-    csv = written.files(casting)["bom.csv"].splitlines()
+    csv = procedure_text.files(casting)["bom.csv"].splitlines()
     assert len(csv) == len(casting.bill) + 1
 
 
@@ -255,7 +255,7 @@ def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said() -> None:
         "height over all": (4.61, 4.6),
     }
     assert unit_heights(set_of("embedded")) == []
-    sheet = written.to_markdown(procedure("encapsulating"))
+    sheet = procedure_text.to_markdown(procedure("encapsulating"))
     assert "layer 1's cap 1.2 for 1.25" in sheet
     assert "- Height over all: 4.60 mm (4.61 drawn, in layers of 0.2)." in sheet
 
@@ -348,9 +348,9 @@ def test_a_window_drawn_to_the_clearance_alone_meets_the_tongue_in_whole_layers(
 def test_drawing_of_every_pour_names_its_pieces() -> None:
     moulds = set_of("encapsulating", "moulds.cavities=[2,1]")
     for step in moulds.plan.steps:
-        drawing = written.step_section(moulds, step)
-        assert drawing == written.step_section(moulds, step)
-        for word in ("base", f"cup {step.index}", "tongue 1", "stub 2", f"layer {step.index}"):
+        drawing = procedure_text.step_section(moulds, step)
+        assert drawing == procedure_text.step_section(moulds, step)
+        for word in ("base", f"cup {step.index}", "tongue 1", "filament 2", f"layer {step.index}"):
             assert word in drawing
 
 
@@ -407,7 +407,7 @@ def test_agent_before_the_last_pour_breaks_a_rule(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("name", sorted(templates()))
 def test_words_allow_agent_on_the_last_cups_bore_alone(name: str) -> None:
     casting = procedure(name)
-    text = written.to_markdown(casting)
+    text = procedure_text.to_markdown(casting)
     assert re.findall(r"only on the (bore of cup \d+)", text) == [f"bore of cup {len(casting.pours)}"]
     assert text.count("No release agent: what is cast here") == len(casting.pours) - 1
 
@@ -419,7 +419,7 @@ def test_a_custom_design_of_two_layers_gets_no_agent() -> None:
 
 
 def words(*source: str) -> str:
-    return written.to_markdown(procedure(*source))
+    return procedure_text.to_markdown(procedure(*source))
 
 
 def test_each_layer_but_the_first_lies_between_two_cup_positions() -> None:
@@ -451,7 +451,7 @@ def test_walls_vary_by_what_the_ribs_leave() -> None:
     walls = {figure.name: figure.value for figure in casting.walls}
     assert walls["layer 1 wall, thinnest"] == pytest.approx(1.25 - 0.075 * math.sqrt(2))
     assert walls["layer 2 wall, thickest"] == pytest.approx(1.25 + 0.15 * math.sqrt(2))
-    record = json.loads(written.to_json(casting))
+    record = json.loads(procedure_text.to_json(casting))
     assert record["eccentricity"] == {
         "ribs": 8,
         "as_drawn_mm": 0.0424264069,
@@ -533,7 +533,7 @@ def test_figures_have_three_digits_at_most(source: list[str]) -> None:
     """Neither 1.4e+04 cps nor 0.07323 %; what a name or a source says is not this project's figure."""
     casting = procedure(*source)
     figures = [*casting.walls, *(figure for pour in casting.pours for figure in pour.figures)]
-    text = written.to_markdown(casting)
+    text = procedure_text.to_markdown(casting)
     for name in (casting.label, casting.name, *(f.source for f in figures if "datasheet" in f.source)):
         text = text.replace(name, "")
     text = re.sub(r"\b[\w/-]*[A-Za-z][\w/-]*\b", " ", text)

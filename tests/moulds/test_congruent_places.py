@@ -130,7 +130,7 @@ FAULTS: list[tuple[str, str, Callable[[Shape], Shape]]] = [
     ("C100", "base", lambda shape: cut(shape, [box(15, 16, 0, 1, 1.5, 9)])),
     ("C100", "cup2", lambda shape: union((shape, box(-19, -17, 6.5, 7.2, 1, 2)))),
     ("C300", "cup2", lambda shape: union((shape, box(16, 18, 24.9, 25.1, 1, 2)))),
-    ("C200", "stub5", lambda shape: union((shape, box(0, 1.2, -0.5, 0.5, 0, 1)))),
+    ("C200", "filament5", lambda shape: union((shape, box(0, 1.2, -0.5, 0.5, 0, 1)))),
 ]
 
 
@@ -145,11 +145,11 @@ def test_a_fault_in_one_cell_is_found_there(code: str, tool: str, change: Callab
     assert len(cells) <= 2  # pours of that one cell
 
 
-def test_of_stubs_that_leave_together_the_one_that_is_caught_is_named() -> None:
-    """A piece of the base below the middle stub stops it, and no other."""
+def test_of_filaments_that_leave_together_the_one_that_is_caught_is_named() -> None:
+    """A piece of the base below the middle filament stops it, and no other."""
     faulty = with_fault(set_of(LEADLESS, "moulds.cavities=[3,3]"), "base", lambda base: union((base, BELOW)))
     found = [f for f in draw.findings(faulty) if not f.ok]
-    assert [f.where for f in found] == ["pour 2: stub5 out against base"]
+    assert [f.where for f in found] == ["pour 2: filament5 out against base"]
     radius = faulty.spec.moulds.filament_mm / 2
     # Over the box lie half the elbow's disc and 1 mm of the lying tail.
     assert found[0].value == pytest.approx(math.pi / 2 * radius**2 + 2 * radius, rel=1e-3)

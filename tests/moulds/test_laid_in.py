@@ -10,7 +10,7 @@ import pytest
 from faulty_sets import broken, of_spec, with_fault
 
 from unitcad.casting.procedure import procedure
-from unitcad.casting.written import to_markdown
+from unitcad.casting.procedure_text import to_markdown
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.kernels.mesh import bounds

@@ -11,7 +11,7 @@ from faulty_sets import broken, set_of, with_fault, without
 
 from unitcad.checks import balance, check_moulds, mould_checks
 from unitcad.errors import Refusal
-from unitcad.moulds import dents
+from unitcad.moulds import trapped_air
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, ring, union
@@ -93,7 +93,7 @@ FAULTS: list[Fault] = [
     ("C100", "base", "a pit of 0.3 in the core", less(moved(cylinder(0.15, 1.81, 9), 2.5, 1.5))),
     ("C100", "base", "a scratch under the seat", less(box(4, 20, 3, 3.2, -0.1, 0.5))),
     ("C100", "cup1", "a scratch in the seat", less(box(-20, -4, 3, 3.2, -1, 0.1))),
-    ("C100", "stub", "filament 0.5 low", shifted(z=-0.5)),
+    ("C100", "filament", "filament 0.5 low", shifted(z=-0.5)),
     ("C100", "cup1", "bore too small", more(ring(5.7, 6, 0, 3.36))),
     ("C100", "cup2", "bore too large", less(cylinder(7.05, -1, 9))),
     ("C100", "cup1", "a pinhole through the wall", less(box(-99, 0, -0.2, 0.2, 2.6, 2.8))),
@@ -122,7 +122,7 @@ FAULTS: list[Fault] = [
     ("C300", "cup2", "a hook under the plate", more(box(-25, -12, -1, 1, -7, -6.5), box(-25, -18.5, -1, 1, -7, 0.5))),
     ("C300", "tongue", "a barb inside Layer 1", more(box(4.6, 5.2, -2.2, 2.2, 1.9, 2.2))),
     ("C300", "base", "an arm over the rim", more(box(-16, -14, -1, 1, -2, 6), box(-16, -11, -1, 1, 5, 6))),
-    ("C300", "stub", "a knob in the core", more(cylinder(1.3, 1.2, 1.6))),
+    ("C300", "filament", "a knob in the core", more(cylinder(1.3, 1.2, 1.6))),
     ("C410", "cup1", "a ceiling with a pinhole", more(ring(0.15, 6, 3.2, 3.36))),
     ("C400", "tongue", "a hollow under it", less(box(5.0, 5.5, -1, 1, 0, 2.0))),
     (
@@ -193,7 +193,7 @@ def test_a_unit_that_is_pushed_out_last_holds_nothing() -> None:
 
     def pushed(order: tuple[Removal, ...]) -> tuple[Removal, ...]:
         down = (0, 0, -1)
-        return (order[0], Removal("stub", down), Removal("base", down), Removal(CAST, down))
+        return (order[0], Removal("filament", down), Removal("base", down), Removal(CAST, down))
 
     moulds = reordered(set_of("encapsulating"), 1, pushed)
     assert [finding.where for finding in check_moulds(moulds) if finding.code == "C300" and not finding.ok] == []
@@ -239,7 +239,7 @@ def test_air_under_a_tongue_is_the_formulas() -> None:
     """The widest tail that the ledge leaves: C400 measures what lengths say; on thin walls it is refused."""
     moulds = set_of("encapsulating", "fpcb.tail_width_mm=6.3", "output.tolerance_mm=0.001")
     measured = [f.value for f in check_moulds(moulds) if f.code == "C400"]
-    expected = [dents.under_tongue(moulds.dimensions, moulds.dimensions.exit, layer) for layer in range(2)]
+    expected = [trapped_air.under_tongue(moulds.dimensions, moulds.dimensions.exit, layer) for layer in range(2)]
     assert measured == pytest.approx(expected, rel=0.01)
     with pytest.raises(Refusal) as refused:
         set_of("encapsulating", "fpcb.tail_width_mm=6.3", "layers.0.wall_mm=0.6", "layers.1.wall_mm=1.9")

@@ -133,7 +133,7 @@ def test_a_core_too_small_in_a_design_s_own_tooling_is_found(tmp_path: Path) -> 
         ("tooling=lambda spec, cast: None", "own.py:DESIGN: tooling returns a NoneType, not a Tooling"),
         ("tooling=lambda spec, cast: cast[1]", r"own.py:DESIGN \(line 12\): IndexError"),
         ("advice=lambda spec, dims: 'thin'", "own.py:DESIGN: advice does not return a list of sentences"),
-        ("left_out=lambda spec: ['tongue']", "own.py:DESIGN: left_out does not return a list of pairs of texts"),
+        ("skipped=lambda spec: ['tongue']", "own.py:DESIGN: skipped does not return a list of pairs of texts"),
         ("assembly=lambda spec, dims: [1 / 0]", r"own.py:DESIGN \(line 12\): ZeroDivisionError"),
         ("limits=lambda spec, dims: spec.nothing", r"own.py:DESIGN \(line 12\): AttributeError"),
     ],

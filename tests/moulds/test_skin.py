@@ -10,7 +10,7 @@ from casting_rules import broken_rules
 from faulty_sets import mesh_findings, set_of, with_fault
 
 from unitcad.casting.procedure import procedure
-from unitcad.casting.steps import in_short
+from unitcad.casting.steps import casting_summary
 from unitcad.casting.views import picture_path, views
 from unitcad.checks import check_moulds, overlap
 from unitcad.checks.balance import findings as balance
@@ -54,7 +54,7 @@ def test_the_procedure_ends_with_the_skin(source):
     made = procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
     assert broken_rules(made) == []
     assert (made.later_mixes, made.last) == (1, "Motor in and skin on")
-    assert "; motor in and skin on, with 1 more mix, " in [*in_short(msgspec.to_builtins(made))][2]
+    assert "; motor in and skin on, with 1 more mix, " in [*casting_summary(msgspec.to_builtins(made))][2]
     on, cure = made.assembly[-2:]
     assert (on.title, cure.title) == ("Skin on", "Let the skin cure")
     assert on.picture == picture_path("skin-on")

@@ -76,7 +76,11 @@ FAULTS: dict[str, tuple[str, str, Callable[[Shape], Shape]]] = {
     "a hole between four cells": ("C230", "cup2", lambda s: cut(s, [hole(9.5, 5.5)])),
     "a hole at the edge": ("C230", "cup2", lambda s: cut(s, [hole(-28.5, 0)])),
     "a hole at the corner": ("C230", "cup1", lambda s: cut(s, [hole(25.5, 25.5)])),
-    "a stub too thick in a corner": ("C200", "stub1", lambda s: union((s, box(-19, -17.8, -19.5, -18.5, 0, 1)))),
+    "a filament too thick in a corner": (
+        "C200",
+        "filament1",
+        lambda s: union((s, box(-19, -17.8, -19.5, -18.5, 0, 1))),
+    ),
 }
 
 

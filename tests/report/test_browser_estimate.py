@@ -129,8 +129,8 @@ def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit, estimate):
 
 def test_the_inputs_that_a_model_sees(visit, estimate):
     head, *rows = cells(visit, "Inputs that a model sees")
-    blocks = [estimate["models"][name]["inputs_seen"] for name in ("rule", "divider", "published")]
-    blocks += estimate["fem"]["inputs_seen"]
+    blocks = [estimate["models"][name]["sensitivities"] for name in ("rule", "divider", "published")]
+    blocks += estimate["fem"]["sensitivities"]
     assert len(head) == 1 + len(blocks)
     largest = []
     for name, *shown_cells in rows:

@@ -158,8 +158,8 @@ def test_every_control_is_reached_and_worked_by_keys(visit):
     assert changed(turned, canvas(visit)) > 0.01
     visit.page.locator('input[name="step"]').focus()
     visit.page.keyboard.press("ArrowRight")
-    assert shown(visit) == ["base", "stub"]
-    visit.page.locator('input[name="part-stub"]').focus()
+    assert shown(visit) == ["base", "filament"]
+    visit.page.locator('input[name="part-filament"]').focus()
     visit.page.keyboard.press("Space")
     assert shown(visit) == ["base"]
     visit.page.locator('input[value="moulds"]').focus()

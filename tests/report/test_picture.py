@@ -87,17 +87,17 @@ def test_every_picture_of_the_encapsulating_unit():
 def test_moments_of_casting():
     parts = {moment.title: moment.parts for moment in moments(Variant.of("encapsulating"))}
     assert list(parts.values()) == [
-        ("base", "stub"),
-        ("base", "stub", "cup1"),
-        ("base", "stub", "cup1", "tongue"),
-        ("base", "stub", "layer1", "cup1", "tongue"),
-        ("base", "stub", "layer1", "cup1"),
-        ("base", "stub", "layer1"),
-        ("base", "stub", "layer1", "cup2"),
-        ("base", "stub", "layer1", "cup2", "tongue"),
-        ("base", "stub", "layer1", "layer2", "cup2", "tongue"),
-        ("base", "stub", "layer1", "layer2", "cup2"),
-        ("base", "stub", "layer1", "layer2"),
+        ("base", "filament"),
+        ("base", "filament", "cup1"),
+        ("base", "filament", "cup1", "tongue"),
+        ("base", "filament", "layer1", "cup1", "tongue"),
+        ("base", "filament", "layer1", "cup1"),
+        ("base", "filament", "layer1"),
+        ("base", "filament", "layer1", "cup2"),
+        ("base", "filament", "layer1", "cup2", "tongue"),
+        ("base", "filament", "layer1", "layer2", "cup2", "tongue"),
+        ("base", "filament", "layer1", "layer2", "cup2"),
+        ("base", "filament", "layer1", "layer2"),
         ("layer1", "layer2", "motor", "fpcb"),
     ]
 

@@ -18,7 +18,7 @@ from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.receivers import unit_mass
 from unitcad.casting.procedure import procedure
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search import design_files, explanation, proposals
 from unitcad.search.candidates import Candidates, candidates, grid, sequences_of, spec_data

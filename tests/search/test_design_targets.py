@@ -12,7 +12,7 @@ import pytest
 
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.search.candidates import candidates
 from unitcad.search.proposals import leads_block
 from unitcad.search.target_file import load_target, target_of

@@ -12,7 +12,7 @@ import pytest
 
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.errors import Refusal, UnknownKey
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.search.design_files import contents, ranking
 from unitcad.search.design_text import explanation_lines, head_lines, lines, title
 from unitcad.search.explanation import explain

@@ -9,7 +9,7 @@ import pytest
 from running import serving
 
 from unitcad.checks import check_moulds
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
 from unitcad.serve.messages import Field

@@ -9,7 +9,7 @@ from batching import bytes_of, unitcad
 
 from unitcad.attenuation.edge.estimate_summary import summary
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.sweeps import BatchOptions, estimate_table
 from unitcad.sweeps.sweep import from_file
 

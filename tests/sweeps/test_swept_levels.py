@@ -9,7 +9,7 @@ import pytest
 from tests.attenuation.test_moduli_source import left_out
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.edge.models import MODELS
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.spec import Spec
 from unitcad.sweeps.estimate_table import evaluate
 from unitcad.sweeps.insensitive_keys import swept_estimate

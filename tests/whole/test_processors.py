@@ -18,7 +18,7 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from unitcad.cli import app
-from unitcad.estimating import estimate_spec
+from unitcad.estimate_inputs import estimate_spec
 from unitcad.validation import load, templates
 
 lab = Path(sys.argv[1])

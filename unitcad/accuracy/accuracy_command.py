@@ -19,7 +19,7 @@ from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson, Sets
 from unitcad.designs import design_of
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.pipeline.subjects import load_subject
 
 _MEDIA, _SPECS = 20, 20

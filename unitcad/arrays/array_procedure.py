@@ -42,7 +42,7 @@ from unitcad.casting.pouring import release as flat_release
 from unitcad.casting.pouring import shown as grams_shown
 from unitcad.casting.preparation import Printing, cleaning, fall, joining, level, printing
 from unitcad.casting.procedure import Procedure, pour_of, procedure, times
-from unitcad.casting.steps import NEEDS, BenchStep, Phase, duration, phases
+from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep, Phase, duration, phases
 from unitcad.casting.views import picture_path, views
 from unitcad.catalogue import Material
 from unitcad.meshcheck.findings import counted
@@ -173,7 +173,7 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         "Trim the flash with small scissors.",
         picture_path("flat-peel"),
         minutes=PEEL_MIN * units,
-        needs=("small scissors", "blunt spatula", "paper"),
+        required_tools=("small scissors", "blunt spatula", "paper"),
     )
     yield BenchStep(
         f"Filament into {base}",
@@ -183,7 +183,7 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         "knife.",
         _picture(step, "filament"),
         minutes=3.0 * units,
-        needs=("sharp knife",),
+        required_tools=("sharp knife",),
     )
     yield BenchStep(
         f"Level {base}",
@@ -192,14 +192,14 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         f"much. Lift {lid} off; leave {base} there until it is cured.",
         _picture(step, "level"),
         minutes=5.0,
-        needs=("level", "paper"),
+        required_tools=("level", "paper"),
     )
     yield BenchStep(
         f"Wipe {cast}",
         f"Wipe {cast} with isopropanol and let it dry. Its outside is the bond face: no release agent on it, ever, no "
         "grease, no fingers.",
         minutes=2.0 * units,
-        needs=("isopropanol and lint-free wipes",),
+        required_tools=("isopropanol and lint-free wipes",),
     )
     yield BenchStep(
         f"Lay {cast} in",
@@ -235,7 +235,7 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
         "open.",
         _picture(step, "lid-on"),
         minutes=LIFT_MIN,
-        needs=("petroleum jelly",),
+        required_tools=("petroleum jelly",),
     )
     yield lid_held(step, _picture(step, "lid-held"))
 
@@ -248,7 +248,7 @@ def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
         "tear off at the sheet. Trim them flush with a knife.",
         _picture(step, "lid-off"),
         minutes=LIFT_MIN,
-        needs=("sharp knife",),
+        required_tools=("sharp knife",),
     )
 
 
@@ -261,7 +261,7 @@ def _out_of_curved(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
         f"pull it out along itself: {never_pushed(moulds.spec, inner)}",
         picture_path("filament-out"),
         minutes=PULL_MIN * units,
-        needs=("narrow pliers",),
+        required_tools=("narrow pliers",),
     )
     yield BenchStep(
         "Peel off",
@@ -270,7 +270,7 @@ def _out_of_curved(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
         "picture shows the way of each part; the sheet stays in one piece. Trim the flash with small scissors.",
         picture_path("peel"),
         minutes=PEEL_MIN * units,
-        needs=("small scissors", "blunt spatula"),
+        required_tools=("small scissors", "blunt spatula"),
     )
 
 
@@ -299,10 +299,10 @@ def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchSt
     """Yield the bill of the whole set, its filaments told apart: bent ones, and straight ones."""
     places = len(moulds.arranged.places)
     for item in bill(moulds, batches, steps, after_pours(moulds, [batch.silicone for batch in batches])):
-        if item.item == "filament stub":
+        if item.item == "filament":
             size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
             yield replace(item, quantity=item.quantity - places)
-            yield Item("filament stub, straight", places, "piece", "cut", f"{size}: {_lengths(moulds)} mm long")
+            yield Item("filament, straight", places, "piece", "cut", f"{size}: {_lengths(moulds)} mm long")
         elif item.item == "adhesive tape":
             # The last pour is held by bands.
             yield replace(item, quantity=item.quantity * (1 - 1 / len(moulds.plan.steps)))
@@ -310,7 +310,7 @@ def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchSt
             yield item
 
 
-ONCE = frozenset(NEEDS)
+ONCE = frozenset(REQUIRED_TOOLS)
 """Things of which one piece, dab or roll is enough for every casting."""
 
 
@@ -558,7 +558,7 @@ def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
         "the pockets and strap slots with small scissors.",
         picture_path("peel"),
         minutes=PEEL_MIN * 2,
-        needs=("small scissors", "blunt spatula"),
+        required_tools=("small scissors", "blunt spatula"),
     )
 
 
@@ -572,7 +572,7 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
             "connector's length, and try the motor again. They leave between sheet and skin. Longer tails need none "
             f"if the way is free. {longer_tails(covered)}",
             minutes=SOLDER_MIN * len(covered),
-            needs=("soldering iron and solder",),
+            required_tools=("soldering iron and solder",),
         )
     strains = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units}
     stretch = listed(f"{number(100 * one, 2)} % round {number(size, 3)} mm" for size, one in sorted(strains.items()))

@@ -48,10 +48,10 @@ from unitcad.cache import Store, digest
 from unitcad.casting.pictures import pictures as bench_pictures
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.procedure import procedure as unit_procedure
+from unitcad.casting.procedure_text import files as written
+from unitcad.casting.procedure_text import step_section
 from unitcad.casting.steps import pour_warnings
 from unitcad.casting.views import picture_path, views
-from unitcad.casting.written import files as written
-from unitcad.casting.written import step_section
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
 from unitcad.errors import Refusal

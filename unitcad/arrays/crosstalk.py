@@ -18,7 +18,7 @@ from unitcad.attenuation.crosstalk import RANGE, Reading, contact, decay, ends
 from unitcad.attenuation.inputs import Drive, EstimateInput, body
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.text import listed, number, some
 
 BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)

@@ -17,7 +17,7 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.construction import construction_of
 from unitcad.arrays.crosstalk import BAND_HZ, crosstalk, crosstalk_lines, ratio_line, ratios
 from unitcad.arrays.crosstalk_maps import CROSSTALK
-from unitcad.casting.steps import in_short
+from unitcad.casting.steps import casting_summary
 from unitcad.cli.build_summary import to_open
 from unitcad.cli.output import console, print_json, progress
 from unitcad.errors import Refusal
@@ -42,7 +42,7 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         yield f"measure first; assumed: {lengths}; build with yours: --set unit.{next(iter(assumed))}=MM"
     if manifest["casting"]:
         told = {f"warning: {line}" for line in manifest["warnings"]}
-        lines = in_short(json.loads((folder / "casting.json").read_bytes()))
+        lines = casting_summary(json.loads((folder / "casting.json").read_bytes()))
         yield from (line for line in lines if line not in told)
         yield from _more_cavities(array)
     if checks := manifest["mould_checks"]:

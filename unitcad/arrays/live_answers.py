@@ -21,7 +21,7 @@ from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.procedure import Procedure
-from unitcad.casting.steps import in_short
+from unitcad.casting.steps import casting_summary
 from unitcad.catalogue import materials
 from unitcad.checks import check_moulds, check_unit
 from unitcad.errors import Refusal
@@ -168,7 +168,7 @@ def _tools(array: Array, answer: Answer) -> None:
     of_units = {name: _cast(to_json(unit)) for name, unit in apart.items()}
     made = array_procedure(moulds, volumes, 0.0, of_units)
     tools = ", ".join(tool.name for tool in moulds.plan.tools)
-    answer.lines = [*in_short(asdict(made)), f"Tools of the sheet: {tools}"]
+    answer.lines = [*casting_summary(asdict(made)), f"Tools of the sheet: {tools}"]
 
 
 @lru_cache(maxsize=8)

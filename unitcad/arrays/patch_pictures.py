@@ -133,7 +133,7 @@ def laid_elsewhere(plan: Plan, step: Step) -> bool:
 def _of_pour(moulds: PatchMoulds, step: Step) -> Iterator[tuple[Body, ...]]:
     """Yield the parts of one pour, from below: base and filaments, inserted layers, cup, silicone, lid."""
     plan, colours = moulds.plan, {body.step: body for body in moulds.unit}
-    own = (*plan.standing(step, "base"), *plan.standing(step, "stub"))
+    own = (*plan.standing(step, "base"), *plan.standing(step, "filament"))
     yield tuple(tool for tool in own if tool.step == step.index)
     before = plan.steps[step.index - 2] if step.index > 1 else None
     if before and laid_elsewhere(plan, before):

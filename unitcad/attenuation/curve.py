@@ -11,7 +11,7 @@ from scipy import special
 
 from unitcad.attenuation.crosstalk import contact
 from unitcad.attenuation.edge import closed_form as cf
-from unitcad.attenuation.edge.inputs_seen import inputs_seen
+from unitcad.attenuation.edge.sensitivities import sensitivities
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
 from unitcad.attenuation.layered.loads import Direction, UniformDisc
 from unitcad.attenuation.layered.response import Response, responses
@@ -55,7 +55,7 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
 
     `drives`: the motor's own first, each over |u| at the edge under the same force. `flat_over_axial_per_newton`: |u|
     by one newton that turns, over |u| by one newton of axial amplitude. `u_z`, `u_r`, `depths` and
-    `surface_m_per_pa` are the axial pressure's, over |u_z| at the edge. `inputs_seen`: of the decay to `EDGE_TO_MM`
+    `surface_m_per_pa` are the axial pressure's, over |u_z| at the edge. `sensitivities`: of the decay to `EDGE_TO_MM`
     under the motor's drive. The spread takes each kind of input (moduli,
     damping, thicknesses, frequency) by itself to its low and high end; that of |u| has `crosstalk.CONTACT` in it.
     """
@@ -93,16 +93,16 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
         "surface_m_per_pa": {"u_z_at_the_edge": float(edge)},
         "error_estimate": rounded_error(axial.error / edge),
         "wavenumbers": axial.wavenumbers,
-        "inputs_seen": _inputs_seen(variant),
+        "sensitivities": _sensitivities(variant),
         "hierarchical_over_control": None,
         "hierarchical_over_control_reason": NO_RATIO,
         "assumptions": ASSUMPTIONS,
     }
 
 
-def _inputs_seen(variant: EstimateInput) -> dict[str, Any]:
+def _sensitivities(variant: EstimateInput) -> dict[str, Any]:
     """Return d ln (|u| at `EDGE_TO_MM` over |u| at the edge) / d ln input under the motor's drive."""
-    seen = inputs_seen(variant, _decays, _SLOPE_STEP)
+    seen = sensitivities(variant, _decays, _SLOPE_STEP)
     return {
         "of": f"|u| of the skin {EDGE_TO_MM} mm from the unit's edge over |u| at the edge",
         "drive": variant.drive,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from unitcad.casting.drawings import side_places, tape_places, tongue_prop
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch
-from unitcad.casting.steps import NEEDS, BenchStep
+from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep
 from unitcad.export.threemf import layout
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
@@ -63,7 +63,7 @@ def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
     )
 
 
-_COUNTED = "flexible circuit", "filament stub", "pad", "wire", "lead wire", "syringe", "own motor"
+_COUNTED = "flexible circuit", "filament", "pad", "wire", "lead wire", "syringe", "own motor"
 
 
 def plural(item: str) -> str:
@@ -93,13 +93,13 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
     lengths, plan = moulds.spec.moulds, moulds.plan
     dims, kinds = plan.dimensions, dict[str, list[Body]]()
     for tool in plan.pieces:
-        # Tongues and stubs are numbered by cell and otherwise alike; cups and lids are not.
-        kinds.setdefault(tool.kind if tool.kind in ("tongue", "stub") else tool.name, []).append(tool)
+        # Tongues and filaments are numbered by cell and otherwise alike; cups and lids are not.
+        kinds.setdefault(tool.kind if tool.kind in ("tongue", "filament") else tool.name, []).append(tool)
     for name, (tool, *more) in kinds.items():
         count, made, item = 1 + len(more), "cut", name
-        if tool.kind == "stub":
+        if tool.kind == "filament":
             length = f"{dims.core_height - moulds.plate[0] + plan.layout.plate[1] + 10:.0f} mm each"
-            item = "filament stub"
+            item = "filament"
             note = f"{number(lengths.filament_mm, 3)} mm printer filament, {length}"
         elif tool.kind == "blade" and tool.made == "cut":
             made = "tool"
@@ -156,8 +156,9 @@ def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchSt
     if cups:
         note = f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide"
         yield Item("flat screwdrivers", 2, "piece", "tool", note)
-    for need in sorted({"caliper", *(need for step in steps for need in step.needs)}, key=[*NEEDS].index):
-        yield Item(need, 1, *NEEDS[need])
+    named = {"caliper", *(tool for step in steps for tool in step.required_tools)}
+    for tool in sorted(named, key=[*REQUIRED_TOOLS].index):
+        yield Item(tool, 1, *REQUIRED_TOOLS[tool])
     if prop := tongue_prop(moulds):
         note = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm, {number(prop.thickness_mm, 3)} mm thick"
         yield Item("pad of stacked card", len(prop.pads), "piece", "cut", note)

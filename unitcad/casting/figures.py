@@ -471,7 +471,7 @@ def off_grid(moulds: MouldSet) -> list[OffGrid]:
         ("base", "seat", -bottom),
         ("base", "pry slots' floor", pry_floor(spec) - plate_bottom(spec)),
     ]
-    if plan.of_kind("stub"):
+    if plan.of_kind("filament"):
         edges.append(("base", "filament groove's roof", filament_groove(spec)))
     if exit:
         edges += [("base", "ledge", exit.low - bottom), ("tongue", "thickness", exit.height)]

@@ -119,7 +119,7 @@ def _laid_out(
             off = np.hypot(points[:, 0] - x, points[:, 1] - 0.9 * low[1] - 0.1 * high[1]).round(1)
             at = points[np.lexsort((-points[:, 2], off))[0]]
         filament = "straight filament" if tool.step else "filament"
-        called = {"tongue": "tongue", "stub": filament}.get(tool.kind, plan.called(name))
+        called = {"tongue": "tongue", "filament": filament}.get(tool.kind, plan.called(name))
         found.setdefault(called, []).append((float(at[0]), float(at[1]), float(at[2])))
     names = (Name(f"{len(at)} {name}s" if len(at) > 1 else name, at[0]) for name, at in found.items())
     return laid, (*numbers, *names)

@@ -112,7 +112,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             "agent on it, ever, no grease, no fingers.",
             picture("bond-face"),
             minutes=2.0 * cells,
-            needs=("isopropanol and lint-free wipes",),
+            required_tools=("isopropanol and lint-free wipes",),
         )
     laid = assembly(moulds) if moulds.design.laid_in == n else ()
     dry = True
@@ -122,14 +122,14 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             dry = False
         title = f"Lay in, {i + 1} of {len(laid)}" if len(laid) > 1 else "Lay in"
         shown = "" if i else picture("laid-in")
-        yield BenchStep(title, fitting.text, shown, minutes=LAY_IN_MIN * cells, needs=fitting.needs)
+        yield BenchStep(title, fitting.text, shown, minutes=LAY_IN_MIN * cells, required_tools=fitting.required_tools)
     if any(body.kind in ("circuit", "wire") for body in step.inserts):
         yield BenchStep(
             "Grease the lead",
             f"Coat the {lead(moulds)} thinly with petroleum jelly where the slot of cup {n} comes, outside the cavity "
             "only: silicone then can't weep out.",
             minutes=1.0 * cells,
-            needs=("petroleum jelly",),
+            required_tools=("petroleum jelly",),
         )
     if flanks := moulds.greased(step):
         yield BenchStep(
@@ -138,7 +138,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             "silicone out of the slits beside the cup's slots. Wipe it off everywhere else.",
             picture("grease"),
             minutes=1.0 * cells,
-            needs=("petroleum jelly",),
+            required_tools=("petroleum jelly",),
         )
     # The faces that get release agent, and why no other does.
     faces, agent = agent_faces(moulds, step), "No release agent: what is cast here bonds later."
@@ -168,7 +168,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         f"{agent} Put cup {n} {on}",
         picture("cup-on"),
         minutes=2.0,
-        needs=("release agent",) if faces else (),
+        required_tools=("release agent",) if faces else (),
     )
     if tongues:
         seat = number(window_length(moulds, step), 2)
@@ -178,7 +178,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             "length on all sides with petroleum jelly: a film that shines, no beads.",
             picture("tongue-in"),
             minutes=1.5 * cells,
-            needs=("petroleum jelly",),
+            required_tools=("petroleum jelly",),
         )
         yield _tongue_home(moulds, n, the_tongue, picture("tongue-home"))
     if step.lid:
@@ -189,7 +189,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             "on, cut corner over cut corner, and press it down.",
             picture("lid-on"),
             minutes=LIFT_MIN,
-            needs=("petroleum jelly",),
+            required_tools=("petroleum jelly",),
         )
         yield lid_held(step, picture("lid-held"))
     else:
@@ -245,7 +245,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             "Trim them flush with a knife.",
             picture("lid-off"),
             minutes=LIFT_MIN,
-            needs=("sharp knife", "blunt spatula"),
+            required_tools=("sharp knife", "blunt spatula"),
         )
     if all(removal.piece != step.cup for removal in step.removals):
         return
@@ -267,7 +267,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         f"{recovery(moulds, n)}",
         picture("cup-off"),
         minutes=LIFT_MIN,
-        needs=("blunt spatula",) if split else (),
+        required_tools=("blunt spatula",) if split else (),
     )
 
 
@@ -301,7 +301,7 @@ def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
         f"{pieces} {LEVEL_AGAIN}",
         picture,
         minutes=2.0,
-        needs=("paper",),
+        required_tools=("paper",),
     )
 
 
@@ -312,7 +312,7 @@ def lid_held(step: Step, picture: str) -> BenchStep:
         f"Put rubber bands round lid and base, or a clamp, clear of sprue and vents. {LEVEL_AGAIN}",
         picture,
         minutes=2.0,
-        needs=("paper",),
+        required_tools=("paper",),
     )
 
 
@@ -340,7 +340,7 @@ def _tongue_home(moulds: MouldSet, pour: int, the_tongue: str, picture: str) -> 
         f"{stops} Wipe grease out of the bore with a cotton bud.{bears}",
         picture,
         minutes=1.5 * len(moulds.plan.layout.cells),
-        needs=("pen", "cotton buds") if marked else ("cotton buds",),
+        required_tools=("pen", "cotton buds") if marked else ("cotton buds",),
     )
 
 
@@ -406,18 +406,18 @@ def struck(
     cells: int,
     coats: int,
     picture: Callable[[str], str],
-    needs: tuple[str, ...] = (),
+    required_tools: tuple[str, ...] = (),
 ) -> Iterator[BenchStep]:
     """Say how an open mould is filled and struck off, in its words; `coats`: cavities that are brushed at first."""
     rest = batch.rest_min
     if not batch.vacuum and not rest:
         minutes = 1.0 * coats
-        yield BenchStep("Brush a first coat", batch.verdict, minutes=minutes, needs=("small brush",))
+        yield BenchStep("Brush a first coat", batch.verdict, minutes=minutes, required_tools=("small brush",))
     minutes = pouring_min(cells) - STRIKE_MIN
-    yield BenchStep("Pour", poured, picture("pour"), kind="pour", minutes=minutes, needs=("pin",))
+    yield BenchStep("Pour", poured, picture("pour"), kind="pour", minutes=minutes, required_tools=("pin",))
     if not batch.vacuum and rest:
         yield BenchStep("Let bubbles rise", batch.verdict, kind="rest", wait_min=rest)
-    yield BenchStep("Strike off", strike, picture("strike"), minutes=STRIKE_MIN, needs=needs)
+    yield BenchStep("Strike off", strike, picture("strike"), minutes=STRIKE_MIN, required_tools=required_tools)
     yield BenchStep(
         "Wait, strike again",
         f"Wipe the blade. After {number(STRIKE_AGAIN_MIN, 3)} min top up and strike again.{film}",
@@ -449,7 +449,7 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
     """Describe the way from the last cured layer to a unit in the hand; `first` is Layer 1's silicone."""
     plan, cells, last = moulds.plan, len(moulds.plan.layout.cells), moulds.plan.steps[-1]
     cup, removed = spaced(last.cup), {removal.piece for removal in last.removals}
-    if plan.of_kind("stub"):
+    if plan.of_kind("filament"):
         each = "the" if cells == 1 else "each"
         yield BenchStep(
             "Filament out",
@@ -483,7 +483,7 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
             f"stays in {cup}.",
             picture_path("base-off"),
             minutes=LIFT_MIN * 2,
-            needs=("blunt spatula",) if split else (),
+            required_tools=("blunt spatula",) if split else (),
         )
     film = " and the blade's film" if moulds.spec.moulds.pour == "open" else ""
     title, what, out, path = (
@@ -500,7 +500,7 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
         f"Loosen the {what} all round with a blunt spatula{out}. Trim flash{film} with small scissors.",
         picture_path(path),
         minutes=PEEL_MIN * cells,
-        needs=("small scissors", "blunt spatula"),
+        required_tools=("small scissors", "blunt spatula"),
     )
 
 
@@ -516,14 +516,14 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         title = f"Motor in, {i + 1} of {len(fittings)}" if len(fittings) > 1 else "Motor in"
         path = picture_path("motor-home" if i or fed_through(moulds) else "motor-in")
         minutes = LAY_IN_MIN * len(moulds.plan.layout.cells)
-        yield BenchStep(title, fitting.text, path, minutes=minutes, needs=fitting.needs)
+        yield BenchStep(title, fitting.text, path, minutes=minutes, required_tools=fitting.required_tools)
     mouth, motor = ("cavity's mouth", "motor") if moulds.makes == "unit" else ("cavities' mouths", "motors")
     ring = next((fitting for fitting in fittings if fitting.mixed), None)
     if ring:
         (silicone,) = _by_layer(silicones, [ring.silicone])
         hours = at_room(float(silicone.cure_h), casting.room_c)
         what, said = ring.mixed, f"{silicone.name} cures {number(hours, 2)} h."
-    elif any(ADHESIVE in fitting.needs for fitting in fittings):
+    elif any(ADHESIVE in fitting.required_tools for fitting in fittings):
         what, hours = "adhesive", ADHESIVE_CURE_H
         said = f"{number(hours, 2)} h, or as its tube says."
     else:
@@ -551,7 +551,7 @@ def skin_on(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchSt
         f"Level the skin tray, fill it and draw {blade} along its rim. Prick bubbles with a pin.",
         picture_path("skin-on"),
         minutes=pouring_min(cells),
-        needs=("level", "pin"),
+        required_tools=("level", "pin"),
     )
     yield BenchStep(
         "Skin on",
@@ -568,7 +568,7 @@ def skin_on(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchSt
         kind="cure",
         minutes=PEEL_MIN * cells,
         wait_min=60 * hours,
-        needs=("small scissors", "blunt spatula"),
+        required_tools=("small scissors", "blunt spatula"),
     )
 
 

@@ -21,12 +21,12 @@ from unitcad.casting.views import level_on, picture_path
 from unitcad.catalogue import Material
 from unitcad.designs.rib_leaves import leaf_mm
 from unitcad.moulds.cup import window_section
-from unitcad.moulds.dents import DENT, TILT_DEG
 from unitcad.moulds.dovetails import Split
 from unitcad.moulds.layout import BLADE_HEIGHT
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.ribs import ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
+from unitcad.moulds.trapped_air import DENT, TILT_DEG
 from unitcad.shape.lettering import seen
 from unitcad.spec import MOTOR_SIZES, assumed_lengths, printer_of
 from unitcad.text import listed, number, spaced
@@ -151,7 +151,7 @@ def sizes(moulds: MouldSet) -> tuple[Size, ...]:
         lengths["fpcb.thickness_mm"] = spec.fpcb.thickness_mm
     if spec.wires:
         lengths["wires.diameter_mm"] = spec.wires.diameter_mm
-    if moulds.plan.of_kind("stub"):
+    if moulds.plan.of_kind("filament"):
         lengths["moulds.filament_mm"] = spec.moulds.filament_mm
     words = {"fpcb": "circuit", "moulds": "filament", "wires": "wire"}
     found = []
@@ -191,11 +191,11 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
             f"{number(GRIP_LENGTH, 2)} mm of the other end: this tab is what you pull by, with fingers or flat pliers.",
             picture_path("cut-tongue"),
             minutes=5.0 * len(cut),
-            needs=("flat pliers",),
+            required_tools=("flat pliers",),
         )
     yield from cleaning(moulds, silicones)
     yield from joining(moulds)
-    needs = ("paper",)
+    required_tools = ("paper",)
     fits = "Put each cup on the plinth once, dry; its cut corner lets it on one way only."
     standing, leaf = ribs(spec, plan.layout), leaf_mm(printer_of(spec))
     if plan.pins:
@@ -215,15 +215,17 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
             "Press each cup onto the plinth once, dry, cut corner over cut corner, by hand or in a vice between two "
             f"boards: its {len(standing)} ribs are crushed and centre it from then on."
         )
-        needs = ("paper", "vice and two boards")
+        required_tools = ("paper", "vice and two boards")
     if not plan.pins:
         fits += (
             f" It sits if paper folded to {number(lengths.seat_relief_mm, 3)} mm goes under it on all four sides. If "
             "it rocks, scrape plinth and seat clean."
         )
         fits += " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
-    yield BenchStep("Try every cup, dry", fits, picture_path("dry-fit"), minutes=5.0 * cups, needs=needs)
-    if plan.of_kind("stub"):
+    yield BenchStep(
+        "Try every cup, dry", fits, picture_path("dry-fit"), minutes=5.0 * cups, required_tools=required_tools
+    )
+    if plan.of_kind("filament"):
         several_rows = len({cell.y for cell in plan.layout.cells}) > 1
         between = " If its groove ends under the plate, cut the bent end to length." if several_rows else ""
         yield BenchStep(
@@ -234,7 +236,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
             "knife.",
             picture_path("filament"),
             minutes=3.0 * cells,
-            needs=("sharp knife",),
+            required_tools=("sharp knife",),
         )
     cup = spaced(level_on(moulds).cup)
     enough = fall(moulds)
@@ -248,7 +250,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
 
 def level(text: str) -> BenchStep:
     """Say how level the mould must be, and how to see it."""
-    return BenchStep("Level the bench", text, picture_path("level"), minutes=5.0, needs=("level", "paper"))
+    return BenchStep("Level the bench", text, picture_path("level"), minutes=5.0, required_tools=("level", "paper"))
 
 
 def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
@@ -258,7 +260,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
             "Clean",
             "Brush off strings and loose bits. Run a fingernail round every bore and rim: cut off what catches.",
             minutes=10.0,
-            needs=("hand brush", "sharp knife"),
+            required_tools=("hand brush", "sharp knife"),
         )
         return
     yield BenchStep(
@@ -268,7 +270,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         kind="rest",
         minutes=15.0,
         wait_min=30.0,
-        needs=("isopropanol and lint-free wipes",),
+        required_tools=("isopropanol and lint-free wipes",),
     )
     exit = moulds.plan.dimensions.exit
     if exit and tunnels(moulds):
@@ -284,7 +286,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
             "syringe of isopropanol, and push a strip of the tongue's film through until it slides freely.",
             picture_path("clear-windows"),
             minutes=5.0 * len(steps),
-            needs=("isopropanol and lint-free wipes", "rinsing syringe"),
+            required_tools=("isopropanol and lint-free wipes", "rinsing syringe"),
         )
     yield BenchStep(
         "Post-cure, bake",
@@ -293,7 +295,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         kind="cure",
         minutes=10.0,
         wait_min=60 * BAKE_H,
-        needs=("oven", "curing lamp"),
+        required_tools=("oven", "curing lamp"),
     )
     drops = {each.name: at_room(float(each.cure_h), moulds.spec.casting.room_c) for each in silicones}
     yield BenchStep(
@@ -304,7 +306,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         kind="cure",
         minutes=WEIGH_MIN + MIXING_MIN,
         wait_min=60 * max(drops.values()),
-        needs=("acrylic varnish",),
+        required_tools=("acrylic varnish",),
     )
 
 
@@ -345,7 +347,7 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
     if any(map(inner, plan.splits)):
         numbered += "; a piece without an outer edge has none"
     rows = ", one row after the other" * grid
-    around = ", cut out round the filaments' grooves" * bool(grid and plan.of_kind("stub"))
+    around = ", cut out round the filaments' grooves" * bool(grid and plan.of_kind("filament"))
     text = (
         f"Printed in pieces: {parts}, {numbered}. Cut off the first layer's bulge along the dovetails. Lay a piece "
         f"flat and push the next one straight down onto it, dovetail into dovetail{rows}, until a fingernail feels no "
@@ -378,7 +380,7 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
         f"{text}. Silicone in a seam cures to a fin {play} mm thick: pull it off with the flash.",
         picture_path("join"),
         minutes=3.0 * sum(len(split.pieces) - 1 for split in plan.splits),
-        needs=("wide adhesive tape", *["petroleum jelly"] * bool(upper)),
+        required_tools=("wide adhesive tape", *["petroleum jelly"] * bool(upper)),
     )
 
 

@@ -1,4 +1,4 @@
-"""The casting procedure as data: the steps in order, with every figure's source; `written` writes it."""
+"""The casting procedure as data: the steps in order, with every figure's source; `procedure_text` writes it."""
 
 from __future__ import annotations
 

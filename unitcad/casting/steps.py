@@ -1,4 +1,4 @@
-"""One step of a procedure: instruction, picture, needs, time; and steps added up."""
+"""One step of a procedure: instruction, picture, required tools, time; and steps added up."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ class BenchStep:
     kind      addition of the bench page: fields for grams, the pot life's or the cure's timer
     minutes   a person's time at the bench
     wait_min  waiting time before the next step
-    needs     tools and consumables, by their names in `NEEDS`
+    required_tools
+              tools and consumables, by their names in `REQUIRED_TOOLS`
     short     the text if an earlier pour had the step too: its number and the differences; filled in by `shortened`
     """
 
@@ -31,7 +32,7 @@ class BenchStep:
     kind: Literal["", "weigh", "mix", "pour", "rest", "cure"] = ""
     minutes: float = 0.0
     wait_min: float = 0.0
-    needs: tuple[str, ...] = ()
+    required_tools: tuple[str, ...] = ()
     short: str = ""
 
 
@@ -60,7 +61,7 @@ def shortened(steps: Iterable[BenchStep]) -> list[BenchStep]:
     return found
 
 
-NEEDS = {
+REQUIRED_TOOLS = {
     "sharp knife": ("piece", "tool", ""),
     "small scissors": ("piece", "tool", ""),
     "pin": ("piece", "tool", ""),
@@ -129,7 +130,7 @@ def duration(minutes: float) -> str:
     return f"{hours} h {rest} min" if hours and rest else f"{hours} h" if hours else f"{rest} min"
 
 
-def in_short(procedure: Mapping[str, Any]) -> Iterator[str]:
+def casting_summary(procedure: Mapping[str, Any]) -> Iterator[str]:
     """Yield a line each: pours and times, the mixes, and warnings about a pour.
 
     `procedure` is a `Procedure` as plain data, as casting.json has it.

@@ -10,7 +10,7 @@ from unitcad.moulds.mould_set import MouldSet
 
 TROUBLES = "troubleshooting.md"
 """The file of a result that has them."""
-_Part = Literal["cup", "tongue", "stub", "slot", "motor"]
+_Part = Literal["cup", "tongue", "filament", "slot", "motor"]
 _VACUUM = "casting.vacuum = true, or "
 
 
@@ -61,7 +61,7 @@ _KNOWN: tuple[tuple[Trouble, _Part | None], ...] = (
             "isopropanol.",
             "moulds.layer_mm smaller.",
         ),
-        "stub",
+        "filament",
     ),
     (
         Trouble(

@@ -158,18 +158,18 @@ def _views(moulds: MouldSet) -> Views:
     slit = (Name("paper", (cup_x + 6.0, 5.0 - cup_y, top)),) if paper else ()
     names = *slit, _corner(moulds, first.rim)
     yield "dry-fit", View((*base, Placed(first.cup)), (*paper, pressed), names=names)
-    if stubs := plan.of_kind("stub"):
+    if filaments := plan.of_kind("filament"):
         down = 1.2 * (moulds.dimensions.core_height - bottom)
         x, y = plan.layout.cells[0].x, -plan.layout.plate[1]
         names = Name("filament", (x, y * 0.8, bottom - down)), Name("groove", (x, y * 0.7, bottom))
         up = _beside_filaments(moulds, 1)
-        yield "filament", View((*base, *placed(stubs, z=-down)), up, UNDER, "under", names=names, way=0)
-    standing, on = (*base, *placed(stubs)), level_on(moulds)
+        yield "filament", View((*base, *placed(filaments, z=-down)), up, UNDER, "under", names=names, way=0)
+    standing, on = (*base, *placed(filaments)), level_on(moulds)
     yield "level", _level((*standing, Placed(on.cup)), cup_x, on.rim, plan.layout.plate, bottom)
     for step in plan.steps:
         for name, view in _pour(moulds, step, standing):
             yield f"pour{step.index}-{name}", view
-    yield from _way_out(moulds)
+    yield from _demoulding(moulds)
     yield from _motor_in(moulds)
     yield from _skin_on(moulds)
 
@@ -344,14 +344,14 @@ def _corner(moulds: MouldSet, z: float) -> Name:
     return Name("cut corner", (x - MARK / 2, y - MARK / 2, z))
 
 
-def _way_out(moulds: MouldSet) -> Views:
+def _demoulding(moulds: MouldSet) -> Views:
     """Yield the views from the last cured layer to the cast in the hand."""
     plan, (bottom, top), y = moulds.plan, moulds.plate, moulds.plan.layout.cup[1]
     base, last = plan.of_kind("base"), plan.steps[-1]
     cast = *plan.steps, *last.inserts
     stays = () if any(removal.piece == last.cup for removal in last.removals) else (Placed(last.cup),)
-    if stubs := plan.of_kind("stub"):
-        away = placed(stubs, z=1.2 * (bottom - moulds.dimensions.core_height))
+    if filaments := plan.of_kind("filament"):
+        away = placed(filaments, z=1.2 * (bottom - moulds.dimensions.core_height))
         out = _beside_filaments(moulds, -1)
         yield "filament-out", View((*placed((*base, *cast)), *stays, *away), out, UNDER, "under", way=0)
     up = last.rim + CLEAR
@@ -437,19 +437,19 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
     by_part = {removal.part: removal.direction for removal in drawn_off}
     ways = [by_part[f"at {cell.name}"] for cell in plan.layout.cells]
     casts = tuple(Extra(union(shapes), layer_colour(pour)) for pour, shapes in enumerate(laid))
-    (base,), (lid,), stubs = (plan.standing(step, kind) for kind in ("base", "lid", "stub"))
+    (base,), (lid,), filaments = (plan.standing(step, kind) for kind in ("base", "lid", "filament"))
     x0, y0, bottom, x1, y1, high = bounds(moulds.mesh(base))
-    seat, standing = step.pins.seat if step.pins else bottom, placed((base, *stubs))
+    seat, standing = step.pins.seat if step.pins else bottom, placed((base, *filaments))
 
-    def filaments(there: tuple[Placed, ...], casts: tuple[Extra, ...], way: int) -> View:
+    def pulled(there: tuple[Placed, ...], casts: tuple[Extra, ...], way: int) -> View:
         """Return the base from below, its filaments halfway out along their cores, on their way up or down."""
         out = 0.8 * (high - bottom)
-        away = (Placed(stub.name, _along(stub.removal or DOWN, out)) for stub in stubs)
+        away = (Placed(piece.name, _along(piece.removal or DOWN, out)) for piece in filaments)
         return View((*there, *away), casts, UNDER, "curved", way=way)
 
     def last_pour() -> Views:
         """Yield the views from the empty curved base to the cured sheet without its lid."""
-        yield "filament", filaments(placed([base]), (), -1)
+        yield "filament", pulled(placed([base]), (), -1)
         yield "level", _level((*standing, *placed([lid])), x1, step.top, (x1, y1), bottom, "curved")
         raised = [
             Extra(shape, layer_colour(pour), _along(way, 2 * CLEAR))
@@ -473,7 +473,7 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
 
     for name, view in last_pour():
         yield f"pour{step.index}-{name}", view
-    yield "filament-out", filaments(placed([base, step]), casts, 1)
+    yield "filament-out", pulled(placed([base, step]), casts, 1)
     # The silicone drawn off, each part in its own direction.
     up = step.rim + 2 * CLEAR
     *others, last = drawn_off

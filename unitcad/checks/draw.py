@@ -106,7 +106,7 @@ def _together(
     """Return for the first removals, of pieces that go the same way, the area at which any of them meets anything.
 
     `first` is the piece of the first removal. Removed pieces count as staying too, so a piece that is free here is free
-    in any order. One after the other, a hundred stubs under a plate would each be compared with the whole plate.
+    in any order. One after the other, a hundred filaments under a plate would each be compared with the whole plate.
     """
     way, there = removals[0].direction, dict(stays)
     like = takewhile(lambda each: each.direction == way and each.piece in there and each.piece != CAST, removals[1:])

@@ -36,7 +36,7 @@ def expected_genus(plan: Plan) -> dict[str, int]:
     if not plan.concentric:
         return {tool.name: 0 for tool in plan.of_kind("blade")} | dict(plan.genus)
     genus = {tool.name: 0 for tool in plan.tools}
-    genus["base"] = len(plan.of_kind("stub"))
+    genus["base"] = len(plan.of_kind("filament"))
     for step in plan.steps:
         genus[step.cup] = len(plan.layout.cells) + step.windows
         if step.lid:

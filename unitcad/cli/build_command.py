@@ -13,7 +13,6 @@ import typer
 
 from unitcad.cli.build_summary import summary
 from unitcad.cli.output import print_json, progress, say_error, warn
-from unitcad.cli.saves import saves
 from unitcad.cli.shared_options import (
     AllowCode,
     AsJson,
@@ -85,7 +84,7 @@ def build(
         why = "is no file that could be saved; unitcad init makes one from a template"
         raise WrongArgument("watch", lacking[0], why)
     with suppress(KeyboardInterrupt):
-        for _ in saves(map(Path, specs)):
+        for _ in wait_for_saves(map(Path, specs)):
             try:
                 once()
             except UnitcadError as error:

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Container, Iterator
 from pathlib import Path
 
-from unitcad.casting.steps import in_short
+from unitcad.casting.steps import casting_summary
 from unitcad.designs import widths
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import PartRecord, row
@@ -37,7 +37,7 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
         lengths = (f"{said_of(spec, key)} ({how})" for key, how in assumed.items())
         yield f"measure first; assumed: {listed(lengths)}"
     if manifest["casting"]:
-        yield from in_short(json.loads((built.folder / "casting.json").read_bytes()))
+        yield from casting_summary(json.loads((built.folder / "casting.json").read_bytes()))
     checks, check = manifest["mould_checks"], manifest["check"]
     if checks:
         passed = sum(entry["ok"] for entry in checks)

@@ -15,7 +15,7 @@ from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
-from unitcad.estimating import FEM, estimate_spec, frequency_table_of_spec, neighbours_of_specs
+from unitcad.estimate_inputs import FEM, estimate_spec, frequency_table_of_spec, neighbours_of_specs
 from unitcad.moulds.plan import plan
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec

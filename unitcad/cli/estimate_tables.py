@@ -214,7 +214,7 @@ def _predicted(block: dict[str, Any]) -> str:
 def _fit_line(fit: dict[str, Any]) -> str:
     """Say which fit it is, and its scores."""
     scores = ", ".join(f"{name} x {one['geometric_mean']:.2f}" for name, one in fit["left_out"].items())
-    beside = " beside the paper's nine" if fit["with_paper"] else ""
+    beside = " beside the paper's nine" if fit["include_paper_units"] else ""
     units = f"{fit['own_units']} units of the lab's own{beside}"
     head = f"  fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]}), {fit['leads']} leads"
     return f"{head}: {units}; unit left out: {scores}"
@@ -246,8 +246,8 @@ def _classes(by_class: dict[str, dict[str, float]], order: list[str]) -> Table:
 
 def _inputs(data: dict[str, Any]) -> tuple[Table, str] | None:
     """Tabulate the percent by which a level grows with 1 % more of an input, and name inputs that no model reads."""
-    found = {name: block["inputs_seen"] for name, block in data["models"].items()}
-    for one in data.get("fem", {}).get("inputs_seen", ()):
+    found = {name: block["sensitivities"] for name, block in data["models"].items()}
+    for one in data.get("fem", {}).get("sensitivities", ()):
         found[f"fem, {one['reading']}"] = one
     seen = {name: one["by"] for name, one in found.items() if one["by"] is not None}
     if not seen:

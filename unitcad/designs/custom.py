@@ -171,7 +171,7 @@ _EXPECTED: dict[str, Callable[[Any], str]] = {
     "pad_radius": _wrong_kind("pad_radius", int | float, "a number"),
     "tooling": _wrong_kind("tooling", Tooling, "a Tooling"),
     "assembly": lambda made: _wrong_texts("assembly")(_texts(made)),
-    "left_out": _wrong_texts("left_out", many=2),
+    "skipped": _wrong_texts("skipped", many=2),
 }
 """For each function of a Design, a check of its result: the fault as text, "" for none."""
 

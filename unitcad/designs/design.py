@@ -24,7 +24,7 @@ def _nothing(spec: Spec, dims: Dimensions) -> list[str]:
     return []
 
 
-def _nothing_left_out(spec: Spec) -> list[Reason]:
+def _nothing_skipped(spec: Spec) -> list[Reason]:
     return []
 
 
@@ -34,9 +34,10 @@ def _inside_cavity(asked: RawSpec, inner_radius: float) -> float:
 
 @dataclass(frozen=True)
 class Fitting:
-    """A sentence of the assembly, and the needs of its step.
+    """A sentence of the assembly, and the tools of its step.
 
-    needs       tools and consumables, as casting.steps.NEEDS names them
+    required_tools
+                tools and consumables, as casting.steps.REQUIRED_TOOLS names them
     silicone    the layer whose silicone it uses: from 1, -1 the last; 0 for none
     mixed       the product of that silicone, if it is mixed after the pours
     volume_mm3  the volume of it in one unit
@@ -44,7 +45,7 @@ class Fitting:
     """
 
     text: str
-    needs: tuple[str, ...] = ()
+    required_tools: tuple[str, ...] = ()
     silicone: int = 0
     mixed: Literal["", "ring"] = ""
     volume_mm3: float = 0.0
@@ -71,7 +72,7 @@ class Design:
     caps         whether a layer has a cap over the one inside it, or is an open ring
     passes       how often the wave from motor to skin passes the border between the layers; None: no estimate
     assembly     how motor and circuit go into the body, or into the mould, a sentence each; [] for a default
-    left_out     skipped pieces of this variant, and why
+    skipped     skipped pieces of this variant, and why
     default      whether it is the design of new specs; True for one design
     """
 
@@ -90,5 +91,5 @@ class Design:
     caps: bool = False
     passes: float | None = None
     assembly: Callable[[Spec, Dimensions], Sequence[str | Fitting]] = _nothing
-    left_out: Callable[[Spec], list[Reason]] = _nothing_left_out
+    skipped: Callable[[Spec], list[Reason]] = _nothing_skipped
     default: bool = False

@@ -115,9 +115,9 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
     return [*steps, Fitting(ring, ("petroleum jelly",), silicone=1, mixed="ring", volume_mm3=volume)]
 
 
-def left_out(spec: Spec) -> list[Reason]:
+def skipped(spec: Spec) -> list[Reason]:
     """Name the tooling that an open ring does without."""
-    reasons = [("filament stub and hole", "embedded: open rings have no suction")]
+    reasons = [("filament and its hole", "embedded: open rings have no suction")]
     if spec.fpcb:
         reasons.insert(0, ("tongue and slot", "embedded: the circuit is on the rings"))
     return reasons
@@ -136,5 +136,5 @@ DESIGN = Design(
     opens="above",
     passes=1.0,
     assembly=assembly,
-    left_out=left_out,
+    skipped=skipped,
 )

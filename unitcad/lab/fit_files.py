@@ -173,7 +173,7 @@ def page(result: Fitted) -> str:
     lines += [settings.note, ""] if settings.note else []
     lines += [
         f"{own} units of the lab's own"
-        + (" in addition to the paper's nine" if settings.with_paper else "")
+        + (" in addition to the paper's nine" if settings.include_paper_units else "")
         + f", {settings.moduli} moduli. {prior_text(result)} {leads_text(result)}",
         "",
         "| model | leave-one-out | own units | own, stored constants | against the baseline | in 80 % | constants |",

@@ -34,7 +34,7 @@ from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import materials
 from unitcad.catalogue.entries import Frequency, MaterialEntry
 from unitcad.errors import Refusal, unknown_name
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.lab.unit_files import Cavity, file_of, measured_walls, source_file, specs_of
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.raw import Table
@@ -81,7 +81,7 @@ class FitLabFile(Table, frozen=True, kw_only=True):
         Literal["small-strain", "quasi-static"],
         Meta(description="moduli of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa"),
     ] = "small-strain"
-    with_paper: Annotated[
+    include_paper_units: Annotated[
         bool, Meta(description="whether the paper's nine units count in addition to the lab's own")
     ] = True
     between_labs: Annotated[
@@ -104,7 +104,7 @@ class OwnUnit:
 
     @property
     def error(self) -> float:
-        """The standard error of ln level; 0 if no interval is given: it is then part of the discrepancy."""
+        """The standard error of ln level; 0 if no interval is given: it is then part of the model error."""
         if self.level.low is None or self.level.high is None:
             return 0.0
         return float(np.log(self.level.high / self.level.low)) / (2 * _TWO_SIDED)
@@ -269,7 +269,7 @@ class Fitted:
 def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fitted:
     """Judge and fit every model with the lab's units. Raises Refusal for units that can't be fitted."""
     settings = lab.settings
-    if not settings.with_paper and len(lab.units) < LEAST_ALONE:
+    if not settings.include_paper_units and len(lab.units) < LEAST_ALONE:
         limit = f"{len(lab.units)} units; without the paper's {LEAST_ALONE} are needed"
         raise Refusal("unit", None, limit)
     by_source: dict[str, Compared] = {}
@@ -294,7 +294,8 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
             )
         )  # fmt: skip
     fit = LabFit(
-        format=1, name=settings.name, units=len(lab.units), moduli=settings.moduli, with_paper=settings.with_paper,
+        format=1, name=settings.name, units=len(lab.units), moduli=settings.moduli,
+        include_paper_units=settings.include_paper_units,
         between_labs=settings.between_labs, seed=SEED, leads=leads,  # pyright: ignore[reportArgumentType]
         model={name: _entry(one, name, chosen) for name, one in COMPARED.items()},
         measured=measured, input=list(lab.inputs),
@@ -317,7 +318,7 @@ def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Ca
     """Return the paper's units, if they are wanted, and the lab's own after them."""
     paper = measured_table(moduli)
     known = np.array([bool(np.all(np.isfinite(units.youngs_modulus))) for units in paper.inputs])
-    kept = np.flatnonzero(known) if lab.settings.with_paper else []
+    kept = np.flatnonzero(known) if lab.settings.include_paper_units else []
     table = MeasuredTable(
         (*(paper.names[i] for i in kept), *(unit.name for unit in lab.units)),
         (*(paper.designs[i] for i in kept), *(CONTROL if len(v.layers) == 1 else v.design for v in inputs)),
@@ -360,7 +361,7 @@ def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
     against, error, p = paired(judged, compared.judged[BASELINE]) if name != BASELINE else (None, None, None)
     numbers = {
         **{key: dict(zip(model.names, map(float, values), strict=False)) for key, values in constants.items()},
-        "discrepancy": found.sigma, "covariance": found.covariance.tolist(), "left_out": judged.score,
+        "model_error": found.sigma, "covariance": found.covariance.tolist(), "left_out": judged.score,
         "left_out_low": low, "left_out_high": high, "own_left_out": judged.own_score,
         "own_by_stored": judged.stored_score, "against_baseline": against, "against_baseline_error": error,
         "against_baseline_p": p,

@@ -20,7 +20,7 @@ from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import figures, measurements
 from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, unknown_name
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.files import read_text
 from unitcad.validation import from_data
 

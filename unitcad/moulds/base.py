@@ -5,7 +5,7 @@
             |           '--'      | |            |
             |     cup   | cavity .'-'. tongue ====== grip
         .---'  .--------+--------'core|-----------'---.
-        | skirt|  plinth            stub              |   seat, z = 0
+        | skirt|  plinth            filament          |   seat, z = 0
         '------'  ........................ .----------'   skirt ends above the plate
         |  plate                     |   |            |
         '----------------------------'   '- groove ---'

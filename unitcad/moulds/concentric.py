@@ -1,4 +1,4 @@
-"""The tooling of concentric layers, drawn from their lengths: base, cups, lids, tongues, filament stubs and blade."""
+"""The tooling of concentric layers, drawn from their lengths: base, cups, lids, tongues, filaments and blade."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from unitcad.designs import design_of
 from unitcad.designs.dimensions import poured
 from unitcad.designs.tooling import Tooling
-from unitcad.moulds import dents, filament, lid
+from unitcad.moulds import filament, lid, trapped_air
 from unitcad.moulds.base import base, plate_bottom
 from unitcad.moulds.cup import cup
 from unitcad.moulds.layout import layout
@@ -16,8 +16,8 @@ from unitcad.moulds.pieces import (
     blade,
     blade_piece,
     cup_piece,
+    filament_pieces,
     lid_piece,
-    stub_pieces,
     tongue_pieces,
     tray_piece,
 )
@@ -36,7 +36,7 @@ def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     design = design_of(spec)
     dims = poured(spec, design.dimensions(spec))
     lay, pours = layout(spec, dims), range(len(cast))
-    dents.check_tongue(spec, dims)
+    trapped_air.check_tongue(spec, dims)
     injected = spec.moulds.pour == "injected"
     tools = [base_piece(base(spec, dims, lay))]
     for i in pours:
@@ -48,7 +48,7 @@ def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     brittle = printer_of(spec).technology.value == "sla"
     tools += tongue_pieces(tongues(dims, lay, cut=brittle), brittle)
     if design.suction:
-        tools += stub_pieces([filament.stub(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells])
+        tools += filament_pieces([filament.piece(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells])
     if dims.skin:
         tools.append(tray_piece(skin_tray(spec, dims, lay)))
     if not injected:

@@ -1,4 +1,4 @@
-"""The stub of printer filament that lets air under a unit, and its way through core and plate.
+"""The piece of printer filament that lets air under a unit, and its way through core and plate.
 
 It fills a hole through the core, flush with its top, and is bent below into a groove under the plate: it rests on the
 bench, so it can't sink under the weight of the pour.
@@ -17,7 +17,7 @@ from unitcad.spec import Spec
 
 FLARE = 1.0
 """Of the filament hole's lower end: the filament bends round it."""
-STUB_TAIL = 8.0
+FILAMENT_TAIL = 8.0
 """Length of the bent end outside the plate, mm: the end to pull."""
 BITE = 1 / 16
 """How far the seal reaches into filament and core, mm."""
@@ -49,13 +49,13 @@ def groove(spec: Spec, lay: Layout, cell: Cell) -> tuple[float, float, float, fl
     return cell.x - half, cell.y - _length(spec, lay, cell), cell.x + half, cell.y + up
 
 
-def stub(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
-    """Draw the stub itself: flush with the core's top, its bent end on the bench."""
+def piece(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
+    """Draw the filament itself: flush with the core's top, its bent end on the bench."""
     radius = spec.moulds.filament_mm / 2
     elbow = bottom + radius
     ball = Revolve(Profile(((0, -radius, _QUARTER), (radius, 0, _QUARTER), (0, radius, 0.0))))
     upright = cylinder(radius, elbow, dims.core_height)
-    outside = STUB_TAIL - BEYOND if _meets_edge(lay, cell) else 0.0
+    outside = FILAMENT_TAIL - BEYOND if _meets_edge(lay, cell) else 0.0
     lying = turned(cylinder(radius, 0, _length(spec, lay, cell) - radius + outside), "x", 1)
     bent = union((upright, moved(ball, z=elbow), moved(lying, z=elbow)))
     return moved(bent, cell.x, cell.y)

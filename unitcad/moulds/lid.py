@@ -18,8 +18,8 @@ from unitcad.designs.tooling import Layout
 from unitcad.errors import Refusal
 from unitcad.moulds.base import outline
 from unitcad.moulds.cup import window_section
-from unitcad.moulds.dents import MESH_ROOM, TILT_DEG, deepest
 from unitcad.moulds.layout import MARK
+from unitcad.moulds.trapped_air import MESH_ROOM, TILT_DEG, deepest
 from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, moved, polygon
 from unitcad.spec import Spec
 

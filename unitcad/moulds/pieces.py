@@ -10,7 +10,7 @@ from unitcad.shape import Extrude, Shape, moved, polygon, turned
 from unitcad.shape.body import Body
 
 _BASE, _CUP, _CUP2, _TONGUE = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.73, 0.83, 0.93), (0.90, 0.30, 0.30)
-_BLADE, _STUB, _LID = (0.87, 0.87, 0.55), (0.22, 0.22, 0.22), (0.80, 0.72, 0.90)
+_BLADE, _FILAMENT, _LID = (0.87, 0.87, 0.55), (0.22, 0.22, 0.22), (0.80, 0.72, 0.90)
 _UP, _DOWN = (0, 0, 1), (0, 0, -1)
 
 
@@ -42,11 +42,11 @@ def tongue_pieces(strips: Sequence[tuple[int, Shape]], brittle: bool) -> list[Bo
     ]
 
 
-def stub_pieces(stubs: Sequence[Shape]) -> list[Body]:
-    """Return filament stubs, pulled out downwards."""
+def filament_pieces(filaments: Sequence[Shape]) -> list[Body]:
+    """Return filaments, pulled out downwards."""
     return [
-        Body(_numbered("stub", i, stubs), "tool", "stub", stub, _STUB, made="cut", removal=_DOWN)
-        for i, stub in enumerate(stubs)
+        Body(_numbered("filament", i, filaments), "tool", "filament", piece, _FILAMENT, made="cut", removal=_DOWN)
+        for i, piece in enumerate(filaments)
     ]
 
 

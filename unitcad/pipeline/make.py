@@ -20,11 +20,11 @@ from unitcad.attenuation.edge.estimates import rounded_layered
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.cache import Store, digest
 from unitcad.casting.procedure import procedure
-from unitcad.casting.written import files as written
+from unitcad.casting.procedure_text import files as written
 from unitcad.checks import Strain, check_geometry, check_unit, strain_findings, strains
 from unitcad.checks.finding import FindingRecord
 from unitcad.errors import Unfinished
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.json_text import json_bytes
 from unitcad.kernels.mesh import bounds
 from unitcad.meshcheck import Options, check_bytes

@@ -225,7 +225,7 @@ def _skipped(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
             yield "second pour", "one layer: one pour"
         if not spec.fpcb and not spec.wires:
             yield "tongue and slot", "no FPCB"
-    yield from design.left_out(spec)
+    yield from design.skipped(spec)
     for name in OUTPUTS:
         if name not in only:
             # The page offers the command for outputs that were not asked for (report/app/estimate.js).

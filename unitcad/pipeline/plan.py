@@ -21,8 +21,8 @@ from unitcad.cache import digest
 from unitcad.casting.bill import SPARE_TONGUE, plates
 from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.preparation import slicer_settings
+from unitcad.casting.procedure_text import step_section
 from unitcad.casting.views import picture_path
-from unitcad.casting.written import step_section
 from unitcad.designs import design_of, no_estimate
 from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
 from unitcad.export import glb, printing, svg, threemf

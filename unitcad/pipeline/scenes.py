@@ -42,7 +42,7 @@ class Moment:
 def moments(moulds: MouldSet) -> Iterator[Moment]:
     """Yield casting from the bare base to the unit, in the order of the procedure."""
     plan = moulds.plan
-    base = tuple(tool.name for kind in ("base", "stub") for tool in plan.of_kind(kind))
+    base = tuple(tool.name for kind in ("base", "filament") for tool in plan.of_kind(kind))
     yield Moment("Base, filament flush with the core" if len(base) > 1 else "Base", base)
     inserts: tuple[str, ...] = ()
     for step in plan.steps:
@@ -68,7 +68,7 @@ def moments(moulds: MouldSet) -> Iterator[Moment]:
 def taken_apart(moulds: MouldSet) -> dict[str, Offset]:
     """Return how far each tool and each cast layer moves (mm) when the set is shown exploded.
 
-    Up the axis in casting order; a tongue out of its window, a filament stub down.
+    Up the axis in casting order; a tongue out of its window, a filament down.
     """
     plan = moulds.plan
     bottom, top = _extent(moulds, ["base"])
@@ -89,7 +89,7 @@ def taken_apart(moulds: MouldSet) -> dict[str, Offset]:
     for tool in plan.tools:
         if tool.kind == "tongue" and tool.removal:
             offsets[tool.name] = (tool.removal[0] * ASIDE, 0.0, offsets[plan.steps[0].cup][2])
-        elif tool.kind == "stub":
+        elif tool.kind == "filament":
             offsets[tool.name] = (0.0, 0.0, bottom - GAP - _extent(moulds, [tool.name])[1])
         elif tool.name not in offsets:
             lift(tool.name)
@@ -167,7 +167,7 @@ def step_in_section(moulds: MouldSet, index: int) -> bytes:
 def exploded(moulds: MouldSet) -> bytes:
     """Show the whole set taken apart, with names."""
     colours, offsets = _colours(moulds), taken_apart(moulds)
-    groups = [[tool.name for tool in moulds.plan.of_kind(kind)] for kind in ("tongue", "stub")]
+    groups = [[tool.name for tool in moulds.plan.of_kind(kind)] for kind in ("tongue", "filament")]
     numbered = [name for group in groups if len(group) > 1 for name in group]
     unnamed = {name for group in groups for name in group[1:]}
     names, parts = {body.name: _name(body) for body in moulds.unit}, []

@@ -25,7 +25,7 @@ from unitcad.designs import dimensions
 from unitcad.designs import shipped as designs
 from unitcad.designs.dimensions import MOTOR_CLEARANCE
 from unitcad.errors import Refusal
-from unitcad.estimating import drawn_input, silicone_layer
+from unitcad.estimate_inputs import drawn_input, silicone_layer
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search.target_file import MOST_GEOMETRIES, Target
 from unitcad.spec import Spec

@@ -11,7 +11,7 @@ from msgspec import structs
 
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.errors import unknown_name
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.search.candidates import Candidates, Geometry, Lengths, tabulate
 from unitcad.search.limits import limits
 from unitcad.search.proposals import Inversion, castability, name_from, name_of

@@ -18,7 +18,7 @@ from unitcad.catalogue import materials as silicones
 from unitcad.catalogue import measurements
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_input
+from unitcad.estimate_inputs import estimate_input
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search.candidates import Candidates, Lengths, Say, candidates
 from unitcad.search.limits import check_possible, label, limits, within

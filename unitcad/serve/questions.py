@@ -22,7 +22,7 @@ MEMORY = 4 << 30
 PRELOAD = (
     "unitcad.serve.answers",
     "unitcad.checks",
-    "unitcad.estimating",
+    "unitcad.estimate_inputs",
     "unitcad.export.svg",
     "unitcad.casting.procedure",
 )

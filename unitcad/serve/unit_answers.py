@@ -9,11 +9,11 @@ from typing import Any
 
 from unitcad import catalogue
 from unitcad.casting.procedure import Procedure, procedure
-from unitcad.casting.steps import in_short
+from unitcad.casting.steps import casting_summary
 from unitcad.checks import check_moulds
 from unitcad.designs import design_of, no_estimate, widths
 from unitcad.errors import Refusal
-from unitcad.estimating import closed_forms, estimate_spec, motor_mass
+from unitcad.estimate_inputs import closed_forms, estimate_spec, motor_mass
 from unitcad.export.svg import unit_section
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
@@ -137,7 +137,7 @@ def _moulds(spec: Spec, answer: Answer) -> None:
         "moulds_apart": {name: list(offset) for name, offset in taken_apart(moulds).items()},
     }
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
-    answer.lines = list(in_short(asdict(unit_procedure(moulds))))
+    answer.lines = list(casting_summary(asdict(unit_procedure(moulds))))
 
 
 def unit_procedure(moulds: MouldSet) -> Procedure:

@@ -20,7 +20,7 @@ Kind = Literal[
     "cup",
     "lid",
     "tongue",
-    "stub",
+    "filament",
     "blade",
     "tray",
     "coupon",

@@ -20,7 +20,7 @@ from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.measured_levels import Moduli, whole_ratio
 from unitcad.attenuation.edge.models import edge_levels, stored
 from unitcad.errors import UnitcadError
-from unitcad.estimating import closed_forms, drawn_input
+from unitcad.estimate_inputs import closed_forms, drawn_input
 from unitcad.spec import Spec
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.batch_options import BatchOptions

@@ -21,7 +21,7 @@ from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.errors import UnitcadError
-from unitcad.estimating import closed_forms, estimate_input, fit_of
+from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
 from unitcad.spec import Spec
 from unitcad.sweeps.sweep import Sweep
 from unitcad.text import listed

@@ -39,7 +39,7 @@ from unitcad.moulds.cuts import BESIDE, Feature, seams
 from unitcad.moulds.dovetails import Interval, Seam, Split, split, strips, unseen
 from unitcad.moulds.labels import corner_labels, engraved, row_width, set_label
 from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
-from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece, stub_pieces
+from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece, filament_pieces
 from unitcad.moulds.pins import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal
@@ -256,12 +256,12 @@ def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: boo
         cup = cup_piece(pour, engraved(blank, _cup_letters(drawing, pour, label)))
         # The last cup is a tray for the sheet: printed as drawn, and the patch leaves it, not it the patch.
         cups.append(replace(cup, upside_down=False, removal=None) if sheets[pour - 1] else cup)
-    stubs = stub_pieces([filament.stub(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
-    steps = tuple(_step(drawing, cast, pour, base, cups[pour - 1], stubs, sheet=sheets[pour - 1]) for pour in pours)
-    holes = [("base", len(stubs)), *((cup.name, len(lay.cells)) for cup in cups)]
+    filaments = filament_pieces([filament.piece(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
+    steps = tuple(_step(drawing, cast, pour, base, cups[pour - 1], filaments, sheet=sheets[pour - 1]) for pour in pours)
+    holes = [("base", len(filaments)), *((cup.name, len(lay.cells)) for cup in cups)]
     bar = blade(lay, dims.heights[len(cast) - 1])
     return Plan(
-        (base, *cups, *stubs, blade_piece(bar, too_long=longer_than_bed(spec, 2 * lay.plate[1]))),
+        (base, *cups, *filaments, blade_piece(bar, too_long=longer_than_bed(spec, 2 * lay.plate[1]))),
         steps,
         lay,
         label,
@@ -314,13 +314,13 @@ def _step(
     pour: int,
     base: Body,
     cup: Body,
-    stubs: Sequence[Body],
+    filaments: Sequence[Body],
     *,
     sheet: bool,
 ) -> Step:
     """Return a pour; the last of them casts the sheet, or its layers are taken out to be laid in elsewhere."""
     last, rim = pour == len(cast), drawing.dims.heights[pour - 1]
-    pulled = [Removal(stub.name, DOWN) for stub in stubs] if last else []
+    pulled = [Removal(piece.name, DOWN) for piece in filaments] if last else []
     # The last cup can't be lifted past the sheet.
     first = Removal(base.name, DOWN) if sheet else Removal(cup.name, UP)
     order = [*pulled, first, *([Removal(CAST, UP)] if last else [])]
@@ -328,7 +328,7 @@ def _step(
         index=pour,
         name=f"layer{pour}",
         material=drawing.array.sheet.material if sheet else drawing.spec.layers[pour - 1].material,
-        tools=(base.name, cup.name, *(stub.name for stub in stubs)),
+        tools=(base.name, cup.name, *(piece.name for piece in filaments)),
         layer=cast[pour - 1],
         earlier=tuple(shape for shapes in cast[: pour - 1] for shape in shapes),
         seals=tuple(_seals(drawing, pour - 1, last=sheet)),

@@ -19,13 +19,13 @@ from unitcad.designs.design import Fitting
 from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
 from unitcad.moulds.base import core
-from unitcad.moulds.dents import MESH_ROOM, TILT_DEG, deepest
 from unitcad.moulds.labels import engraved, set_label
 from unitcad.moulds.lid import THICKNESS, VENT
-from unitcad.moulds.pieces import base_piece, lid_piece, stub_pieces
+from unitcad.moulds.pieces import base_piece, filament_pieces, lid_piece
 from unitcad.moulds.pins import PIN_RADIUS, Pins, pin_holes, standing_pins
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal
+from unitcad.moulds.trapped_air import MESH_ROOM, TILT_DEG, deepest
 from unitcad.shape import (
     Common,
     Revolve,
@@ -193,16 +193,18 @@ def curved_plan(
     base = base_piece(engraved(base, _base_letters(former, f"B{pour:X}{label}")))
     lid = lid_piece(pour, engraved(lid, _lid_letters(former, f"L{pour:X}{label}")))
     ways = [_down(axis(array, place.x)) for place in array.places]
-    stubs = [replace(stub, removal=way) for stub, way in zip(stub_pieces(_stubs(former)), ways, strict=True)]
+    filaments = [
+        replace(piece, removal=way) for piece, way in zip(filament_pieces(_filaments(former)), ways, strict=True)
+    ]
     # The flat tools have the plain names.
     base = replace(base, name=f"base{pour}", step=pour)
-    stubs = [replace(stub, name=f"{stub.name}-{pour}", step=pour) for stub in stubs]
+    filaments = [replace(piece, name=f"{piece.name}-{pour}", step=pour) for piece in filaments]
     channels = tuple(_channels(former, array.sheet.high - INTO, former.top))
     step = Step(
         index=pour,
         name=f"layer{pour}",
         material=array.sheet.material,
-        tools=(base.name, lid.name, *(stub.name for stub in stubs)),
+        tools=(base.name, lid.name, *(piece.name for piece in filaments)),
         layer=(poured,),
         earlier=tuple(shape for shapes in laid for shape in shapes),
         seals=tuple(_seals(former)),
@@ -213,15 +215,15 @@ def curved_plan(
         pins=former.pins,
         removals=(
             Removal(lid.name, UP),
-            *(Removal(stub.name, way) for stub, way in zip(stubs, ways, strict=True)),
+            *(Removal(piece.name, way) for piece, way in zip(filaments, ways, strict=True)),
             *parts_out(array),
         ),
     )
-    holes = ((base.name, len(stubs)), (lid.name, len(channels)))
+    holes = ((base.name, len(filaments)), (lid.name, len(channels)))
     inner = inner_tools(array, flat, label)
     return replace(
         inner,
-        tools=(*(tool for tool in inner.tools if tool.kind != "blade"), base, lid, *stubs, *inner.of_kind("blade")),
+        tools=(*(tool for tool in inner.tools if tool.kind != "blade"), base, lid, *filaments, *inner.of_kind("blade")),
         steps=(*inner.steps, step),
         genus=(*inner.genus, *holes),
         stretches=bent_stretches(array),
@@ -333,7 +335,7 @@ def _filament_ways(former: Former) -> list[Shape]:
     return drawn
 
 
-def _stubs(former: Former) -> list[Shape]:
+def _filaments(former: Former) -> list[Shape]:
     """Draw the filaments: flush with the core's top, their lower ends on the bench."""
     array, radius = former.array, former.spec.moulds.filament_mm / 2
     (x, y), bottom = former.half, former.bottom

@@ -147,7 +147,7 @@ def _nearest(variant: EstimateInput, fit: LabFit | None) -> dict[str, Any]:
 
 def _highest(fit: LabFit | None) -> float:
     """Return the highest level behind the leading model."""
-    paper = [float(measured_table().levels.max())] if fit is None or fit.with_paper else []
+    paper = [float(measured_table().levels.max())] if fit is None or fit.include_paper_units else []
     return max([*paper, *(unit.value for unit in (fit.measured if fit else ()))])
 
 
@@ -179,7 +179,7 @@ def _source(variant: EstimateInput, estimated: dict[str, Any], data: dict[str, A
     if fit is None:
         what = "a rule fitted to nine measured levels; the paper states neither their surface nor axis"
     else:
-        paper = " and the paper's nine" if fit.with_paper else ""
+        paper = " and the paper's nine" if fit.include_paper_units else ""
         what = f"{'a rule' if fit.leads == RULE else fit.leads} fitted to {fit.units} units of {fit.name}{paper}"
     new = " Three or more layers: not measured." if len(variant.layers) > 2 else ""
     near = data["nearest"]

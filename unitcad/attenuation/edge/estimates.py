@@ -127,7 +127,7 @@ def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
         "name": fit.name,
         "leads": fit.leads,
         "own_units": fit.units,
-        "with_paper": fit.with_paper,
+        "include_paper_units": fit.include_paper_units,
         "moduli": fit.moduli,
         "left_out": {
             name: {"geometric_mean": one.left_out, "low": one.left_out_low, "high": one.left_out_high}

@@ -1,7 +1,7 @@
 """A lab's stored fit: the models' constants, the prediction for a new unit, the lab's own measurements.
 
-A new unit's ln level is Student-t distributed: `scale`^2 = discrepancy^2 (1 + g' C g), where g is the gradient of the
-model's ln level in the logarithms of its constants, and C their covariance over discrepancy^2.
+A new unit's ln level is Student-t distributed: `scale`^2 = model_error^2 (1 + g' C g), where g is the gradient of the
+model's ln level in the logarithms of its constants, and C their covariance over model_error^2.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ PERCENT = (10, 90)
 class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A model fitted to a lab's units: constants, their stored values, and the predictive.
 
-    `discrepancy`: standard deviation of a unit's ln level about the model. `covariance`: of the constants' logarithms,
-    in the order of `constants`, over discrepancy^2. `left_out` is the factor with the unit left out.
+    `model_error`: standard deviation of a unit's ln level about the model. `covariance`: of the constants' logarithms,
+    in the order of `constants`, over model_error^2. `left_out` is the factor with the unit left out.
     `at_bound`: the constant that the search left on its bound, None if the units determine all.
     """
 
@@ -38,7 +38,7 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     high: dict[str, Positive]
     stored: dict[str, Positive]
     degrees_of_freedom: Annotated[int, Meta(ge=1, le=100000)]
-    discrepancy: Annotated[float, Meta(ge=1e-6, le=10)]
+    model_error: Annotated[float, Meta(ge=1e-6, le=10)]
     covariance: list[list[Annotated[float, Meta(ge=-1e9, le=1e9)]]]
     left_out: Positive
     left_out_low: Positive
@@ -86,7 +86,7 @@ class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     name: Annotated[str, Meta(min_length=1, max_length=100)]
     units: Annotated[int, Meta(ge=1, le=100000)]
     moduli: Literal["small-strain", "quasi-static"]
-    with_paper: bool
+    include_paper_units: bool
     between_labs: Annotated[float, Meta(ge=0, le=100)]
     seed: int
     leads: Literal["rule", "published", "corrected", "divider"]
@@ -129,7 +129,7 @@ def predictive(fit: LabFit, model: str, variant: EstimateInput) -> tuple[int, fl
     centre = float(np.log(edge_levels(units, model, one.constants))[0])
     own = np.array([one.constants[name] for name in COMPARED[model].names])
     g = COMPARED[model].gradient(units, own)[0]
-    scale = one.discrepancy * float(np.sqrt(1.0 + g @ np.array(one.covariance) @ g))
+    scale = one.model_error * float(np.sqrt(1.0 + g @ np.array(one.covariance) @ g))
     return one.degrees_of_freedom, centre, scale if np.isfinite(centre) else float("nan")
 
 
@@ -150,7 +150,7 @@ def predictive_block(fit: LabFit, model: str, variant: EstimateInput, reason: st
         "degrees_of_freedom": df,
         "centre": centre,
         "scale": scale,
-        "discrepancy": fit.model[model].discrepancy,
+        "model_error": fit.model[model].model_error,
         "what": "where a new unit of this kind is expected in this lab: Student-t of ln level, at the inputs' middle",
     }
 

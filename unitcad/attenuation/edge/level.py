@@ -10,7 +10,6 @@ import numpy as np
 
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.inputs_seen import STEP, ends, inputs_seen
 from unitcad.attenuation.edge.lab_fit import LabFit, predictive_block
 from unitcad.attenuation.edge.measured_levels import (
     CLASSES,
@@ -20,6 +19,7 @@ from unitcad.attenuation.edge.measured_levels import (
     whole_ratio,
 )
 from unitcad.attenuation.edge.models import edge_levels, stored
+from unitcad.attenuation.edge.sensitivities import STEP, ends, sensitivities
 from unitcad.attenuation.edge.variant_units import FIELDS, nominal, stacked
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 
@@ -211,15 +211,15 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
         block |= _published_details(variant, controls)
     if model == "corrected":
         block["wave_of_the_level"] = "s"
-    block["inputs_seen"] = tested(
-        variant, inputs_seen(variant, lambda _: edge_levels(_changed(variant), model, constants))
+    block["sensitivities"] = tested(
+        variant, sensitivities(variant, lambda _: edge_levels(_changed(variant), model, constants))
     )
     block["assumptions"] = ASSUMPTIONS[model]
     return block
 
 
 def tested(variant: EstimateInput, seen: dict[str, Any]) -> dict[str, Any]:
-    """Return slopes (`inputs_seen`) with `tested`: for each how many measured pairs agree in sign, and its range.
+    """Return slopes (`sensitivities`) with `tested`: for each how many measured pairs agree in sign, and its range.
 
     The range holds the slope and the pairs' own, and 0 unless two pairs or more were measured and all agree.
     """
@@ -239,7 +239,7 @@ def tested(variant: EstimateInput, seen: dict[str, Any]) -> dict[str, Any]:
 
 @lru_cache(maxsize=4)
 def _changed(variant: EstimateInput) -> Units:
-    """Return the variants that `inputs_seen` compares, which every model reads."""
+    """Return the variants that `sensitivities` compares, which every model reads."""
     return stacked(ends(variant, STEP))
 
 

@@ -187,15 +187,15 @@ def _of_lab(fit: LabFit) -> Lead:
     own = np.array([unit.place for unit in fit.measured])
     ends = own[:, LENGTHS : LENGTHS + 2]
     low, high = float(ends.min()), float(ends.max())
-    if fit.with_paper:
+    if fit.include_paper_units:
         low, high = min(low, paper.moduli[0]), max(high, paper.moduli[1])
     return Lead(
         model=fit.leads,
         constants=one.constants,
         degrees_of_freedom=one.degrees_of_freedom,
-        sigma=one.discrepancy,
+        sigma=one.model_error,
         # The paper's units count as places; their residuals belong to another lab.
-        places=np.concatenate([own, paper.places]) if fit.with_paper else own,
+        places=np.concatenate([own, paper.places]) if fit.include_paper_units else own,
         residuals=np.array([unit.residual for unit in fit.measured]),
         moduli=(low, high),
         covariance=np.array(one.covariance),

@@ -1,6 +1,6 @@
 """Models fitted to two campaigns, the paper's and a lab's, whose constants may differ: shrunk, judged, predictive.
 
-A unit's ln level scatters about its model with the standard deviation sigma (the discrepancy), and between campaigns
+A unit's ln level scatters about its model with the standard deviation sigma (the model error), and between campaigns
 the logarithms of a model's constants scatter by `between_labs` times the information of a unit of the other campaign.
 The likelihood of a campaign of n units then counts for another one with the weight 1/(n between_labs^2 + 1) a unit: a
 power prior (Ibrahim and Chen, Statistical Science 15, 46, 2000), for a model that is linear in its constants the

@@ -60,7 +60,7 @@ def level(
 ) -> float:
     """Return the amplitude of a reading over the motor's, both along the drive unless `component` says otherwise.
 
-    variant_input   `estimating.estimate_input(spec)`
+    variant_input   `estimate_inputs.estimate_input(spec)`
     frequency_hz    overrides the input's, also that of a draw
     drive           "flat" (sideways force) or "axial"
     reading         "skin" or "edge"

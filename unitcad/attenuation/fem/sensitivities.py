@@ -7,8 +7,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from unitcad.attenuation.edge.inputs_seen import inputs_seen
 from unitcad.attenuation.edge.level import unknown
+from unitcad.attenuation.edge.sensitivities import sensitivities
 from unitcad.attenuation.edge.variant_units import merged
 from unitcad.attenuation.fem.motor_level import Reading, amplitude, motion
 from unitcad.attenuation.fem.prior_range import ALIKE
@@ -19,10 +19,10 @@ STEP, FINENESS = 0.01, 0.5
 """The step is wide enough that the mesh's own changes do not show; differences are off by about 1 % of a slope."""
 
 
-def fem_inputs(
+def fem_sensitivities(
     variant: EstimateInput, say: Callable[[str], None] = lambda line: None, step: float = STEP
 ) -> list[dict[str, Any]]:
-    """Return `inputs_seen` of each reading, of the unit as drawn, bonded, all values nominal; [] without a level.
+    """Return `sensitivities` of each reading, of the unit as drawn, bonded, all values nominal; [] without a level.
 
     One finite-element solution for each end of each input serves both readings.
     """
@@ -41,8 +41,8 @@ def fem_inputs(
                 levels[reading].append(amplitude(shown, drive, "along") / abs(moved.motor))
         return np.ones(len(variants))
 
-    inputs_seen(variant, solve, step)
+    sensitivities(variant, solve, step)
     return [
-        {"drive": drive, "reading": reading, **inputs_seen(variant, lambda _, own=own: own, step)}
+        {"drive": drive, "reading": reading, **sensitivities(variant, lambda _, own=own: own, step)}
         for reading, own in levels.items()
     ]

@@ -15,7 +15,7 @@ from unitcad.attenuation.inputs import TissueLayer, body
 from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.catalogue import Printer, choose, printers, tissue
 from unitcad.errors import Refusal
-from unitcad.estimating import tissue_layer
+from unitcad.estimate_inputs import tissue_layer
 from unitcad.kernels.mesh import bounds, realise
 from unitcad.lab.phantom.box import BoxLengths, cast, expect_apart, lengths, pieces
 from unitcad.lab.phantom.recipe import PhantomTable, Recipe, recipe, stiffening

@@ -211,8 +211,8 @@
 
   // What a percent more of each input does to each model's level, in percent; what no model reads is named below.
   function inputs(data) {
-    const closed = Object.entries(data.models || {}).map(([model, block]) => [nameOf(model), block.inputs_seen || {}]);
-    const solved = ((data.fem || {}).inputs_seen || []).map((one) => [`Finite elements, ${one.reading}`, one]);
+    const closed = Object.entries(data.models || {}).map(([model, block]) => [nameOf(model), block.sensitivities || {}]);
+    const solved = ((data.fem || {}).sensitivities || []).map((one) => [`Finite elements, ${one.reading}`, one]);
     const reading = [...closed, ...solved].filter(([, seen]) => seen.by);
     if (!reading.length) return null;
     const names = [...Object.keys(reading[0][1].by), ...reading[0][1].not_seen];

@@ -13,7 +13,7 @@ EVERY_S = 0.25
 """Seconds between two looks at the files."""
 
 
-def saves(specs: Iterable[Path]) -> Iterator[None]:
+def wait_for_saves(specs: Iterable[Path]) -> Iterator[None]:
     """Yield at once, and then after every save of a spec or a file that it names: a design's, a fit, an array's unit.
 
     A save is told once the file has been still for one look: editors write in several steps.

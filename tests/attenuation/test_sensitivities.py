@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.curve import layered_block
-from unitcad.attenuation.edge.inputs_seen import changed, inputs_seen
 from unitcad.attenuation.edge.level import nominal, stacked
 from unitcad.attenuation.edge.models import MODELS, edge_levels, stored
-from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.attenuation.edge.sensitivities import changed, sensitivities
+from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import load
 
 SPECS = {
@@ -44,7 +44,7 @@ def asked(spec, path: str) -> float | None:
 def test_slopes_are_those_of_specs_that_were_changed(name: str, model: str) -> None:
     spec = spec_of(name)
     variant = estimate_input(spec)
-    found = inputs_seen(variant, lambda variants: edge_levels(stacked(variants), model))
+    found = sensitivities(variant, lambda variants: edge_levels(stacked(variants), model))
     compared = 0
     for path in changed(variant):
         value = asked(spec, path)
@@ -65,8 +65,8 @@ def test_slopes_by_formula() -> None:
     blocks = estimate_spec(load("encapsulating"))["models"]
     x = stored()["divider"]["kappa"] * 2 * 355 / 15
     slopes = {"layers.0.youngs_modulus_kpa": x / (1 + x), "layers.1.youngs_modulus_kpa": -x / (1 + x)}
-    assert blocks["divider"]["inputs_seen"]["by"] == pytest.approx(slopes, abs=1e-4)
-    paper = blocks["published"]["inputs_seen"]["by"]
+    assert blocks["divider"]["sensitivities"]["by"] == pytest.approx(slopes, abs=1e-4)
+    paper = blocks["published"]["sensitivities"]["by"]
     (exponents,) = (one["exponents_s_wave"] for one in blocks["published"]["readings"] if one["eta"] == "loss_modulus")
     assert [paper[f"layers.{i}.wall_mm"] for i in (0, 1)] == pytest.approx([-e for e in exponents], abs=1e-4)
     assert paper["estimate.frequency_hz"] == pytest.approx(-sum(exponents), abs=1e-4)
@@ -76,28 +76,28 @@ def test_slopes_by_formula() -> None:
 def test_each_input_is_seen_or_named_as_not_seen(name: str) -> None:
     spec = spec_of(name)
     for model, block in estimate_spec(spec)["models"].items():
-        seen = block["inputs_seen"]
+        seen = block["sensitivities"]
         assert model in MODELS
         assert {*seen["by"], *seen["not_seen"]} == set(changed(estimate_input(spec)))
         assert not set(seen["by"]) & set(seen["not_seen"])
     models = estimate_spec(spec)["models"]
-    assert not models["rule"]["inputs_seen"]["by"]  # beyond the measured ratio of moduli, or one layer alone
-    assert "layers.0.wall_mm" in models["published"]["inputs_seen"]["by"]
+    assert not models["rule"]["sensitivities"]["by"]  # beyond the measured ratio of moduli, or one layer alone
+    assert "layers.0.wall_mm" in models["published"]["sensitivities"]["by"]
 
 
 def test_a_slope_has_the_pairs_that_were_measured_and_a_range_with_zero_if_they_contradict() -> None:
     models = estimate_spec(load("encapsulating"))["models"]
-    tested = models["published"]["inputs_seen"]["tested"]
-    slope = models["published"]["inputs_seen"]["by"]["layers.1.youngs_modulus_kpa"]
+    tested = models["published"]["sensitivities"]["tested"]
+    slope = models["published"]["sensitivities"]["by"]["layers.1.youngs_modulus_kpa"]
     outer = tested["layers.1.youngs_modulus_kpa"]
     assert (outer["agree"], outer["of"]) == (0, 2)
     assert (outer["low"], outer["high"]) == (slope, pytest.approx(np.log(0.156 / 0.0886) / np.log(355 / 250), abs=1e-4))
     for name, one in tested.items():
         assert one["low"] <= 0 <= one["high"], name
-    single = estimate_spec(load("single-embedded"))["models"]["published"]["inputs_seen"]["tested"]
+    single = estimate_spec(load("single-embedded"))["models"]["published"]["sensitivities"]["tested"]
     assert single["layers.0.youngs_modulus_kpa"]["of"] == 3
     stiff = ["layers.0.material=dragon-skin-30", "layers.1.material=ecoflex-00-10"]
-    untested = estimate_spec(load("embedded", stiff))["models"]["published"]["inputs_seen"]["tested"]
+    untested = estimate_spec(load("embedded", stiff))["models"]["published"]["sensitivities"]["tested"]
     assert {one["of"] for one in untested.values()} == {0}
 
 
@@ -107,16 +107,16 @@ def test_another_model_s_slopes_come_from_the_same_function() -> None:
     def cube_of_the_mass(variants):
         return [one.geometry.motor_mass.middle**3 * one.tissue[0].shear_modulus.middle ** -0.5 for one in variants]
 
-    found = inputs_seen(variant, cube_of_the_mass)
+    found = sensitivities(variant, cube_of_the_mass)
     assert found["by"] == {"motor mass": 3.0, "tissue shear modulus": -0.5}
-    nothing = inputs_seen(variant, lambda variants: np.full(len(variants), np.nan))
+    nothing = sensitivities(variant, lambda variants: np.full(len(variants), np.nan))
     assert nothing["by"] is None
     assert "no finite level" in nothing["reason"]
 
 
 def test_the_curve_says_what_its_decay_reads() -> None:
     """Against differences of specs that were changed, by another step and a smaller rtol."""
-    found = layered_block(estimate_input(load("encapsulating")))["inputs_seen"]
+    found = layered_block(estimate_input(load("encapsulating")))["sensitivities"]
     by = found["by"]
     assert set(by) == {
         *("diameter_mm", "motor.diameter_mm", "estimate.frequency_hz"),
@@ -128,7 +128,7 @@ def test_the_curve_says_what_its_decay_reads() -> None:
             variant = estimate_input(load("encapsulating", [f"{path}={value * factor!r}"]))
             ends.append(layered_block(variant, rtol=1e-8)["drives"]["flat"]["u"]["value"][30])
         middle = estimate_input(load("encapsulating", [f"{path}={value!r}"]))
-        slope = layered_block(middle)["inputs_seen"]["by"][path]
+        slope = layered_block(middle)["sensitivities"]["by"][path]
         assert slope == pytest.approx(math.log(ends[1] / ends[0]) / (2 * STEP), abs=1e-3)
     assert "layers.0.wall_mm" not in by
     assert "not in it" in found["nothing_else"]

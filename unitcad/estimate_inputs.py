@@ -46,10 +46,10 @@ def estimate_spec(
         data["fit"] = {**_fit_file(spec), **data["fit"]}
     if FEM in asked:
         from unitcad.attenuation.fem.prior_range import range_block
-        from unitcad.attenuation.fem.sensitivities import fem_inputs
+        from unitcad.attenuation.fem.sensitivities import fem_sensitivities
 
         block = range_block(variant, say=say)
-        data[FEM] = rounded({**block, "inputs_seen": fem_inputs(variant, say)})
+        data[FEM] = rounded({**block, "sensitivities": fem_sensitivities(variant, say)})
     return data
 
 

@@ -31,7 +31,7 @@ _SILICONE = {
 _TISSUE = ("shear_modulus", "damping", "thickness", "density")
 
 
-def inputs_seen(variant: EstimateInput, levels: Levels, step: float = STEP) -> dict[str, Any]:
+def sensitivities(variant: EstimateInput, levels: Levels, step: float = STEP) -> dict[str, Any]:
     """Return {by: d ln level / d ln input by input, not_seen: the inputs that change nothing}, to four decimals.
 
     Without a finite level `by` is None, with a `reason`.

@@ -1,4 +1,4 @@
-"""A procedure written out: Markdown for the bench, JSON for programs, CSV for the bill, a drawing a pour."""
+"""A procedure as text: Markdown for the bench, JSON for programs, CSV for the bill, a drawing a pour."""
 
 from __future__ import annotations
 
