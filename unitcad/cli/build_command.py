@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from unitcad.cli.build_summary import summary
+from unitcad.cli.file_watcher import wait_for_saves
 from unitcad.cli.output import print_json, progress, say_error, warn
 from unitcad.cli.shared_options import (
     AllowCode,
