@@ -19,6 +19,8 @@ import shutil
 import stat
 import time
 from collections.abc import Callable, Iterator, Mapping
+from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -40,11 +42,41 @@ _TOKEN = re.compile(re.escape(TEMPORARY) + "[0-9a-f]{16}")
 OLD, NEW = "old", "new"
 EMPTY_S = 60.0
 """After this time an empty scratch folder belongs to no process that is just making or removing it."""
+_LOOKED_AT = 5000
+"""Names of a folder that are compared with a missing one."""
 _DEVICE = re.compile(r"con|prn|aux|nul|com[0-9]|lpt[0-9]", re.IGNORECASE)
 
 
 class NotThere(UnitcadError):
-    """A file that does not exist."""
+    """A file that does not exist; printed with the most similar path that does."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        super().__init__(path)
+        self.path = path
+
+    def __str__(self) -> str:
+        return f"{self.path}: {no_such_file(self.path)}"
+
+
+def no_such_file(path: str | os.PathLike[str]) -> str:
+    """Return the words for a missing file, with the most similar path that exists."""
+    near = _similar(Path(path))
+    return f"no such file{f'; closest: {near}' if near else ''}"
+
+
+def _similar(path: Path) -> Path | None:
+    """Return the existing path whose parts are most like those of a missing one; None if there is none."""
+    folder = path.parent if path.parent.is_dir() else _similar(path.parent)
+    try:
+        names = sorted(entry.name for entry in islice(os.scandir(folder), _LOOKED_AT)) if folder else []
+    except OSError:
+        return None
+    same_kind = [name for name in names if Path(name).suffix.lower() == path.suffix.lower()]
+    for some in (same_kind, names):
+        stems = {Path(name).stem.lower(): name for name in some}
+        if folder and (near := get_close_matches(path.stem.lower(), stems, n=1, cutoff=0.65)):
+            return folder / stems[near[0]]
+    return None
 
 
 def read(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> bytes:
@@ -56,7 +88,7 @@ def read(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = 
         with open(path, "rb", opener=regular(links)) as file:
             content = file.read(largest + 1)
     except (FileNotFoundError, NotADirectoryError):
-        raise NotThere(f"{path}: no such file") from None
+        raise NotThere(path) from None
     except OSError as error:
         raise UnitcadError(f"{path}: {(error.strerror or 'unreadable').lower()}") from None
     except ValueError:

@@ -18,6 +18,7 @@ import msgspec
 from msgspec import Struct, field
 
 from unitcad.errors import Refusal
+from unitcad.text import with_article
 
 _CORE = "cli"
 """The package whose additions come first."""
@@ -92,16 +93,20 @@ def file_kinds() -> tuple[FileKind, ...]:
     return tuple(kind for room in _rooms() for kind in room.files)
 
 
+def kind_of(data: Mapping[str, object]) -> FileKind | None:
+    """Return the kind of a TOML file, known by the keys of its data."""
+    return next((kind for kind in file_kinds() if kind.keys and all(key in data for key in kind.keys)), None)
+
+
 def expect_none_but(
     wanted: str, data: Mapping[str, object], source: str, field: str, refused: type[Refusal] = Refusal
 ) -> None:
     """Raise `refused`, of a field, for a file of another kind than `wanted`, known by the keys of its data."""
-    found = next((kind for kind in file_kinds() if kind.keys and all(key in data for key in kind.keys)), None)
+    found = kind_of(data)
     if found and found.name != wanted and found.command:
         raise of_other_kind(found, field, source, refused)
 
 
 def of_other_kind(found: FileKind, field: str, source: str, refused: type[Refusal]) -> Refusal:
     """Return the refusal of a file by its kind, with the command that takes it."""
-    article = "an" if found.name[0] in "aeiou" else "a"
-    return refused(field, source, f"is {article} {found.name}: run {found.command} {shlex.quote(source)}")
+    return refused(field, source, f"is {with_article(found.name)}: run {found.command} {shlex.quote(source)}")

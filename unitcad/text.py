@@ -92,6 +92,11 @@ def listed(words: Iterable[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+def with_article(noun: str) -> str:
+    """Return a noun after a or an."""
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+
+
 def some(words: Iterable[object], most: int = 10) -> str:
     """Return the first words of a list, each cut at 60 characters, and the number of the others: "a, b and 7 more"."""
     every = list(words)

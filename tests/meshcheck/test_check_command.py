@@ -67,7 +67,7 @@ def test_exit_codes(folder: Path) -> None:
     assert run("sub/hole.stl", cwd=folder).returncode == 1
     assert run("sub/warn.STL", cwd=folder).returncode == 0
     assert run("sub/warn.STL", "--fail-on", "warning", cwd=folder).returncode == 1
-    assert run("none.stl", cwd=folder).returncode == 1
+    assert run("none.stl", cwd=folder).returncode == 2
     assert run(cwd=folder).returncode == 2
     for wrong in (["--fail-on", "x"], ["--select", "Q"], ["--printer", "x"], ["--unit", "x"], ["--output-format", "x"]):
         result = run("good.stl", *wrong, cwd=folder)
@@ -104,10 +104,15 @@ def test_folders_and_globs(folder: Path) -> None:
     data = json.loads(run("**/*.stl", "--json", cwd=folder).stdout)
     assert [entry["path"] for entry in data["files"]] == ["good.stl", "sub/hole.stl"]
     (folder / "bare").mkdir()
-    for name in ("bare", "no*.stl"):
-        result = run(name, "--json", cwd=folder)
-        assert result.returncode == 1
-        assert json.loads(result.stdout)["files"][0]["findings"][0]["code"] == "F012"
+    for name in ("bare", "no*.stl", "god.stl"):
+        alone = run(name, "--json", cwd=folder)
+        assert alone.returncode == 2
+        assert json.loads(alone.stdout)["error"]["value"] == name
+        result = run(name, "sub/warn.STL", "--json", cwd=folder)
+        assert result.returncode == 2
+        codes = {entry["path"]: entry["findings"][0]["code"] for entry in json.loads(result.stdout)["files"]}
+        assert codes.keys() == {name, "sub/warn.STL"}
+        assert codes[name] == "F012"
 
 
 def test_hidden_folders_and_loops_are_left_out_and_each_file_is_judged_once(folder: Path) -> None:

@@ -12,6 +12,7 @@ UNIT = 'name = "unit"\ndesign = "encapsulating"\ndiameter_mm = 14\n'
 LAYER = '[[layers]]\nmaterial = "{}"\nwall_mm = 1.25\ncap_mm = 1.25\n'
 GOOD = UNIT + LAYER.format("ecoflex-00-10") + LAYER.format("dragon-skin-30")
 SILICONES = "ecoflex-00-10, ecoflex-00-30, ecoflex-00-50, dragon-skin-10-medium, dragon-skin-30"
+CURVE = "Strain (%),Stress (kPa)\n" + "".join(f"{i}.5,{i}.5\n" for i in range(60))
 THIN = "the motor (7), 0.1 of clearance and walls of 2.5 a side need 12.2 mm; nearest accepted: 12.2"
 
 COMMANDS = {
@@ -50,13 +51,14 @@ COMMANDS = {
     "Layer 1 is layers.0",
     "build unit.toml --only mould": "--only = 'mould': unknown name; closest: moulds; nearest accepted: 'moulds'",
     "build unit.toml --formats STL": "--formats = 'STL': unknown name; closest: stl; nearest accepted: 'stl'",
-    "build unit.toml --fit unit.toml": "estimate.fit: design = 'encapsulating': unknown key; "
-    "name a lab-fit.toml of unitcad fit",
+    "build unit.toml --fit made/spec.toml": "estimate.fit = 'spec.toml': is a spec, not a fit; name a "
+    "lab-fit.toml, which `unitcad fit LAB` writes from measured units",
     "build unit.toml -o part.csv": "part.csv: is a file, not a folder; choose another with -o",
     "build unit.toml --set moulds.cavities=2x5": "moulds.cavities = '2x5': unknown name; known: fill or a list such as "
     "[1, 1]; nearest accepted: [2, 5]",
     "build forearm-patch --set layout.pitch_mm=x": "layout.pitch_mm = 'x': takes a number or a list such as [1.5, 1.5]",
     "batch unit.toml": "SWEEP = 'unit.toml': is a spec: run unitcad build unit.toml",
+    "batch sweep.toml --formats stl step": "SWEEP = 'step': is a format; several take commas: --formats stl,step",
     "batch sweep.toml -j two": "--jobs = 'two': takes a whole number, such as 1",
     "batch sweep.toml --table xlsx": "--table = 'xlsx': unknown name; known: csv, json, parquet",
     "estimate unit.toml --model pubished": "--model = 'pubished': unknown name; closest: published; "
@@ -67,13 +69,15 @@ COMMANDS = {
     "nearest accepted: '100:200:10'",
     "check part.csv --select TT": "--select = 'TT': unknown code; unitcad check --list-rules lists all",
     "check unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
+    "check parts.csv": "FILE = 'parts.csv': no such file; closest: part.csv",
+    "check 'none*.stl'": "FILE = 'none*.stl': no file matches",
     "check --diff a.stl b.stl": "--diff = 'a.stl': no such file",
     "check part.csv --jobs 0": "--jobs = 0: must be at least 1; nearest accepted: 1",
     "check a.stl --printer ender": "--printer = 'ender': unknown name; closest: ender-3; nearest accepted: 'ender-3'",
     "check part.csv --report sarif": "--report = 'sarif': must be FORMAT=FILE; nearest accepted: 'sarif=report.sarif'",
-    "material part.csv": "--like: is required: 'part' is no shipped silicone, and a curve gives only a modulus; known: "
-    + SILICONES,
-    "material part.csv --like ecoflex-00-30": "part.csv: needs two lines or more of the same count of numbers",
+    "material curve.csv": "--like: is required: 'curve' is no shipped silicone, and a curve gives only a modulus; "
+    "known: " + SILICONES,
+    "material part.csv": "part.csv: needs two lines or more of the same count of numbers",
     "material unit.toml": "FILE = 'unit.toml': is a spec: run unitcad build unit.toml",
     "measure part.csv": "CAMPAIGN = 'part.csv': is not a TOML file, whose name ends in .toml",
     "measure gone": "gone: no such file",
@@ -165,7 +169,14 @@ def test_a_mistake_in_a_command_is_answered_in_one_line(line, tmp_path, capsys, 
     monkeypatch.chdir(tmp_path)
     for folder in ("folder", "made"):
         (tmp_path / folder).mkdir()
-    files = {"unit.toml": GOOD, "made/spec.toml": GOOD, "empty.toml": "", "part.csv": "a,b\n", "part.step": ""}
+    files = {
+        "unit.toml": GOOD,
+        "made/spec.toml": GOOD,
+        "empty.toml": "",
+        "part.csv": "a,b\n",
+        "part.step": "",
+        "curve.csv": CURVE,
+    }
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     (tmp_path / "binary.toml").write_bytes(b"\xff\x00\x80")

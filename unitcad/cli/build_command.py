@@ -23,6 +23,7 @@ from unitcad.cli.shared_options import (
     Only,
     Sets,
     allow_code,
+    expect_commas,
     listed,
     outputs,
     overrides,
@@ -38,7 +39,6 @@ from unitcad.pipeline.write import PAGE, Built, held
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
 from unitcad.spec import read_toml
-from unitcad.spec.raw import FORMATS
 from unitcad.validation import confirm_known, every_template
 from unitcad.validation.suggestions import numbers
 
@@ -71,9 +71,7 @@ def build(
     as_json: AsJson = False,
 ) -> None:
     """Make a unit and its casting moulds, or an array of units. The last line printed is the folder."""
-    for spec in specs:
-        if spec in FORMATS:
-            raise WrongArgument("spec", spec, "is a format; several take commas: --formats stl,step")
+    expect_commas("SPEC", specs)
     specs = [confirm_known(spec) for spec in specs]
     once = partial(_built, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
     if not watch:

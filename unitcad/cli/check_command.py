@@ -1,4 +1,4 @@
-"""`unitcad check`: its command line. What it does is in `check_run`."""
+"""The command line of `unitcad check`; `check_run` does the work."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.check_run import Asked, run
+from unitcad.cli.check_run import CheckArguments, run
 
 
 def check(
@@ -15,7 +15,7 @@ def check(
     ] = None,
     output_format: Annotated[
         str, typer.Option(metavar="FORMAT", help="Report: text, json, github, sarif, junit or markdown.")
-    ] = Asked.output_format,
+    ] = CheckArguments.output_format,
     as_json: Annotated[bool, typer.Option("--json", help="Short for --output-format json.")] = False,
     report: Annotated[
         list[str] | None,
@@ -71,7 +71,9 @@ def check(
         str | None,
         typer.Option(metavar="FILE", help="manifest.json of a build, or its folder (M rules). Default: none."),
     ] = None,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Worker processes.")] = Asked.jobs,
+    jobs: Annotated[
+        int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Worker processes.")
+    ] = CheckArguments.jobs,
     max_faces: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Most faces in a file. Default: 10,000,000.")
     ] = None,
@@ -122,4 +124,4 @@ def check(
 
     Reads STL, 3MF, OBJ, PLY, OFF and GLB, and STEP if an extra with a B-rep kernel is installed.
     """
-    raise typer.Exit(run(Asked(**locals())))
+    raise typer.Exit(run(CheckArguments(**locals())))

@@ -110,7 +110,7 @@ def _pairs(old: str, new: str) -> Iterator[tuple[str, str | None, str | None]]:
     kinds = [Path(path).is_dir() for path in (old, new)]
     for path in (old, new):
         if not Path(path).exists():
-            raise Refusal("--diff", path, "no such file")
+            raise Refusal("--diff", path, files.no_such_file(path))
     if kinds[0] != kinds[1]:
         raise Refusal("--diff", f"{old} {new}", "must be two files or two folders; one of them is a folder")
     if not kinds[0]:

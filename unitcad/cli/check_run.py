@@ -1,7 +1,8 @@
-"""What `unitcad check` does: mesh files against the rules of unitcad.check. Nothing here parses a command line."""
+"""The work of `unitcad check`: compare mesh files with the rules. Nothing here parses a command line."""
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ from unitcad.export import finding_pictures
 from unitcad.meshcheck import Limits, Options, file_checks, output
 from unitcad.meshcheck import baseline as baselines
 from unitcad.meshcheck import manifest as listing
-from unitcad.meshcheck.findings import MOST, SHOWN
+from unitcad.meshcheck.findings import MOST, SHOWN, FileReport
 from unitcad.meshcheck.output import FORMATS, render
 from unitcad.meshcheck.rules.registry import check_prefixes, rules
 from unitcad.meshcheck.rules.registry import explain as explanation
@@ -27,7 +28,7 @@ from unitcad.spec.toml import read_toml
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class CheckArguments:
     """The options of a call, as `check_command.check` explains them."""
 
     files: list[str] | None = None
@@ -61,95 +62,108 @@ class Asked:
     list_rules: bool = False
 
 
-def run(asked: Asked) -> int:
+def run(arguments: CheckArguments) -> int:
     """Check the files and print or save the report; return the exit code. Raises UnitcadError or Refusal."""
 
-    if asked.list_rules:
+    if arguments.list_rules:
         sys.stdout.write("".join(f"{rule.code} {rule.severity}: {rule.title}\n" for rule in rules().values()))
         return 0
-    if asked.explain is not None:
-        sys.stdout.write(explanation(",".join(asked.explain)) + "\n")
+    if arguments.explain is not None:
+        sys.stdout.write(explanation(",".join(arguments.explain)) + "\n")
         return 0
-    output_format = "json" if asked.as_json else asked.output_format
+    output_format = "json" if arguments.as_json else arguments.output_format
     if output_format not in FORMATS:
         raise unknown_name("--output-format", output_format, FORMATS)
-    if asked.as_json and asked.output_format not in (Asked.output_format, "json"):
+    if arguments.as_json and arguments.output_format not in (CheckArguments.output_format, "json"):
         why = "--json asks for another one: leave one of them out, or have both with --report json=FILE"
-        raise Refusal("--output-format", asked.output_format, why)
-    if asked.show is not None and Path(asked.show).exists() and not Path(asked.show).is_dir():
-        raise Refusal("--pictures", asked.show, "must name a folder; this is a file")
-    copies = [_copy(given, FORMATS) for given in asked.report or []]
-    configuration = check_settings.find(asked.config, wanted=not asked.no_config)
-    fail_on = asked.fail_on or configuration.value("fail_on") or "error"
+        raise Refusal("--output-format", arguments.output_format, why)
+    if arguments.show is not None and Path(arguments.show).exists() and not Path(arguments.show).is_dir():
+        raise Refusal("--pictures", arguments.show, "must name a folder; this is a file")
+    copies = [_copy(given, FORMATS) for given in arguments.report or []]
+    configuration = check_settings.find(arguments.config, wanted=not arguments.no_config)
+    fail_on = arguments.fail_on or configuration.value("fail_on") or "error"
     if fail_on not in ("error", "warning"):
         raise unknown_name("--fail-on", fail_on, ("error", "warning"))
-    base = Path(asked.baseline) if asked.baseline is not None else configuration.baseline
-    if asked.write_baseline and base is None:
+    base = Path(arguments.baseline) if arguments.baseline is not None else configuration.baseline
+    if arguments.write_baseline and base is None:
         raise UnitcadError("--write-baseline needs a file: --baseline FILE, or the key baseline of the settings")
     if base is not None:
-        known = baselines.read(base) if base.exists() or not asked.write_baseline else baselines.EMPTY
-    selected = check_prefixes(*configuration.chosen("select", _split(asked.select)))
-    extra = check_prefixes("--extend-select", _split(asked.extend_select) or [])
+        known = baselines.read(base) if base.exists() or not arguments.write_baseline else baselines.EMPTY
+    selected = check_prefixes(*configuration.chosen("select", _split(arguments.select)))
+    extra = check_prefixes("--extend-select", _split(arguments.extend_select) or [])
     options = Options(
         select=selected + extra if selected else (),
-        ignore=check_prefixes(*configuration.chosen("ignore", _split(asked.ignore))),
-        unit=unit_named(*configuration.chosen("unit", asked.unit)),
-        printer=_printer(*configuration.chosen("printer", asked.printer)),
-        shells=asked.shells,
-        strict=bool(configuration.value("strict") if asked.strict is None else asked.strict),
-        strict_3mf=bool(configuration.value("strict_3mf") if asked.strict_3mf is None else asked.strict_3mf),
+        ignore=check_prefixes(*configuration.chosen("ignore", _split(arguments.ignore))),
+        unit=unit_named(*configuration.chosen("unit", arguments.unit)),
+        printer=_printer(*configuration.chosen("printer", arguments.printer)),
+        shells=arguments.shells,
+        strict=bool(configuration.value("strict") if arguments.strict is None else arguments.strict),
+        strict_3mf=bool(configuration.value("strict_3mf") if arguments.strict_3mf is None else arguments.strict_3mf),
         limits=_limits(
-            asked.max_faces or configuration.value("max_faces"), *configuration.chosen("timeout", asked.timeout)
+            arguments.max_faces or configuration.value("max_faces"), *configuration.chosen("timeout", arguments.timeout)
         ),
-        locations=MOST if asked.all_locations or base is not None or asked.show is not None else SHOWN,
-        draw=asked.show is not None,
+        locations=MOST if arguments.all_locations or base is not None or arguments.show is not None else SHOWN,
+        draw=arguments.show is not None,
     )
-    for name in asked.files or ():
+    for name in arguments.files or ():
         if name.endswith(".toml") and Path(name).is_file():
             expect_none_but("", read_toml(Path(name)), name, "FILE")
-    if asked.diff is not None:
-        if asked.files or asked.manifest is not None or base is not None:
+    if arguments.diff is not None:
+        if arguments.files or arguments.manifest is not None or base is not None:
             raise UnitcadError("--diff compares its two names alone: leave out other files, --manifest and --baseline")
         from unitcad.cli import check_diff  # with trimesh and SciPy, which no other check needs
 
-        said, code = check_diff.run(*asked.diff, options, fail_on, output_format, asked.show)
+        said, code = check_diff.run(*arguments.diff, options, fail_on, output_format, arguments.show)
         _write(said, plain=output_format == "text")
         return code
-    if not asked.files and asked.manifest is None:
+    if not arguments.files and arguments.manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
     for pattern, codes in (configuration.value("per_file_ignores") or {}).items():
         check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
     draw = None
-    if asked.show is not None:
-        draw = partial(finding_pictures.write, Path(asked.show))
-    memory = asked.memory or configuration.value("memory") or 8000
-    check_all = partial(file_checks.check_files, jobs=asked.jobs, memory_mb=memory, then=draw)
-    left_out = configuration.left_out(asked.exclude or [])
-    files, unread = file_checks.expand(asked.files or [], left_out)
+    if arguments.show is not None:
+        draw = partial(finding_pictures.write, Path(arguments.show))
+    memory = arguments.memory or configuration.value("memory") or 8000
+    check_all = partial(file_checks.check_files, jobs=arguments.jobs, memory_mb=memory, then=draw)
+    left_out = configuration.left_out(arguments.exclude or [])
+    files, unread = file_checks.expand(arguments.files or [], left_out)
+    absent = [name for name in files if not os.path.lexists(name)]
+    without_files = [report for report in unread if report.verdict == "error"]
+    incomplete = bool(absent or without_files)
+    if incomplete and arguments.manifest is None and len(absent) == len(files) and len(without_files) == len(unread):
+        raise _no_files(without_files, absent)
     of_path = partial(_options_of, configuration, options)
-    if asked.manifest is None:
+    if arguments.manifest is None:
         reports = unread + list(check_all([(path, of_path(path)) for path in files]))
     else:
-        listed = listing.read(asked.manifest)
+        listed = listing.read(arguments.manifest)
         work = listing.work(listed, files, of_path, None if options.printer is not None else printers())
         compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
         reports = unread + compared + listing.unchecked(listed, [path for path, _ in work], of_path)
-    shown = MOST if asked.all_locations else SHOWN
+    shown = MOST if arguments.all_locations else SHOWN
     if base is not None:
-        known = baselines.write(base, known, reports) if asked.write_baseline else known
+        known = baselines.write(base, known, reports) if arguments.write_baseline else known
         reports = [baselines.apply(known, base, report) for report in reports]
     reports = [report.shortened(shown) for report in reports]
-    table = output.statistics(reports) if asked.statistics else ""
+    table = output.statistics(reports) if arguments.statistics else ""
     used = None if base is None else base.as_posix()
     for format_, path in copies:
         _save(path, render(reports, format_, fail_on, configuration.shown, used))
-    if asked.statistics and output_format == "text":
+    if arguments.statistics and output_format == "text":
         sys.stdout.write(table)
     else:
         written = render(reports, output_format, fail_on, configuration.shown, used)
         _write(written, plain=output_format == "text")
         sys.stderr.write(table)
-    return file_checks.worst(reports, fail_on)
+    return 2 if incomplete else file_checks.worst(reports, fail_on)
+
+
+def _no_files(without_files: Sequence[FileReport], absent: Sequence[str]) -> Refusal:
+    """Return the refusal of arguments that all name nothing to check."""
+    faults = [Refusal("FILE", report.path, report.findings[0].message) for report in without_files]
+    faults += [Refusal("FILE", name, files.no_such_file(name)) for name in absent]
+    faults[0].others = tuple(faults[1:])
+    return faults[0]
 
 
 def _copy(given: str, formats: Sequence[str]) -> tuple[str, Path]:

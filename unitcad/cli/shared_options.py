@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from unitcad.arguments import confirm_form
-from unitcad.errors import unknown_name
+from unitcad.errors import Refusal, unknown_name
 from unitcad.spec import custom_code
 from unitcad.spec.raw import FORMATS, OUTPUTS
 
@@ -73,6 +74,15 @@ def outputs(only: str | None) -> tuple[str, ...]:
     """Return what --only asks for; all without it."""
 
     return OUTPUTS if only is None else tuple(name for name in listed(only) if name)
+
+
+def expect_commas(field: str, words: Iterable[str]) -> None:
+    """Raise Refusal for an argument that belongs to an option's list: --formats stl step."""
+    for word in words:
+        if word in FORMATS:
+            raise Refusal(field, word, "is a format; several take commas: --formats stl,step")
+        if word in OUTPUTS:
+            raise Refusal(field, word, "is an output; several take commas: --only unit,moulds")
 
 
 def listed(text: str | None) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -110,36 +111,31 @@ def material(
         raise Refusal("--cell-n", cell_n, "belongs to tensile curves, of which none is given")
     for path in [*(curves or []), *([dma] if dma else [])]:
         if not path.exists():
-            raise files.NotThere(f"{path}: no such file")
+            raise files.NotThere(path)
         if path.suffix == ".toml":
             expect_none_but("", read_toml(path), str(path), "FILE")
-    shipped = catalogue.materials()
-    named = name or _slug((curves or [dma])[0])  # type: ignore[arg-type]
-    base = like or named
-    if not like and named not in shipped:
-        limit = f"is required: {named!r} is no shipped silicone, and a curve gives only a modulus"
-        raise Refusal("--like", None, f"{limit}; known: {', '.join(shipped)}")
-    if base not in shipped:
-        raise unknown_name("--like", base, shipped)
     given = declared(column or [])
     layout = Layout(_DELIMITERS.get(delimiter, delimiter), decimal, skip_lines)
     used = _strain(strain, amplitude_um, wall_mm)
-    tensile = dynamic = None
     with progress("material") as stage:
-        if curves:
-            specimen = Specimen(width_mm, thickness_mm, gauge_mm, cell_n=cell_n)
-            read = []
-            for path in curves:
-                stage(path.name)
-                read.append(read_curve(path, given, specimen, layout))
-                if cell_n is not None and read[-1].specimen.area is None:
-                    limit = f"needs the cross-section, which {path.name} does not give: --width-mm and --thickness-mm"
-                    raise Refusal("--cell-n", cell_n, limit)
-            tensile = evaluate(read, used, shipped[base])
+        specimen = Specimen(width_mm, thickness_mm, gauge_mm, cell_n=cell_n)
+        read = []
+        for path in curves or []:
+            stage(path.name)
+            read.append(read_curve(path, given, specimen, layout))
+            if cell_n is not None and read[-1].specimen.area is None:
+                limit = f"needs the cross-section, which {path.name} does not give: --width-mm and --thickness-mm"
+                raise Refusal("--cell-n", cell_n, limit)
+        moduli = None
         if dma is not None:
             stage(dma.name)
-            ratio = float(shipped[base].poisson_ratio)
-            dynamic = evaluate_dynamic(read_dynamic(dma, given, deformation, layout), frequency_hz, ratio)
+            moduli = read_dynamic(dma, given, deformation, layout)
+        shipped = catalogue.materials()
+        named = name or _slug((curves or [dma])[0])  # type: ignore[arg-type]
+        base = _base(like, named, shipped)
+        tensile = evaluate(read, used, shipped[base]) if read else None
+        ratio = float(shipped[base].poisson_ratio)
+        dynamic = evaluate_dynamic(moduli, frequency_hz, ratio) if moduli else None
     entry = written.table(tensile, dynamic, base, frequency_hz)
     written.expect_loadable(named, entry)
     text = written.material_toml(named, entry, _comments(entry, shipped[base]))
@@ -165,6 +161,17 @@ def material(
     typer.echo(text, nl=False)
     if out is not None:
         typer.echo(str(out))
+
+
+def _base(like: str, named: str, shipped: Mapping[str, Material]) -> str:
+    """Return the shipped silicone that gives the values that no test measures."""
+    if not like and named not in shipped:
+        limit = f"is required: {named!r} is no shipped silicone, and a curve gives only a modulus"
+        raise Refusal("--like", None, f"{limit}; known: {', '.join(shipped)}")
+    base = like or named
+    if base not in shipped:
+        raise unknown_name("--like", base, shipped)
+    return base
 
 
 def _comments(entry: dict[str, Any], base: Material) -> tuple[str, ...]:

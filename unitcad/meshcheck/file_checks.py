@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from unitcad.files import no_such_file
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
 from unitcad.meshcheck.builds import check_3mf, check_step
@@ -125,7 +126,7 @@ def _bytes_of(path: Path, limits: Limits) -> bytes:
         with path.open("rb") as file:
             return file.read(status.st_size)
     except FileNotFoundError as error:
-        raise F012.unreadable("no such file") from error
+        raise F012.unreadable(no_such_file(path)) from error
     except (OSError, ValueError) as error:
         raise F012.unreadable(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
 

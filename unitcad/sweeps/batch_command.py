@@ -19,6 +19,7 @@ from unitcad.cli.shared_options import (
     Only,
     Sets,
     allow_code,
+    expect_commas,
     finite,
     listed,
     outputs,
@@ -143,7 +144,8 @@ def batch(
         _merge(shards or [], out, options, paged, as_json)
         return
     if shards:
-        raise Refusal("SWEEP", str(shards[0]), "a batch takes one sweep; build this one by another command")
+        expect_commas("SWEEP", map(str, shards))
+        raise Refusal("SWEEP", str(shards[0]), "a batch takes one sweep; run a second batch for this one")
     chosen = outputs(only)
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)

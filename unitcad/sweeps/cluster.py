@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.errors import Refusal, UnitcadError, missing_extra
+from unitcad.files import no_such_file
 
 DASK_SECONDS = 6.0
 """Seconds that a scheduler may take to answer: with imports and start-up the command ends within ten."""
@@ -45,7 +46,7 @@ def check_certificates(certificates: Certificates, scheduler: str | None) -> Non
         if scheduler is None or not scheduler.startswith(ENCRYPTED):
             raise Refusal(option, str(path), "needs a --scheduler at tls://")
         if not path.is_file():
-            raise Refusal(option, str(path), "no such file")
+            raise Refusal(option, str(path), no_such_file(path))
 
 
 def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple[Executor, int]:

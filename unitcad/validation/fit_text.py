@@ -7,13 +7,16 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from unitcad.errors import Refusal, UnknownKey
+from unitcad.rooms import kind_of
 from unitcad.spec import convert
 from unitcad.spec.raw import EstimateTable
+from unitcad.text import with_article
 
 if TYPE_CHECKING:
     from unitcad.attenuation.edge.lab_fit import LabFit
 
 FIELD = "estimate.fit"
+_NEXT = "name a lab-fit.toml, which `unitcad fit LAB` writes from measured units"
 
 
 def check_fit(table: EstimateTable) -> None:
@@ -21,7 +24,12 @@ def check_fit(table: EstimateTable) -> None:
     if table.fit is None or table.fit_source is None:
         key = "fit" if table.fit is None else "fit_source"
         raise Refusal(f"estimate.{key}", None, "is required beside the other of fit and fit_source")
-    fit = lab_fit(table.fit_source)
+    try:
+        fit = lab_fit(table.fit_source)
+    except Refusal as refusal:
+        if refusal.field != FIELD:
+            raise
+        raise Refusal(FIELD, table.fit, refusal.limit) from None
     if fit.moduli != table.moduli:
         limit = f"{table.fit} has its constants by {fit.moduli} moduli"
         raise Refusal("estimate.moduli", table.moduli, limit, fit.moduli)
@@ -33,11 +41,15 @@ def lab_fit(text: str) -> LabFit:
     from unitcad.attenuation.edge.lab_fit import LabFit, fault
 
     try:
-        fit = convert(tomllib.loads(text), LabFit)
+        data = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         raise Refusal(FIELD, None, f"not TOML: {error}") from None
+    if kind := kind_of(data):
+        raise Refusal(FIELD, None, f"is {with_article(kind.name)}, not a fit; {_NEXT}")
+    try:
+        fit = convert(data, LabFit)
     except Refusal as refusal:
-        limit = "unknown key; name a lab-fit.toml of unitcad fit" if isinstance(refusal, UnknownKey) else refusal.limit
+        limit = f"unknown key; {_NEXT}" if isinstance(refusal, UnknownKey) else refusal.limit
         raise Refusal(f"{FIELD}: {refusal.field}", refusal.value, limit) from None
     wrong = fault(fit)
     if wrong:

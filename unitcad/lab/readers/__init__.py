@@ -177,7 +177,7 @@ def open_recording(path: Path, layout: Layout = AS_FOUND) -> Recording:
         with open(path, "rb", opener=files.regular()) as file:
             first = file.read(512)
     except FileNotFoundError:
-        raise files.NotThere(f"{path}: no such file") from None
+        raise files.NotThere(path) from None
     except OSError as error:
         raise UnitcadError(f"{path}: {(error.strerror or 'unreadable').lower()}") from None
     if (size := path.stat().st_size) > LARGEST:

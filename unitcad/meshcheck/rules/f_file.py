@@ -103,7 +103,7 @@ F012 = Rule("""
     The path does not exist, is not a file, or may not be read; or it is STEP and no B-rep extra is installed (a warning
     if a folder was named). A warning if a solid of a STEP file has no closed mesh: its overlap and print are not
     judged.
-    Example: `unitcad check prat.stl` for the file part.stl.
+    Example: `unitcad check lid.stl prat.stl` for the file part.stl.
     Fix: Check the path and its permissions. If the message says that STEP needs an extra, install it.
 """)
 
