@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 from unitcad.arrays.array_tables import Cast, CircuitTable, Construction
 from unitcad.designs import design_of
-from unitcad.spec import Spec
+from unitcad.spec import Spec, to_data
 
 Box = tuple[float, float, float, float]
 """(x0, y0, x1, y1), mm."""
@@ -118,6 +118,11 @@ class Array:
                     break
                 least = min(least, math.hypot(other_x - x, other_y - y))
         return least
+
+    def paths_of(self, unit: Spec) -> tuple[str, ...]:
+        """Return the paths at which `asked` has a unit: "unit." first, if it is the array's own, then its places."""
+        tables = {"unit.": self.asked, **{f"place.{i}.unit.": own for i, own in enumerate(self.asked.get("place", ()))}}
+        return tuple(path for path, table in tables.items() if table.get("unit") == to_data(unit))
 
     def placed(self, name: str) -> Placed:
         """Return the place of that name. Raises KeyError."""

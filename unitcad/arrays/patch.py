@@ -147,6 +147,11 @@ class PatchMoulds(MouldSet):
         """The silicone as it is cast."""
         return self.construction.bodies(self.arranged)
 
+    @property
+    def parts(self) -> tuple[str, Spec]:
+        """The array's own unit: those with several are cast apart."""
+        return "unit.", self.arranged.unit
+
     @cached_property
     def laid_later(self) -> tuple[Body, ...]:
         """The motors at their places and the common circuit, of units that are cast in one pour with the sheet."""
@@ -273,9 +278,9 @@ class PatchMoulds(MouldSet):
         return Manifold()
 
 
-def patch_moulds(array: Array, altered: Plan | None = None) -> PatchMoulds:
-    """Return the mould set of an array's sheet; `altered` replaces its plan: a set with a fault, for tests."""
-    return PatchMoulds(patch_spec(array), altered, array=array)
+def patch_moulds(array: Array, altered: Plan | None = None, given: frozenset[str] = frozenset()) -> PatchMoulds:
+    """Return the mould set of an array's sheet; `altered` and `given`: see `MouldSet`."""
+    return PatchMoulds(patch_spec(array), altered, given, array=array)
 
 
 def patch_spec(array: Array) -> Spec:
