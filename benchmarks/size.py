@@ -16,8 +16,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (545_500, 402, 68_000),
-    "core": (272_300, 221, 35_000),
+    "total": (546_000, 402, 68_100),
+    "core": (272_400, 221, 35_000),
     "tests": (409_500, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""

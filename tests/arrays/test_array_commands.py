@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.arrays.array_file import array_hash, array_templates, load_array
 from unitcad.cli import app
 from unitcad.errors import Refusal
 
@@ -86,3 +86,29 @@ def test_build_writes_an_array_and_its_page(tmp_path: Path) -> None:
     assert (folder / "bench.html").is_file()
     assert (folder / "units/encapsulating/report.html").is_file()
     assert "1 unit on a sheet" in done.stderr
+
+
+def test_step_0_of_an_array_measures_each_unit_s_parts_and_its_command_builds_the_array(tmp_path: Path) -> None:
+    """Two kinds of units, one at a place of its own. A given value counts as measured, also the catalogue's own."""
+    (tmp_path / "mixed.toml").write_text(
+        'name = "mixed"\narray = "pockets"\nunit = "encapsulating"\n[[place]]\nat = "A1"\nunit = "motor-10mm"\n'
+        '[layout]\nkind = "grid"\ncolumns = 2\nrows = 1\npitch_mm = 25.0\n'
+    )
+    given = ["--set", "unit.motor.thickness_mm=2", "--set", "place.0.unit.fpcb.thickness_mm=0.11"]
+    done = run.invoke(app, ["build", str(tmp_path / "mixed.toml"), "-o", str(tmp_path), "--only", "casting", *given])
+    assert "assumed: unit.fpcb.thickness_mm = 0.11 (usual stock)" in done.stderr
+    folder = Path(done.stdout.splitlines()[-1])
+    text = (folder / "casting.md").read_text()
+    lines = re.findall(r"^- (\S+): (.* thickness): (.*)$", text, re.MULTILINE)
+    assert lines == [
+        ("motor-10mm", "motor thickness", "1.8 mm"),
+        ("motor-10mm", "circuit thickness", "0.11 mm"),
+        ("encapsulating", "motor thickness", "2 mm"),
+        ("encapsulating", "circuit thickness", "0.11 mm (assumed; usual stock)"),
+    ]
+    (command,) = re.findall(r"^unitcad build array.toml (.*)$", text, re.MULTILINE)
+    assert len(sets := command.replace("--set ", "").split()) == 8
+    assert array_hash(load_array(folder / "array.toml", sets)) == array_hash(load_array(folder / "array.toml"))
+    assert "(assumed;" not in (folder / "units/motor-10mm/casting.md").read_text()
+    again = run.invoke(app, ["build", str(folder / "array.toml"), "-o", str(tmp_path), "--only", "casting"])
+    assert "assumed: unit.motor.thickness_mm = 2" in again.stderr, "a result's file has every value"

@@ -114,13 +114,13 @@ def test_the_sheet_begins_with_what_to_measure() -> None:
         "moulds.filament_mm": spec.moulds.filament_mm,
     }
     made = casting("encapsulating")
-    assert {size.key: size.value_mm for size in made.printing.sizes} == drawn
+    assert {size.keys[0]: size.value_mm for size in made.printing.sizes} == drawn
     text = to_markdown(made)
     (command,) = re.findall(r"^unitcad build spec.toml (.*)$", text, re.MULTILINE)
     assert text.index("## 0. Measure first") < text.index("## Print") < text.index("## Before the first pour")
     assert load("encapsulating", command.replace("--set ", "").split()) == spec
     assert "motor thickness: 2 mm (assumed; 2 to 2.65: up to 0.65 mm out of the skin's plane)" in text
-    wires = {size.key for size in casting("no-fpcb").printing.sizes}
+    wires = {size.keys[0] for size in casting("no-fpcb").printing.sizes}
     assert "wires.diameter_mm" in wires
     assert "fpcb.thickness_mm" not in wires
 

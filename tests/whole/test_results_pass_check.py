@@ -6,16 +6,34 @@ import pytest
 from typer.testing import CliRunner
 
 from unitcad.cli import app
+from unitcad.export.printing import stl
+from unitcad.kernels.mesh import arrays, realise
+from unitcad.shape import cut, cylinder
 from unitcad.validation.load import every_template
+
+ALL_FORMATS = {"encapsulating", "forearm-patch", "forearm-pockets"}
 
 
 @pytest.mark.parametrize("template", sorted(every_template()))
 def test_a_result_passes_check_and_its_manifest(template: str, tmp_path: Path) -> None:
-    formats = "stl,3mf,step" if template == "encapsulating" else "stl,3mf"
+    passes(template, tmp_path, "stl,3mf,step,glb" if template in ALL_FORMATS else "stl,3mf")
+
+
+def test_an_array_of_a_body_file_in_pockets_passes_check(tmp_path: Path) -> None:
+    """Its disc is 0.03 mm larger than said, which a pocket takes."""
+    body = realise(cut(cylinder(7.03, 0, 4.5), [cylinder(3.7, -1, 2)]), 96)
+    (tmp_path / "disc.stl").write_bytes(stl(*arrays(body), "disc"))
+    layer = '[[unit.layers]]\nmaterial = "ecoflex-00-30"\nwall_mm = 2.0\ncap_mm = 1.25\n'
+    unit = f'name = "discs"\narray = "pockets"\n[unit]\ndesign = "disc.stl"\ndiameter_mm = 14.0\n{layer}'
+    (tmp_path / "array.toml").write_text(f'{unit}[layout]\nkind = "grid"\ncolumns = 2\nrows = 1\npitch_mm = 20.0\n')
+    passes(str(tmp_path / "array.toml"), tmp_path, "stl,3mf,step,glb")
+
+
+def passes(subject: str, out: Path, formats: str) -> None:
     built = CliRunner().invoke(
-        app, ["build", template, "-o", str(tmp_path), "--only", "unit,moulds", "--formats", formats, "--no-check"]
+        app, ["build", subject, "-o", str(out), "--only", "unit,moulds", "--formats", formats, "--no-check"]
     )
-    if template == "custom/dome":  # has no moulds
+    if subject == "custom/dome":  # has no moulds
         return
     assert built.exit_code == 0, built.output
     folder = built.stdout.splitlines()[-1]

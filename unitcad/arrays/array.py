@@ -12,10 +12,13 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 from unitcad.arrays.array_tables import Cast, CircuitTable, Construction
-from unitcad.spec import Spec
+from unitcad.designs import design_of
+from unitcad.spec import Spec, to_data
 
 Box = tuple[float, float, float, float]
 """(x0, y0, x1, y1), mm."""
+OFF_ROUND = 0.05
+"""Largest distance of a unit's outline from its disc, mm (assumed): a quarter of the usual hold."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +35,11 @@ class Placed:
     def radius(self) -> float:
         """Half the unit's diameter, mm."""
         return self.unit.diameter_mm / 2
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of its outline from its axis, mm."""
+        return self.radius + (0.0 if design_of(self.unit).tooling == "concentric" else OFF_ROUND)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +118,11 @@ class Array:
                     break
                 least = min(least, math.hypot(other_x - x, other_y - y))
         return least
+
+    def paths_of(self, unit: Spec) -> tuple[str, ...]:
+        """Return the paths at which `asked` has a unit: "unit." first, if it is the array's own, then its places."""
+        tables = {"unit.": self.asked, **{f"place.{i}.unit.": own for i, own in enumerate(self.asked.get("place", ()))}}
+        return tuple(path for path, table in tables.items() if table.get("unit") == to_data(unit))
 
     def placed(self, name: str) -> Placed:
         """Return the place of that name. Raises KeyError."""

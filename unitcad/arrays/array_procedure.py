@@ -40,7 +40,7 @@ from unitcad.casting.pouring import (
 )
 from unitcad.casting.pouring import release as flat_release
 from unitcad.casting.pouring import shown as grams_shown
-from unitcad.casting.preparation import Printing, cleaning, fall, joining, level, printing
+from unitcad.casting.preparation import Printing, Size, cleaning, fall, joining, level, printing
 from unitcad.casting.procedure import Procedure, pour_of, procedure, times
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep, Phase, duration, phases
 from unitcad.casting.views import picture_path, views
@@ -541,12 +541,21 @@ def _printing(moulds: PatchMoulds, solid_mm3: float, units: Mapping[str, Procedu
     files = [f"{folder}/{plate}" for folder, unit in units.items() for plate in unit.printing.plates]
     return replace(
         sheet,
-        sizes=tuple(dict.fromkeys((*sheet.sizes, *(size for each in of_units for size in each.sizes)))),
+        sizes=tuple(_sizes(moulds.arranged, of_units)),
         plates=(*sheet.plates, *files),
         minutes=sheet.minutes + sum(each.minutes for each in of_units),
         cm3=sheet.cm3 + sum(each.cm3 for each in of_units),
         how=(*sheet.how, f"The units' moulds: {listed(files)}, as their casting.md says."),
     )
+
+
+def _sizes(array: Array, of_units: Sequence[Printing]) -> Iterator[Size]:
+    """Yield the lengths of each distinct unit's bought parts, with their paths in the array's file."""
+    for unit, own in zip(array.units, of_units, strict=True):
+        name = f"{unit.name}: " if len(of_units) > 1 else ""
+        for size in own.sizes:
+            keys = tuple(path + key for path in array.paths_of(unit) for key in size.keys)
+            yield replace(size, what=name + size.what, keys=keys)
 
 
 def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:

@@ -136,7 +136,7 @@ class Arrayed(Compound):
 
     @property
     def moulds(self) -> PatchMoulds:
-        return patch_moulds(self.of)
+        return patch_moulds(self.of, given=self.given)
 
     @property
     def text(self) -> str:
@@ -159,7 +159,8 @@ class Arrayed(Compound):
         moulds = self.moulds
         moulds.plan  # noqa: B018  # refuses before the long work begins
         units = {
-            folder: _unit(array, unit, only, check, store, progress) for folder, unit in unit_folders(array).items()
+            folder: _unit(array, unit, self.given, only, check, store, progress)
+            for folder, unit in unit_folders(array).items()
         }
         own: dict[str, bytes] = {Arrayed.file: to_toml(array).encode()}
         shared: dict[str, str] = {}
@@ -213,14 +214,30 @@ def unit_folders(array: Array) -> dict[str, Spec]:
     return named
 
 
-def _unit(array: Array, unit: Spec, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Product:
+def _unit(
+    array: Array,
+    unit: Spec,
+    given: frozenset[str],
+    only: Sequence[str],
+    check: bool,
+    store: Store,
+    progress: Progress,
+) -> Product:
     """Return a unit's own result; without moulds and casting if it is cast with the sheet."""
     apart = construction_of(array.construction, array.cast).own_tails
     wanted = [name for name in only if apart or name not in ("moulds", "casting")] or ["unit"]
     progress.prefix = "unit: "
-    product = Subject(unit).make(wanted, check, store, progress)
+    subject = Subject(unit)
+    subject.given = _given(array, unit, given)
+    product = subject.make(wanted, check, store, progress)
     progress.prefix = ""
     return product
+
+
+def _given(array: Array, unit: Spec, given: frozenset[str]) -> frozenset[str]:
+    """Return the paths of given values in a unit's own spec."""
+    paths = array.paths_of(unit)
+    return frozenset(key.removeprefix(path) for key in given for path in paths if key.startswith(path))
 
 
 def _patch(moulds: PatchMoulds, store: Store) -> tuple[list[PartRecord], dict[str, str]]:
@@ -270,14 +287,15 @@ def _procedure(moulds: PatchMoulds, shape: Geometry, units: dict[str, Product]) 
     """Return how the array is cast."""
     volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
     apart = unit_folders(moulds.arranged) if moulds.construction.own_tails else {}
-    of_units = {folder: _of_unit(unit, units[folder]) for folder, unit in apart.items()}
+    array, given = moulds.arranged, moulds.given
+    of_units = {folder: _of_unit(unit, units[folder], _given(array, unit, given)) for folder, unit in apart.items()}
     return array_procedure(moulds, volumes, printed_mm3(shape["parts"]), of_units)
 
 
-def _of_unit(unit: Spec, product: Product) -> Procedure:
+def _of_unit(unit: Spec, product: Product, given: frozenset[str]) -> Procedure:
     manifest = product.manifest
     volumes = [step["layer_volume_mm3"] for step in manifest["steps"]]
-    return unit_procedure(MouldSet(unit), volumes, printed_mm3(manifest["parts"]))
+    return unit_procedure(MouldSet(unit, given=given), volumes, printed_mm3(manifest["parts"]))
 
 
 def _material(moulds: PatchMoulds, step: int | None) -> str | None:

@@ -18,13 +18,12 @@ from unitcad.arrays.construction import construction_of
 from unitcad.arrays.crosstalk import BAND_HZ, crosstalk, crosstalk_lines, ratio_line, ratios
 from unitcad.arrays.crosstalk_maps import CROSSTALK
 from unitcad.casting.steps import casting_summary
-from unitcad.cli.build_summary import to_open
+from unitcad.cli.build_summary import assumed_line, to_open
 from unitcad.cli.output import console, print_json, progress
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.manifest import Manifest
-from unitcad.spec import assumed_lengths, said_of
-from unitcad.text import listed, number
+from unitcad.text import number
 from unitcad.validation import compound_kind
 
 
@@ -35,11 +34,8 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
     box = array.sheet.outline
     size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
     yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {number(array.sheet.thickness_mm, 3)} mm thick"
-    unit = array.units[0]
-    assumed = {key: how for key, how in assumed_lengths(unit).items() if f"unit.{key}" not in given}
-    if assumed:
-        lengths = listed(f"unit.{said_of(unit, key)} ({how})" for key, how in assumed.items())
-        yield f"measure first; assumed: {lengths}; build with yours: --set unit.{next(iter(assumed))}=MM"
+    for unit in array.units:
+        yield from assumed_line(unit, given, array.paths_of(unit)[0])
     if manifest["casting"]:
         told = {f"warning: {line}" for line in manifest["warnings"]}
         lines = casting_summary(json.loads((folder / "casting.json").read_bytes()))

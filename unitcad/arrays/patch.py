@@ -49,7 +49,7 @@ def patch_parts(array: Array) -> tuple[PatchPart, ...]:
     way = construction_of(array.construction, array.cast)
     shared = way.bodies(array)
     if way.own_tails:
-        shared = tuple(replace(body, name=SHEET, shape=moved(body.shape, z=array.sheet.low)) for body in shared)
+        shared = tuple(replace(body, name=SHEET, shape=_stretched(array, body.shape)) for body in shared)
     own = []
     for i, unit in enumerate(array.units):
         places = tuple(place for place in array.places if array.units.index(place.unit) == i)
@@ -71,6 +71,26 @@ def patch_bodies(array: Array) -> tuple[Body, ...]:
     return tuple(
         body for part in patch_parts(array) for body in (_at_places(array, part) if part.places else (part.body,))
     )
+
+
+def _stretched(array: Array, sheet: Shape) -> Shape:
+    """Return the sheet at its height with each pocket as wide as the unit in it, so that the hold is no overlap.
+
+    A turned unit's polygon is within the circle round the pocket's.
+    """
+    low, high, round_polygon = array.sheet.low, array.sheet.high, 1 / math.cos(math.pi / _segments(array))
+    pockets = [
+        moved(cylinder(place.reach * round_polygon, low - 1, high + 1), place.x, place.y) for place in array.places
+    ]
+    return cut(moved(sheet, z=low), pockets)
+
+
+def _segments(array: Array) -> int:
+    """Return the sides of every full turn: as fine as the largest round of units and corners needs."""
+    radius = max(array.sheet.corner_mm, *(unit.diameter_mm / 2 for unit in array.units))
+    if array.cast == "curved":
+        radius = max(radius, array.back_radius_mm)
+    return segment_count(radius + math.sqrt(radius), array.unit.output.tolerance_mm)
 
 
 def _at_places(array: Array, part: PatchPart) -> tuple[Body, ...]:
@@ -127,6 +147,11 @@ class PatchMoulds(MouldSet):
         """The silicone as it is cast."""
         return self.construction.bodies(self.arranged)
 
+    @property
+    def parts(self) -> tuple[str, Spec]:
+        """The array's own unit: those with several are cast apart."""
+        return "unit.", self.arranged.unit
+
     @cached_property
     def laid_later(self) -> tuple[Body, ...]:
         """The motors at their places and the common circuit, of units that are cast in one pour with the sheet."""
@@ -150,23 +175,13 @@ class PatchMoulds(MouldSet):
 
     @cached_property
     def together(self) -> tuple[tuple[str, tuple[Shape, ...]], ...]:
-        """The solids in the space of the patch, by name: of pockets the units, and the sheet stretched around them.
-
-        A pocket is stretched to its unit's radius: the hold is no overlap. A turned unit's polygon is within the circle
-        round the pocket's.
-        """
+        """The solids in the space of the patch, by name: of pockets the stretched sheet, and the units."""
         if not self.construction.own_tails:
             return super().together
-        array, round_polygon = self.arranged, 1 / math.cos(math.pi / self.segments)
-        (sheet,) = self.unit
-        high = array.sheet.thickness_mm
-        open_to = [
-            moved(cylinder(place.radius * round_polygon, -high, 2 * high), place.x, place.y) for place in array.places
-        ]
-        units: dict[str, list[Shape]] = {place.name: [] for place in array.places}
-        for body in self.pushed_in:
-            units[body.name.partition("-")[0]].append(body.shape)
-        return (SHEET, (cut(sheet.shape, open_to),)), *((name, tuple(shapes)) for name, shapes in units.items())
+        solids: dict[str, list[Shape]] = {}
+        for body in patch_bodies(self.arranged):
+            solids.setdefault(body.name.partition("-")[0], []).append(body.shape)
+        return tuple((name, tuple(shapes)) for name, shapes in solids.items())
 
     @cached_property
     def cast_flat(self) -> PatchMoulds | None:
@@ -252,13 +267,8 @@ class PatchMoulds(MouldSet):
 
     @cached_property
     def segments(self) -> int:
-        """Sides of every full turn: as fine as the largest round of units and corners needs."""
-
-        array = self.arranged
-        radius = max(array.sheet.corner_mm, *(unit.diameter_mm / 2 for unit in array.units))
-        if array.cast == "curved":
-            radius = max(radius, array.back_radius_mm)
-        return segment_count(radius + math.sqrt(radius), self.spec.output.tolerance_mm)
+        """Sides of every full turn."""
+        return _segments(self.arranged)
 
     @cached_property
     def rib_spaces(self) -> Manifold:
@@ -268,9 +278,9 @@ class PatchMoulds(MouldSet):
         return Manifold()
 
 
-def patch_moulds(array: Array, altered: Plan | None = None) -> PatchMoulds:
-    """Return the mould set of an array's sheet; `altered` replaces its plan: a set with a fault, for tests."""
-    return PatchMoulds(patch_spec(array), altered, array=array)
+def patch_moulds(array: Array, altered: Plan | None = None, given: frozenset[str] = frozenset()) -> PatchMoulds:
+    """Return the mould set of an array's sheet; `altered` and `given`: see `MouldSet`."""
+    return PatchMoulds(patch_spec(array), altered, given, array=array)
 
 
 def patch_spec(array: Array) -> Spec:

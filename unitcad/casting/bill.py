@@ -16,7 +16,7 @@ from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
 from unitcad.shape.column import extent
-from unitcad.spec import Spec, assumed_lengths, motor_of
+from unitcad.spec import Spec, motor_of
 from unitcad.text import cell, number
 
 SPARE_TONGUE = "spare-tongue"
@@ -120,7 +120,7 @@ def motor_name(spec: Spec) -> str:
 def _inside(moulds: MouldSet) -> Iterator[Item]:
     cells, spec = len(moulds.plan.layout.cells), moulds.spec
     note = f"{number(spec.motor.diameter_mm, 3)} x {number(spec.motor.thickness_mm, 3)} mm"
-    if any(key.startswith("motor.") for key in assumed_lengths(spec)):
+    if any(key.startswith("motor.") for key in moulds.assumed):
         note += " (assumed)"
     if motor := motor_of(spec):
         ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}

@@ -28,7 +28,7 @@ from unitcad.moulds.ribs import ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
 from unitcad.moulds.trapped_air import DENT, TILT_DEG
 from unitcad.shape.lettering import seen
-from unitcad.spec import MOTOR_SIZES, assumed_lengths, printer_of
+from unitcad.spec import MOTOR_SIZES, printer_of
 from unitcad.text import listed, number, spaced
 
 PERIMETERS = 3
@@ -62,10 +62,10 @@ def _has_foot(moulds: MouldSet) -> bool:
 
 @dataclass(frozen=True)
 class Size:
-    """A length to measure before printing: its name and key, as drawn in mm, and the assumption about it."""
+    """A length to measure before printing: its name, its paths in the source, mm as drawn, the assumption about it."""
 
     what: str
-    key: str
+    keys: tuple[str, ...]
     value_mm: float
     assumed: str = ""
 
@@ -145,7 +145,8 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
 
 def sizes(moulds: MouldSet) -> tuple[Size, ...]:
     """Return the lengths of bought parts that the tools are drawn for."""
-    spec, assumed = moulds.spec, assumed_lengths(moulds.spec)
+    path, spec = moulds.parts
+    assumed = moulds.assumed
     lengths = {} if spec.motor.absent else {f"motor.{size}": getattr(spec.motor, size) for size in MOTOR_SIZES}
     if spec.fpcb:
         lengths["fpcb.thickness_mm"] = spec.fpcb.thickness_mm
@@ -158,7 +159,7 @@ def sizes(moulds: MouldSet) -> tuple[Size, ...]:
     for key, value in lengths.items():
         table, _, name = key.partition(".")
         what = f"{words.get(table, table)}{'' if table == 'moulds' else f' {name[:-3]}'}"
-        found.append(Size(what, key, value, assumed.get(key, "")))
+        found.append(Size(what, (path + key,), value, assumed.get(key, "")))
     return tuple(found)
 
 

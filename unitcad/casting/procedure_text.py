@@ -135,13 +135,10 @@ def _measuring(procedure: Procedure) -> Iterator[str]:
         f"- {size.what}: {number(size.value_mm, 3)} mm{f' (assumed; {size.assumed})' if size.assumed else ''}"
         for size in printing.sizes
     )
-    again = f"put your figures into {printing.source} and build it again"
-    if procedure.makes == "unit":
-        again = "build again here with your figures"
-    yield f"\nIf calipers differ by more than {number(MEASURED_MM, 2)} mm, {again} before you print."
-    if procedure.makes == "unit":
-        sets = " ".join(f"--set {size.key}={number(size.value_mm, 3)}" for size in printing.sizes)
-        yield f"\n```sh\nunitcad build {printing.source} {sets}\n```"
+    differ = f"If calipers differ by more than {number(MEASURED_MM, 2)} mm"
+    yield f"\n{differ}, build again here with your figures before you print."
+    sets = " ".join(f"--set {key}={number(size.value_mm, 3)}" for size in printing.sizes for key in size.keys)
+    yield f"\n```sh\nunitcad build {printing.source} {sets}\n```"
 
 
 def _listed_items(items: Iterable[Item]) -> Iterator[str]:

@@ -119,9 +119,9 @@ def _built(
         check_slicing(spec.unit, chosen)
     results: list[Built] = []
     printing: list[str] = []
-    for spec in wanted:
+    for spec, known in zip(wanted, given, strict=True):
         with progress(spec.name) as say:
-            result = build_subject(spec.of, out, only=chosen, check=not no_check, say=say)
+            result = build_subject(spec.of, out, only=chosen, check=not no_check, say=say, given=known)
             if slicing:
                 say("slicing")
                 printing.append(slice_tools(spec.unit, result.folder, result.manifest, say))
@@ -143,13 +143,14 @@ def _built(
     return all(result.ok for result in results)
 
 
-def _given(source: str, changes: list[str]) -> set[str]:
-    """Return the paths of the numbers that a person gave, by --set or in a file that is no template."""
-    own = {} if source in every_template() else read_toml(Path(source))
-    return {change.partition("=")[0].strip() for change in changes} | {path for path, _ in numbers(own)}
+def _given(source: str, changes: list[str]) -> frozenset[str]:
+    """Return the paths of the numbers that a person gave, by --set or in a file that is no template and no result's."""
+    shipped = source in every_template() or (Path(source).parent / "manifest.json").exists()
+    own = {} if shipped else read_toml(Path(source))
+    return frozenset({change.partition("=")[0].strip() for change in changes} | {path for path, _ in numbers(own)})
 
 
-def _summary(of: Subject, built: Built, given: set[str]) -> Iterator[str]:
+def _summary(of: Subject, built: Built, given: frozenset[str]) -> Iterator[str]:
     """Return the lines of a result; `given`: see `_given`."""
     if isinstance(of, Compound):
         return of.summary(built.folder, built.manifest, given)

@@ -32,10 +32,7 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
         cells = json.loads((built.folder / "casting.json").read_bytes())["cells"] if manifest["casting"] else 1
         each = f"{cells} units, each " if cells > 1 else ""
         yield f"{each}{_across(spec, manifest['parts'])} mm across, {high} mm high{circuit}{silicone}"
-    assumed = {key: how for key, how in assumed_lengths(spec).items() if key not in given}
-    if assumed:
-        lengths = (f"{said_of(spec, key)} ({how})" for key, how in assumed.items())
-        yield f"measure first; assumed: {listed(lengths)}"
+    yield from assumed_line(spec, given)
     if manifest["casting"]:
         yield from casting_summary(json.loads((built.folder / "casting.json").read_bytes()))
     checks, check = manifest["mould_checks"], manifest["check"]
@@ -46,6 +43,15 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
     if level := manifest["estimate"]:
         yield from level["lines"]
     yield from to_open(built.folder)
+
+
+def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:
+    """Yield a line of the lengths that nobody measured, if there are any; `path`: of the spec in its file."""
+    assumed = {key: how for key, how in assumed_lengths(spec).items() if path + key not in given}
+    if assumed:
+        lengths = listed(f"{path}{said_of(spec, key)} ({how})" for key, how in assumed.items())
+        yours = f"; build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
+        yield f"measure first; assumed: {lengths}{yours}"
 
 
 def to_open(folder: Path) -> Iterator[str]:

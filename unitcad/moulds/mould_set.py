@@ -24,7 +24,7 @@ from unitcad.moulds.surroundings import Surroundings, surroundings
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
 from unitcad.shape.profile import FACETS
-from unitcad.spec import Spec, from_json, to_json, with_formats
+from unitcad.spec import Spec, assumed_lengths, from_json, to_json, with_formats
 from unitcad.spec.custom_code import is_body_file
 from unitcad.spec.raw import CastingTable
 from unitcad.spec.resolved import Estimate
@@ -72,11 +72,13 @@ def forget() -> None:
 class MouldSet:
     """A spec's unit and moulds. Lengths in mm, as assembled, z = 0 at the skin.
 
-    `altered` replaces the spec's own plan: a set with a fault, for tests.
+    `altered` replaces the spec's own plan: a set with a fault, for tests. `given`: the paths of the values that a
+    person gave, in the file `source`; they count as measured.
     """
 
     spec: Spec
     altered: Plan | None = None
+    given: frozenset[str] = frozenset()
     _kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
     _meshes: dict[Shape, Manifold] = field(default_factory=dict, init=False, repr=False)
 
@@ -105,6 +107,17 @@ class MouldSet:
     def unit(self) -> tuple[Body, ...]:
         """The bodies of the unit."""
         return unit_bodies(self.spec) if self.blank is self else self.blank.unit
+
+    @property
+    def parts(self) -> tuple[str, Spec]:
+        """The spec of the unit that the bought parts are for, and its path in the file `source`."""
+        return "", self.spec
+
+    @property
+    def assumed(self) -> dict[str, str]:
+        """The assumption about each length of these parts that nobody has measured, by its key."""
+        path, spec = self.parts
+        return assumed_lengths(spec, {key.removeprefix(path) for key in self.given})
 
     @cached_property
     def laid_later(self) -> tuple[Body, ...]:

@@ -107,6 +107,8 @@ class Subject:
     """A spec as the source of a result; `subjects.Compound` is the same for several units."""
 
     kind, file = "spec", "spec.toml"
+    given: frozenset[str] = frozenset()
+    """The paths of the values that a person gave: lengths among them count as measured."""
 
     def __init__(self, spec: Spec) -> None:
         self.of: Any = spec
@@ -153,7 +155,7 @@ class Subject:
         Raises Refusal if the moulds can't be made, Unfinished if a check lacks memory or time.
         """
         spec, outputs = self.unit, possible_outputs(self.unit, only)
-        moulds = MouldSet(spec)
+        moulds = MouldSet(spec, given=self.given)
         if {"moulds", "casting"} & set(outputs):
             moulds.plan  # noqa: B018  # refuses before the long work begins
         own: dict[str, bytes] = {"spec.toml": to_toml(spec).encode()}

@@ -6,6 +6,7 @@ Files that depend only on the geometry are shared by all variants of it, under a
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -98,10 +99,10 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
             spared = next((body.name for body in plate if body.kind == "tongue"), "")
             names = tuple(spared if body.name == SPARE_TONGUE else body.name for body in plate)
             yield Planned(path, make, key, form="3mf", bodies=names)
-        make, key = partial(glb_content, moulds, every), partial(joint_key, moulds, every, "glb")
-        yield Planned(f"{together}.glb", make, key, form="glb", bodies=names)
         solids = [body.in_file for body in every]
         solids = side_by_side(solids) if group.name == "moulds" else solids
+        make, key = partial(glb_content, moulds, solids), partial(joint_key, moulds, solids, "glb")
+        yield Planned(f"{together}.glb", make, key, form="glb", bodies=names)
         yield step_file(f"{together}.step", moulds, solids, group.name)
     if "unit" in only:
         yield _drawn(moulds, "section.svg", partial(unit_section, moulds), "section")
@@ -286,22 +287,21 @@ def unit_section(moulds: MouldSet) -> str:
 
 
 def side_by_side(bodies: Sequence[Body]) -> list[Body]:
-    """Return pieces of tooling, those of each later pour and further bases and trays next to the first pour's.
+    """Return pieces of tooling in a row along x, first the first: the pieces of a cut tool, or all tongues, together.
 
-    As assembled, the cups of two pours would be in one place.
+    As assembled, the cups of two pours would be in one place, and ribs press into the base.
     """
-    columns, first = [], True
-    last = max((body.step or 1 for body in bodies), default=1)
+    groups: dict[str, list[Body]] = {}
     for body in bodies:
-        column = (body.step or 1) - 1
-        if body.kind in ("base", "tray"):
-            column, first, last = (0, False, last) if first else (last, False, last + 1)
-        columns.append(column)
-    boxes = [extent(body.shape) for body in bodies]
-    pitch = max((box[3] for box in boxes), default=0.0) - min((box[0] for box in boxes), default=0.0) + GAP
-    return [
-        replace(body, shape=moved(body.shape, x=column * pitch)) for body, column in zip(bodies, columns, strict=True)
-    ]
+        several = body.kind in ("tongue", "stub")
+        groups.setdefault(f"{body.kind}{body.step}" if several else body.name.partition("-")[0], []).append(body)
+    placed, end = dict[str, Body](), -math.inf
+    for group in groups.values():
+        boxes = [extent(body.shape) for body in group]
+        x = max(0.0, end + GAP - min(box[0] for box in boxes))
+        end = x + max(box[3] for box in boxes)
+        placed |= {body.name: replace(body, shape=moved(body.shape, x=x)) for body in group}
+    return [placed[body.name] for body in bodies]
 
 
 def step_file(path: str, moulds: MouldSet, bodies: Sequence[Body], name: str) -> Planned:

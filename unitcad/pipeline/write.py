@@ -64,11 +64,12 @@ def build(
     check: bool = True,
     say: Callable[[str], object] = lambda stage: None,
     store: Store | None = None,
+    given: frozenset[str] = frozenset(),
 ) -> Built:
     """Build a spec, or the loaded object of a room, into `out`/<slug>-<hash12>.
 
     `only` is a choice of OUTPUTS; without `check` mould checks and mesh checks are skipped. Formats and outputs that
-    the folder has from before are made again. `say` gets the name of each stage.
+    the folder has from before are made again. `say` gets the name of each stage. `given`: see `Subject`.
     Raises Refusal or UnitcadError before anything is written; a failed check is no exception, see `Built.ok`.
     """
     wanted = subject(of)
@@ -82,7 +83,9 @@ def build(
         formats: tuple[Format, ...] = tuple(form for form in FORMATS if form in (*there.formats, *wanted.formats))
         every, checked = checked_outputs((*outputs, *there.outputs)), check or there.checked
         with contextlib.suppress(_Changed):  # another build has put a result there: its outputs are made too
-            maker = partial(wanted.with_formats(formats).make, every, checked)
+            making = wanted.with_formats(formats)
+            making.given = given
+            maker = partial(making.make, every, checked)
             return write(folder, maker, store, say, unchanged=lambda there=there: earlier(folder, wanted) == there)
 
 

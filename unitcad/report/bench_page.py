@@ -82,7 +82,7 @@ class ListedSize(msgspec.Struct):
     """A length to measure before printing."""
 
     what: str
-    key: str
+    keys: list[str]
     value_mm: float
     assumed: str
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from functools import lru_cache
 
 from msgspec import structs
@@ -37,8 +38,8 @@ def motor_of(spec: Spec) -> catalogue.Motor | None:
     return None
 
 
-def assumed_lengths(spec: Spec) -> dict[str, str]:
-    """Return the assumption about each length that nobody has measured, by its key."""
+def assumed_lengths(spec: Spec, given: Container[str] = ()) -> dict[str, str]:
+    """Return the assumption about each length that nobody has measured, by its key, but for those `given`."""
     motor = motor_of(spec)
     sizes = [(size, getattr(motor, size)) for size in MOTOR_SIZES] if motor else []
     found = {
@@ -51,7 +52,7 @@ def assumed_lengths(spec: Spec) -> dict[str, str]:
         found[key] += f": up to {number(proud, 2)} mm out of the skin's plane"
     if spec.fpcb and spec.fpcb.thickness_mm == FpcbTable().thickness_mm:
         found["fpcb.thickness_mm"] = "usual stock"
-    return found
+    return {key: how for key, how in found.items() if key not in given}
 
 
 def said_of(spec: Spec, key: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from unitcad.arrays.array import Array, Box, Sheet
+from unitcad.arrays.array import OFF_ROUND, Array, Box, Sheet
 from unitcad.arrays.construction import Construction, Level
 from unitcad.arrays.limb import bent_stretches
 from unitcad.arrays.piece_seams import (
@@ -138,8 +138,6 @@ def _seams(array: Array, outer: Box) -> tuple[Seam, ...]:
 
 LEAST_WEB = 2.0
 """Silicone between two pockets, at least, mm (assumed): a narrower strip tears as a unit is pushed in."""
-OFF_ROUND = 0.05
-"""Largest distance of a unit's outline from its disc, mm (assumed): a quarter of the usual hold."""
 
 
 def apart(unit: Spec) -> tuple[float, str]:

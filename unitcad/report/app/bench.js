@@ -190,19 +190,18 @@
   // Step 0: the lengths of bought parts, and the command that builds with those that were measured.
   function first() {
     const { sizes, source } = data.casting.printing;
-    const command = el("code", {});
+    const command = el("code", {}), now = (size) => value(size.keys[0], "mm") || size.value_mm;
     const draw = () => {
-      const off = sizes.filter((size) => Math.abs((value(size.key, "mm") || size.value_mm) - size.value_mm) > data.measured_mm);
-      const sets = (list) => list.map((size) => ` --set ${size.key}=${number(value(size.key, "mm") || size.value_mm, 4)}`).join("");
+      const off = sizes.filter((size) => Math.abs(now(size) - size.value_mm) > data.measured_mm);
+      const sets = (list) => list.flatMap((size) => size.keys.map((key) => ` --set ${key}=${number(now(size), 4)}`)).join("");
       clear(said, off.length > 0 && `${off.map((size) => size.what).join(", ")} differ${off.length > 1 ? "" : "s"}: build again in this folder before you print.`);
       command.textContent = `unitcad build ${source}${sets(off.length ? off : sizes)}`;
     };
     const said = el("p", { className: "verdict bad", role: "status" });
-    const rows = sizes.map((size) => field(size.key, `${size.what}: ${number(size.value_mm, 3)} mm${size.assumed ? ` (assumed; ${size.assumed})` : ""}`, "mm", "mm"));
-    const single = data.casting.makes === "unit";
+    const rows = sizes.map((size) => field(size.keys[0], `${size.what}: ${number(size.value_mm, 3)} mm${size.assumed ? ` (assumed; ${size.assumed})` : ""}`, "mm", "mm"));
     const paper = sizes.map((size) => `${size.what} ${number(size.value_mm, 3)} mm${size.assumed ? " (assumed)" : ""}: ______ mm`).join("; ");
     const node = section("first", "0. Measure first", el("div", { className: "fields", oninput: draw }, rows), el("p", { className: "paper" }, paper), said,
-      el("p", {}, `A size that differs by more than ${data.measured_mm} mm needs other moulds: `, single ? command : `put it into ${source} and build again.`));
+      el("p", {}, `A size that differs by more than ${data.measured_mm} mm needs other moulds: `, command));
     draw();
     return node;
   }
