@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation import HalfSpace, KelvinVoigt, LayeredMedium, UniformDisc
-from unitcad.attenuation.crosstalk import decay
+from unitcad.attenuation.curve import decay
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import components
 from unitcad.attenuation.layered.response import MOST_SOLVED

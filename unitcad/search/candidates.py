@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import structs
 
 from unitcad import catalogue
-from unitcad.attenuation.crosstalk import crosstalk_ratio
+from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.edge import nearest
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.ranges import Predictive, lead_of

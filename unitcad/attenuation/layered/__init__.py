@@ -11,7 +11,7 @@ from unitcad.attenuation.layered.medium import (
     complex_shear_modulus,
     compressibility,
 )
-from unitcad.attenuation.layered.response import LayeredMedium, Response, components, responses
+from unitcad.attenuation.layered.response import LayeredMedium, Response, components
 
 __all__ = [
     "Damping",
@@ -29,5 +29,4 @@ __all__ = [
     "complex_shear_modulus",
     "components",
     "compressibility",
-    "responses",
 ]

@@ -25,13 +25,12 @@ up to 300 Hz.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.layered.integral import Body, Integrals, Problem, integrate, overflow
+from unitcad.attenuation.layered.integral import Integrals, Problem, integrate, overflow
 from unitcad.attenuation.layered.loads import Load, UniformDisc
 from unitcad.attenuation.layered.medium import LEAST, MOST, Stack, finite, out_of_range
 from unitcad.attenuation.layered.propagation import Array
@@ -91,80 +90,6 @@ class Response:
     def largest(self) -> float:
         """The largest |u| of a component."""
         return float(max(np.max(np.abs(u)) for u in (self.u_r, self.u_theta, self.u_z)))
-
-
-def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
-    """Return the displacement of `medium` under `load` at radii r (m, any shape), a depth z (m) and omega (rad/s).
-
-    rtol: wanted error over the largest |u| of all radii, 1e-12 to 0.1. Raises `Refusal` for invalid values, and
-    for r = 0 under a surface point load, `UnitcadError` if no finite answer was found. If rtol can't be reached
-    the errors say so.
-    """
-    return responses([(medium, omega)], [load], r, z, rtol)[0][0]
-
-
-def responses(
-    bodies: Sequence[tuple[Stack, float]], loads: Sequence[Load], r: Any, z: float = 0.0, rtol: float = 1e-6
-) -> list[list[Response]]:
-    """Return the displacements of each body (a medium and its omega) under each of the loads, as `respond` does.
-
-    The loads differ in their directions only, and none is radial if one is not. They share one kernel, and bodies that
-    are alike one path: each that does not reach rtol on it, beside its own largest |u|, is solved by itself. Raises as
-    `respond`.
-    """
-    for load in loads:
-        if not isinstance(load, Load):
-            raise Refusal("load", str(load), "must be a Point or a UniformDisc")
-    if len({(load.reach, load.direction == "radial") for load in loads}) > 1:
-        raise Refusal("loads", str(loads), "must differ in their directions only, all radial or none")
-    radii = _radii(r)
-    z, rtol = finite("z", z), finite("rtol", rtol, above=True)
-    if not 1e-12 <= rtol <= 0.1:
-        raise Refusal("rtol", rtol, "must be from 1e-12 to 0.1", min(max(rtol, 1e-12), 0.1))
-    if loads[0].reach == 0.0 and z == 0.0 and np.any(radii == 0.0):
-        raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
-    # A layer of no thickness changes nothing, so its waves must not set the path.
-    solved = [Body(medium.without_empty_layers(), omega) for medium, omega in bodies]
-    if len(solved) * len(loads) == 1:
-        return _on_one_path(solved, loads, radii, z, rtol)
-    shared = _on_one_path(solved, loads, radii, z, max(rtol / _CLOSER, 1e-12)) if all(map(_damped, solved)) else None
-    return [
-        [
-            shared[i][j]
-            if shared and shared[i][j].error <= rtol * shared[i][j].largest
-            else _on_one_path([body], [load], radii, z, rtol)[0][0]
-            for j, load in enumerate(loads)
-        ]
-        for i, body in enumerate(solved)
-    ]
-
-
-def _damped(body: Body) -> bool:
-    """Return whether no pole of a body lies on the path."""
-    return all(material.shear.imag > 0 or material.shear == 0 for material in body.medium.materials(body.omega))
-
-
-def _on_one_path(
-    bodies: Sequence[Body], loads: Sequence[Load], radii: Array, z: float, rtol: float
-) -> list[list[Response]]:
-    """Return the displacement of each body under each load, rtol being over the largest of all."""
-    flat = radii.ravel()
-    end = max(body.medium.last_pole(body.omega) for body in bodies)
-    _check_size(end, float(flat.max()) + loads[0].reach + 2.0 * z, max(body.omega for body in bodies))
-    sideways = any(load.direction == "tangential" for load in loads)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # values that are no numbers are refused below
-        # Each component is made of at most two rows, and one of them is at least as large as each row.
-        problem = Problem(tuple(bodies), tuple(loads), flat, z)
-        integrals = _solve(problem, end, rtol / 2.0 if sideways else rtol)
-    if not (np.isfinite(integrals.total).all() and np.isfinite(integrals.error).all()):
-        raise overflow(bodies[0].omega)
-    found, first = list[Response](), 0
-    for load in [*loads] * len(bodies):
-        rows = slice(first, first + len(load.orders))
-        total, error = (part[rows].reshape(-1, *radii.shape) for part in (integrals.total, integrals.error))
-        found.append(_of_rows(load, total, error, integrals.wavenumbers))
-        first = rows.stop
-    return [found[first : first + len(loads)] for first in range(0, len(found), len(loads))]
 
 
 def _of_rows(load: Load, rows: Array, errors: np.ndarray, wavenumbers: int) -> Response:
@@ -299,7 +224,26 @@ class LayeredMedium(Stack):
         >>> bool(abs(static.u_z.real - 1 / (4 * 3.141592653589793 * 1e3)) < 1e-9)  # 1 / (4 pi mu r)
         True
         """
-        return respond(self, load, omega, r, z, rtol)
+        if not isinstance(load, Load):
+            raise Refusal("load", str(load), "must be a Point or a UniformDisc")
+        radii = _radii(r)
+        z, rtol = finite("z", z), finite("rtol", rtol, above=True)
+        if not 1e-12 <= rtol <= 0.1:
+            raise Refusal("rtol", rtol, "must be from 1e-12 to 0.1", min(max(rtol, 1e-12), 0.1))
+        if load.reach == 0.0 and z == 0.0 and np.any(radii == 0.0):
+            raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
+        # A layer of no thickness changes nothing, so its waves must not set the path.
+        medium, flat = self.without_empty_layers(), radii.ravel()
+        end = medium.last_pole(omega)
+        _check_size(end, float(flat.max()) + load.reach + 2.0 * z, omega)
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what is no number is refused below
+            # Each component is made of at most two rows, and one of them is at least as large as each row.
+            sideways = load.direction == "tangential"
+            found = _solve(Problem(medium, omega, load, flat, z), end, rtol / 2.0 if sideways else rtol)
+        if not (np.isfinite(found.total).all() and np.isfinite(found.error).all()):
+            raise overflow(omega)
+        total, error = (part.reshape(-1, *radii.shape) for part in (found.total, found.error))
+        return _of_rows(load, total, error, found.wavenumbers)
 
 
 MOST_SOLVED = 400
