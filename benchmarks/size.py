@@ -16,8 +16,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (541_300, 401, 67_500),
-    "core": (268_100, 220, 34_500),
+    "total": (540_700, 384, 67_300),
+    "core": (267_500, 203, 34_300),
     "tests": (407_000, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""

@@ -14,7 +14,7 @@ from benchmarks.accuracy.pages import markdown
 from benchmarks.accuracy.result import Plot, Result
 from unitcad.attenuation.curve import NO_RATIO
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.estimate_summary import summary
+from unitcad.attenuation.edge.estimates import summary
 from unitcad.attenuation.edge.level import corners
 from unitcad.attenuation.edge.models import edge_levels
 from unitcad.cli import app

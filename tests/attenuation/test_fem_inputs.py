@@ -6,9 +6,8 @@ import pytest
 
 pytest.importorskip("skfem")
 
-from unitcad.attenuation.edge.inputs_seen import changed, inputs_seen
-from unitcad.attenuation.fem.motor_level import level
-from unitcad.attenuation.fem.sensitivities import STEP, fem_inputs
+from unitcad.attenuation.edge.level import changed, inputs_seen
+from unitcad.attenuation.fem.unit import STEP, fem_inputs, level
 from unitcad.estimating import estimate_input
 from unitcad.validation import load
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.curve import layered_block
-from unitcad.attenuation.edge.inputs_seen import changed, inputs_seen
-from unitcad.attenuation.edge.level import nominal, stacked
+from unitcad.attenuation.edge.level import changed, inputs_seen, nominal, stacked
 from unitcad.attenuation.edge.models import MODELS, edge_levels, stored
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.validation import load

@@ -10,10 +10,10 @@ from msgspec.structs import replace
 from scipy import special
 
 from unitcad.attenuation.edge import closed_form as cf
-from unitcad.attenuation.edge.inputs_seen import inputs_seen
+from unitcad.attenuation.edge.level import inputs_seen
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
+from unitcad.attenuation.layered import LayeredMedium, Response, components
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.response import LayeredMedium, Response, components
 
 EDGE_TO_MM = 30
 NO_RATIO = (

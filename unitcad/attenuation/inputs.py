@@ -8,8 +8,8 @@ from typing import Literal
 import msgspec
 import numpy as np
 
+from unitcad.attenuation.layered import LayeredMedium
 from unitcad.attenuation.layered.medium import HalfSpace, KelvinVoigt, Layer, LossFactor
-from unitcad.attenuation.layered.response import LayeredMedium
 
 Drive = Literal["flat", "axial"]
 

@@ -11,7 +11,7 @@ from unitcad.spec import convert
 from unitcad.spec.raw import EstimateTable
 
 if TYPE_CHECKING:
-    from unitcad.attenuation.edge.lab_fit import LabFit
+    from unitcad.attenuation.edge.ranges import LabFit
 
 FIELD = "estimate.fit"
 
@@ -30,7 +30,7 @@ def check_fit(table: EstimateTable) -> None:
 @lru_cache(maxsize=16)
 def lab_fit(text: str) -> LabFit:
     """Return the fit of a lab-fit.toml's text. Raises Refusal, at `estimate.fit`, for the first fault."""
-    from unitcad.attenuation.edge.lab_fit import LabFit, fault
+    from unitcad.attenuation.edge.ranges import LabFit, fault
 
     try:
         fit = convert(tomllib.loads(text), LabFit)
