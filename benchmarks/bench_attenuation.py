@@ -17,7 +17,7 @@ from benchmarks.accuracy.hankel_peers import adaptive
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.crosstalk import Decays, crosstalk
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.crosstalk import decay
+from unitcad.attenuation.curve import decay
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.models import MODELS, edge_levels
 from unitcad.attenuation.inputs import EstimateInput, TissueLayer, body

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.accuracy.fem_search import as_data, drawn_levels, unit_levels
-from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.measured import measured_table
 
 FILE = Path(__file__).parent / "fem.json"
 SEED, DRAWS, FINENESS = 1, 256, 1.0

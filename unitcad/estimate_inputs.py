@@ -10,8 +10,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded, rounded_layered
-from unitcad.attenuation.edge.lab_fit import LabFit
-from unitcad.attenuation.edge.variant_units import merged
+from unitcad.attenuation.edge.measured import merged
+from unitcad.attenuation.edge.ranges import LabFit
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered import FractionalKelvinVoigt
 from unitcad.attenuation.receivers import neighbours_block
@@ -45,8 +45,7 @@ def estimate_spec(
     if "fit" in data:
         data["fit"] = {**_fit_file(spec), **data["fit"]}
     if FEM in asked:
-        from unitcad.attenuation.fem.prior_range import range_block
-        from unitcad.attenuation.fem.sensitivities import fem_sensitivities
+        from unitcad.attenuation.fem.unit import fem_sensitivities, range_block
 
         block = range_block(variant, say=say)
         data[FEM] = rounded({**block, "sensitivities": fem_sensitivities(variant, say)})

@@ -16,10 +16,19 @@ from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Cell, Plot, Promise, Result, Say, Summary, Table, stars
 from benchmarks.accuracy.unexplained import NineLevels, unexplained
 from unitcad.accuracy.timing import Timing, interleaved, timing
-from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable, measured_table
-from unitcad.attenuation.edge.models import COMPARED, MODELS, assessments, edge_levels, in_order, stored
-from unitcad.attenuation.edge.scores import Assessment, Fit, assess
-from unitcad.attenuation.fem.motor_level import Setting, amplitude, motion, pressed_skin
+from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable, measured_table
+from unitcad.attenuation.edge.models import (
+    COMPARED,
+    MODELS,
+    Assessment,
+    Fit,
+    assess,
+    assessments,
+    edge_levels,
+    in_order,
+    stored,
+)
+from unitcad.attenuation.fem.unit import Setting, amplitude, motion, pressed_skin
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements

@@ -14,9 +14,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
-from unitcad.attenuation.fem.motor_level import Drive, Reading, Setting, amplitude, motion
-from unitcad.attenuation.fem.unknowns import Draw, drawn
+from unitcad.attenuation.edge.measured import CONTROL, measured_table
+from unitcad.attenuation.fem.unit import Draw, Drive, Reading, Setting, amplitude, drawn, motion
 from unitcad.catalogue import measurements
 from unitcad.designs import shipped
 from unitcad.estimate_inputs import estimate_input

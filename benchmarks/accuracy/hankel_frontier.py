@@ -97,8 +97,7 @@ def table(name: str, own: Sequence[Best], other: Sequence[Best], repeats: int) -
         tuple(rows),
         f"True errors. FFTLog has the fewest of {len(_POINTS)} numbers of points with which one of "
         f"{len(_FIRST) * len(_LAST) * len(_BIASES)} ranges and biases reaches the error. It knows the answer, and "
-        f"returns only u_z, without a bound. The aim is at most {AIM:g} at every error. unitcad keeps the "
-        "Bessel functions of the last paths and radii; at new radii it works them out.",
+        f"returns only u_z, without a bound. The aim is at most {AIM:g} at every error.",
     )
 
 

@@ -8,20 +8,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.accuracy.result import Promise, Table
-from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
+from unitcad.attenuation.edge.measured import MeasuredTable, measured_table
 from unitcad.attenuation.edge.models import (
     BASELINE,
     COMPARED,
+    RANGE_HOLDS,
     RULE,
+    Fit,
+    assess,
     assessments,
+    bootstrap_range,
     choice,
     classes_out,
     forms,
     in_order,
+    left_out_errors,
     pairwise,
     rules,
+    sign_flip_p,
 )
-from unitcad.attenuation.edge.scores import RANGE_HOLDS, Fit, assess, bootstrap_range, left_out_errors, sign_flip_p
 
 LEVEL = 0.05
 """Of a test: two models are told apart at or below it."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
-from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
+from unitcad.attenuation.edge.measured import MeasuredTable, measured_table
 from unitcad.attenuation.edge.models import BASELINE, COMPARED, RULE
 from unitcad.attenuation.edge.ranges import Predictive, lead_on
 

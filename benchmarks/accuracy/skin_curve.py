@@ -13,10 +13,9 @@ from msgspec.structs import replace
 from benchmarks.accuracy.fem_search import unit_spec
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
-from unitcad.attenuation.crosstalk import CONTACT_MM, contact, decay, ends
-from unitcad.attenuation.fem.harmonic_response import Contact
-from unitcad.attenuation.fem.motor_level import unit_fields
-from unitcad.attenuation.fem.unknowns import Draw, Setting, drawn
+from unitcad.attenuation.curve import CONTACT_MM, contact, decay, ends
+from unitcad.attenuation.fem.elements import Contact
+from unitcad.attenuation.fem.unit import Draw, Setting, drawn, unit_fields
 from unitcad.attenuation.inputs import Drive, EstimateInput, body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements

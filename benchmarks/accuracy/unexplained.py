@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.attenuation.edge.closed_form import wave_speed
-from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable
-from unitcad.attenuation.edge.scores import Assessment
+from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable
+from unitcad.attenuation.edge.models import Assessment
 from unitcad.catalogue import measurements
 
 

@@ -11,8 +11,7 @@ from benchmarks.accuracy.fem_search import DRIVES, READINGS, drawn_levels, searc
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, interleaved
-from unitcad.attenuation.fem.motor_level import Drive, Setting, amplitude, motion, pressed_skin
-from unitcad.attenuation.fem.unknowns import Draw, drawn
+from unitcad.attenuation.fem.unit import Draw, Drive, Setting, amplitude, drawn, motion, pressed_skin
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements

@@ -17,9 +17,8 @@ from unitcad.accuracy.meshes import mesh_rows, tolerances_of
 from unitcad.accuracy.responses import COMPONENTS, REFERENCE, RTOLS, compare, respond, response_rows
 from unitcad.accuracy.skipped import skipped_rows
 from unitcad.attenuation.inputs import Quantity, body
-from unitcad.attenuation.layered import LayeredMedium
+from unitcad.attenuation.layered import LayeredMedium, Response
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.response import Response
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input

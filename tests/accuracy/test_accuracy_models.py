@@ -8,9 +8,8 @@ import pytest
 
 from benchmarks.accuracy.level_scores import simulated
 from benchmarks.accuracy.unexplained import NineLevels, unexplained
-from unitcad.attenuation.edge.measured_levels import measured_table
-from unitcad.attenuation.edge.models import assessments
-from unitcad.attenuation.edge.scores import RANGE_HOLDS
+from unitcad.attenuation.edge.measured import measured_table
+from unitcad.attenuation.edge.models import RANGE_HOLDS, assessments
 
 NAMES = measured_table().names
 

@@ -14,8 +14,8 @@ from benchmarks.accuracy.fem_search import (
     unit_levels,
     unit_spec,
 )
-from unitcad.attenuation.edge.measured_levels import measured_table
-from unitcad.attenuation.fem.motor_level import level
+from unitcad.attenuation.edge.measured import measured_table
+from unitcad.attenuation.fem.unit import level
 from unitcad.estimate_inputs import estimate_input
 
 MEASURED = measured_table().levels

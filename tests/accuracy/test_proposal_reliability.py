@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import beta
 
 from benchmarks.accuracy import proposal_reliability as suite
-from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.ranges import held
 
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy import skin_curve as suite
-from unitcad.attenuation.crosstalk import CONTACT, CONTACT_MM, contact, crosstalk_ratio
-from unitcad.attenuation.curve import layered_block
+from unitcad.attenuation.curve import CONTACT, CONTACT_MM, contact, crosstalk_ratio, layered_block
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.estimate_inputs import estimate_input

@@ -15,7 +15,7 @@ from unitcad.arrays.circuit.outline import outline
 from unitcad.arrays.crosstalk import MOST_LOADED, crosstalk, crosstalk_csv, crosstalk_lines, pairs
 from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
 from unitcad.attenuation import UniformDisc
-from unitcad.attenuation.crosstalk import crosstalk_ratio
+from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.receivers import neighbours_block
 from unitcad.errors import Refusal

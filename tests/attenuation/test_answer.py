@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 from typer.testing import CliRunner
 
-from unitcad.attenuation.edge.answer import percent
+from unitcad.attenuation.edge.estimates import percent
 from unitcad.attenuation.edge.models import assessments, stored
 from unitcad.cli import app
 from unitcad.estimate_inputs import estimate_spec

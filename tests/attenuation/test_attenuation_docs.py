@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.models import BASELINE, RULE, assessments, choice, classes_out, in_order, pairwise
 from unitcad.attenuation.edge.ranges import held
 from unitcad.text import number

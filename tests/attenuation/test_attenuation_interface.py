@@ -15,7 +15,7 @@ import pytest
 
 import unitcad
 from unitcad import attenuation
-from unitcad.attenuation.layered import response
+from unitcad.attenuation import layered
 from unitcad.attenuation.layered.medium import Stack
 from unitcad.errors import Refusal, UnitcadError
 
@@ -32,8 +32,8 @@ def test_public_names_are_loaded_without_cad():
 
 
 def test_the_example_of_the_docstring_runs():
-    assert doctest.testmod(response).attempted == 14
-    assert doctest.testmod(response).failed == 0
+    assert doctest.testmod(layered).attempted == 14
+    assert doctest.testmod(layered).failed == 0
 
 
 def test_a_stack_with_a_loss_has_at_least_that_in_every_body():

@@ -7,10 +7,11 @@ import pytest
 from scipy.optimize import least_squares
 
 from unitcad.attenuation.edge import closed_form as cf
-from unitcad.attenuation.edge.measured_levels import CLASSES, measured_slopes, measured_table, whole_ratio
+from unitcad.attenuation.edge.measured import CLASSES, measured_slopes, measured_table, whole_ratio
 from unitcad.attenuation.edge.models import (
     COMPARED,
     MODELS,
+    assess,
     assessments,
     choice,
     classes_out,
@@ -19,7 +20,6 @@ from unitcad.attenuation.edge.models import (
     rules,
     stored,
 )
-from unitcad.attenuation.edge.scores import assess
 from unitcad.catalogue import measurements
 from unitcad.designs import shipped
 from unitcad.estimate_inputs import FEM

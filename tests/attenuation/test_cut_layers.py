@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.edge.level import edge_level
+from unitcad.attenuation.edge.measured import merged
 from unitcad.attenuation.edge.models import MODELS
 from unitcad.attenuation.edge.ranges import predictive_of
-from unitcad.attenuation.edge.variant_units import merged
-from unitcad.attenuation.fem.motor_level import level as finite_elements
-from unitcad.attenuation.fem.prior_range import ALIKE
+from unitcad.attenuation.fem.unit import ALIKE
+from unitcad.attenuation.fem.unit import level as finite_elements
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import from_data
 

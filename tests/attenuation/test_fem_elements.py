@@ -9,10 +9,9 @@ from msgspec.structs import replace
 pytest.importorskip("skfem")
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.fem import harmonic_mesh as hm
-from unitcad.attenuation.fem.harmonic_elements import element_matrices
-from unitcad.attenuation.fem.harmonic_response import disc_response, motor_response
-from unitcad.attenuation.fem.motor_level import Setting, motion, pressed_skin, unit_fields
+from unitcad.attenuation.fem import elements as hm
+from unitcad.attenuation.fem.elements import disc_response, element_matrices, motor_response
+from unitcad.attenuation.fem.unit import Setting, motion, pressed_skin, unit_fields
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.estimate_inputs import estimate_input

@@ -6,9 +6,8 @@ import pytest
 
 pytest.importorskip("skfem")
 
-from unitcad.attenuation.edge.sensitivities import changed, sensitivities
-from unitcad.attenuation.fem.motor_level import level
-from unitcad.attenuation.fem.sensitivities import STEP, fem_sensitivities
+from unitcad.attenuation.edge.level import changed, sensitivities
+from unitcad.attenuation.fem.unit import STEP, fem_sensitivities, level
 from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 

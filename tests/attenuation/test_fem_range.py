@@ -14,10 +14,8 @@ from msgspec.structs import replace
 
 pytest.importorskip("skfem")
 
-from unitcad.attenuation.fem import prior_range
-from unitcad.attenuation.fem.motor_level import Setting, level, motion
-from unitcad.attenuation.fem.prior_range import DRAWS, range_block
-from unitcad.attenuation.fem.unknowns import CHOICES, Draw, drawn
+from unitcad.attenuation.fem import unit as prior_range
+from unitcad.attenuation.fem.unit import CHOICES, DRAWS, Draw, Setting, drawn, level, motion, range_block
 from unitcad.attenuation.inputs import Quantity
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimate_inputs import estimate_input, estimate_spec
@@ -131,10 +129,9 @@ def test_an_unknown_drive_or_reading_is_refused():
 
 
 def test_it_is_made_only_when_it_is_asked_for(monkeypatch):
-    from unitcad.attenuation.fem import sensitivities
 
     monkeypatch.setattr(prior_range, "range_block", lambda variant, say: {"draws": 0})
-    monkeypatch.setattr(sensitivities, "fem_sensitivities", lambda variant, say: [])
+    monkeypatch.setattr(prior_range, "fem_sensitivities", lambda variant, say: [])
     assert "fem" not in estimate_spec(load("encapsulating"))
     data = estimate_spec(load("encapsulating"), models=("published", "fem"))
     assert data["fem"] == {"draws": 0, "sensitivities": []}

@@ -9,8 +9,8 @@ import pytest
 pytest.importorskip("skfem")
 
 from benchmarks.accuracy.fem_search import COMPONENTS, unit_levels
-from unitcad.attenuation.edge.measured_levels import measured_table
-from unitcad.attenuation.fem.unknowns import Draw
+from unitcad.attenuation.edge.measured import measured_table
+from unitcad.attenuation.fem.unit import Draw
 
 DATA = json.loads((Path(__file__).parents[2] / "docs" / "fem.json").read_text("utf-8"))
 

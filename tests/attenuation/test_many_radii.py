@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation import HalfSpace, KelvinVoigt, LayeredMedium, UniformDisc
-from unitcad.attenuation.crosstalk import decay
+from unitcad.attenuation.curve import decay
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.layered import components
-from unitcad.attenuation.layered.response import MOST_SOLVED
+from unitcad.attenuation.layered import MOST_SOLVED, components
 from unitcad.attenuation.receivers import Patch, influence
 from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load

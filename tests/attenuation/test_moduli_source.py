@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from unitcad.attenuation.edge.closed_form import published_path
-from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table, whole_ratio
+from unitcad.attenuation.edge.measured import MeasuredTable, measured_table, whole_ratio
 from unitcad.catalogue import materials
 from unitcad.cli import app
 from unitcad.estimate_inputs import estimate_spec

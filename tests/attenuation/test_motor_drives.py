@@ -69,13 +69,6 @@ def test_a_drive_s_curve(drive: str) -> None:
     assert sizes["flat"] / sizes["axial"] == pytest.approx(np.array(block["flat_over_axial_per_newton"]["value"]))
 
 
-def test_axial_curve_is_that_of_the_pressure() -> None:
-    block, axial = BLOCKS["flat"], BLOCKS["flat"]["drives"]["axial"]
-    for key in ("u_z", "u_r"):
-        shape = np.array(axial[key]["value"]) / axial["u_z"]["value"][0]
-        assert np.array(block[key]["value"]) == pytest.approx(shape, rel=1e-12)
-
-
 def test_the_drive_is_the_part_s_where_the_spec_gives_none() -> None:
     assert {name for name, motor in motors().items() if motor.drive.value == "axial"} == {"VG1040003D"}
     plain = read(LEADLESS)

@@ -10,9 +10,8 @@ import pytest
 from msgspec import structs
 from scipy import integrate, stats
 
-from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.measured import LENGTHS, coordinates_of, measured_table, nearest
 from unitcad.attenuation.edge.models import left_out_logs, stored
-from unitcad.attenuation.edge.nearest import LENGTHS, coordinates_of, nearest
 from unitcad.attenuation.edge.ranges import OF_THE_KIND, Predictive, lead_of, predictive_of
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.estimate_inputs import estimate_input

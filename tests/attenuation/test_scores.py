@@ -8,19 +8,22 @@ import pytest
 from scipy import stats
 
 from benchmarks.accuracy.level_scores import permutation_p, simulated, with_levels
-from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.models import (
     COMPARED,
     assess_all,
     assessments,
+    bootstrap_range,
     choice,
+    choose_without,
     forms,
     in_order,
+    left_out_errors,
     one_constant,
     pairwise,
     rules,
+    sign_flip_p,
 )
-from unitcad.attenuation.edge.scores import bootstrap_range, choose_without, left_out_errors, sign_flip_p
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.validation import load
 

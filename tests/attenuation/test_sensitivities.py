@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.curve import layered_block
-from unitcad.attenuation.edge.level import nominal, stacked
+from unitcad.attenuation.edge.level import changed, nominal, sensitivities, stacked
 from unitcad.attenuation.edge.models import MODELS, edge_levels, stored
-from unitcad.attenuation.edge.sensitivities import changed, sensitivities
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import load
 

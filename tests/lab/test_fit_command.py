@@ -15,9 +15,9 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from unitcad.attenuation.edge.closed_form import crossings, published_path
+from unitcad.attenuation.edge.measured import nominal
 from unitcad.attenuation.edge.models import COMPARED
 from unitcad.attenuation.edge.ranges import predictive_of
-from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimate_inputs import estimate_input, estimate_spec

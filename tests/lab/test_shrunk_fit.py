@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from unitcad.attenuation.edge.lab_fit import quantiles
-from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
+from unitcad.attenuation.edge.measured import MeasuredTable, measured_table
 from unitcad.attenuation.edge.models import COMPARED, Model, assess_all, stored
-from unitcad.attenuation.edge.shrunk_fit import Campaigns, gradients, judge, paired, shrunk
+from unitcad.attenuation.edge.ranges import Campaigns, gradients, judge, paired, quantiles, shrunk
 
 TABLE = measured_table()
 MODELS = COMPARED

@@ -16,8 +16,8 @@ from scipy.io import wavfile
 from typer.testing import CliRunner
 
 from unitcad.attenuation.edge.closed_form import published_path
-from unitcad.attenuation.edge.lab_fit import unit_key
-from unitcad.attenuation.edge.variant_units import nominal
+from unitcad.attenuation.edge.measured import nominal
+from unitcad.attenuation.edge.ranges import unit_key
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input

@@ -21,7 +21,7 @@ OPEN = """() => document.querySelectorAll("#estimate details").forEach((node) =>
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory):
     """The folder of a unit estimated by closed forms and, with few draws, by finite elements."""
-    from unitcad.attenuation.fem import prior_range
+    from unitcad.attenuation.fem import unit as prior_range
 
     models = 'estimate.models=["rule","divider","published","fem"]'
     with pytest.MonkeyPatch.context() as patch:

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from unitcad.attenuation.crosstalk import crosstalk_ratio
-from unitcad.attenuation.curve import layered_block
+from unitcad.attenuation.curve import crosstalk_ratio, layered_block
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.receivers import unit_mass
 from unitcad.casting.procedure import procedure

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from unitcad.attenuation.crosstalk import crosstalk_ratio
+from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.errors import Refusal, UnknownKey
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.search.design_files import contents, ranking

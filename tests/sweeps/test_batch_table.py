@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from batching import bytes_of, unitcad
 
-from unitcad.attenuation.edge.estimate_summary import summary
+from unitcad.attenuation.edge.estimates import summary
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.sweeps import BatchOptions, estimate_table

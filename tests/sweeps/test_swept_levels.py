@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.attenuation.test_moduli_source import left_out
-from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.models import MODELS
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.spec import Spec

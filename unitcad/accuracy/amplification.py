@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from unitcad.accuracy.responses import REFERENCE, respond
+from unitcad.attenuation.edge.level import changed, ends
+from unitcad.attenuation.edge.measured import stacked
 from unitcad.attenuation.edge.models import edge_levels, stored
-from unitcad.attenuation.edge.sensitivities import changed, ends
-from unitcad.attenuation.edge.variant_units import stacked
 from unitcad.attenuation.inputs import EstimateInput, body
 from unitcad.estimate_inputs import closed_forms, fit_of
 from unitcad.spec import Spec

@@ -11,8 +11,8 @@ import numpy as np
 
 from unitcad.accuracy.timing import PROCESSOR, interleaved
 from unitcad.attenuation.inputs import EstimateInput, body
+from unitcad.attenuation.layered import Response
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.response import Response
 
 RTOLS = (0.1, 1e-3, 1e-5, 1e-7, 1e-9)
 REFERENCE = 1e-11

@@ -9,7 +9,7 @@ from typing import Any
 
 from unitcad import notebook
 from unitcad.arguments import texts
-from unitcad.attenuation.edge.estimate_summary import summary
+from unitcad.attenuation.edge.estimates import summary
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.spec.raw import Model
 from unitcad.validation import Changes, Source, load

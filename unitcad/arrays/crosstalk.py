@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.arrays.array import Array
-from unitcad.attenuation.crosstalk import RANGE, Reading, contact, decay, ends
+from unitcad.attenuation.curve import RANGE, Reading, contact, decay, ends
 from unitcad.attenuation.inputs import Drive, EstimateInput, body
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
 from unitcad.errors import Refusal

@@ -1,23 +1,21 @@
-"""The layered half-space's curve: how the skin's motion decays from the unit's edge outwards, and its spread."""
+"""The skin beyond a unit's edge by the layered half-space: the decay, its spread, and crosstalk to a neighbour."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 from msgspec.structs import replace
 from scipy import special
 
-from unitcad.attenuation.crosstalk import contact
 from unitcad.attenuation.edge import closed_form as cf
-from unitcad.attenuation.edge.sensitivities import sensitivities
+from unitcad.attenuation.edge.level import sensitivities
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
-from unitcad.attenuation.layered.loads import Direction, UniformDisc
-from unitcad.attenuation.layered.response import Response, responses
+from unitcad.attenuation.layered import LayeredMedium, Response, components
+from unitcad.attenuation.layered.loads import UniformDisc
 
 EDGE_TO_MM = 30
-DEPTHS_MM = (1.0, 3.0)
 NO_RATIO = (
     "a laterally uniform half-space has no ring of silicone in it: it can't say what the layers do, so multiplying "
     "its curve by another model's ratio would not be a model"
@@ -42,33 +40,111 @@ FAR = (
     "0.79 (0.70 to 0.88) of its amplitude every 20 mm at 40 to 60 Hz and 0.80 (0.68 to 0.92) at 75 to 100 Hz. Both "
     "bands fit one of 400 random bodies within the template's sources under a flat motor, and eight under an axial one."
 )
-_DIRECTIONS: dict[Drive, Direction] = {"flat": "tangential", "axial": "normal"}
 _COMPONENTS = {"flat": ("u_r", "u_theta", "u_z"), "axial": ("u_r", "u_z")}
-_DECAY_RTOL = 1e-3
 _SLOPE_RTOL, _SLOPE_STEP = 1e-6, 0.01
 """They leave the slopes off by less than 1e-3."""
 _NO_UNIT = "a laterally uniform body under the motor's disc: walls, caps, silicones, circuit and mass are not in it"
+
+
+RANGE = (
+    "moduli, damping and thicknesses of the body and the frequency to either end of their ranges, one kind at a time; "
+    "and what a unit on the skin changes, bonded or resting, by finite elements (`CONTACT`)"
+)
+CONTACT_MM = (0.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
+CONTACT: dict[Drive, tuple[tuple[float, ...], tuple[float, ...]]] = {
+    "flat": ((1.0, 0.82, 0.66, 0.48, 0.34, 0.23, 0.19, 0.14), (1.0,) * 8),
+    "axial": ((1.0, 0.83, 0.84, 0.9, 0.9, 0.9, 0.9, 0.9), (1.0, 1.0, 1.05, 1.47, 1.5, 1.5, 1.58, 2.14)),
+}
+"""Factors between |u| over that at the edge and bare skin's, least and largest, at `CONTACT_MM` from the edge.
+
+Finite elements of the paper's two designs with four pairs of silicones each, skin that sticks to the unit or lets it
+slide, 100 to 150 Hz, against the layered solver (`python -m benchmarks.accuracy skin` makes them again).
+"""
+Reading = Literal["u", "u_z"]
+_RTOL = 1e-3
+
+
+def crosstalk_ratio(variant: EstimateInput, pitch: float, spread: bool = True) -> Quantity:
+    """Return |u| of the bare skin at `pitch` (m) from the unit's middle over |u| at its edge, under its motor's drive.
+
+    The layered half-space's own decay. low and high: `RANGE`, without `spread` none. Raises `Refusal` for values that
+    no body has.
+    """
+
+    def ratio(end: dict[str, int]) -> float:
+        return float(decay(variant, np.array([pitch]), end=end)[0])
+
+    value = ratio({})
+    if not spread:
+        return Quantity(value)
+    every = [value, *(ratio(end) for end in ends(variant))]
+    low, high = (float(factor) for factor in contact(variant.drive, 1e3 * (pitch - variant.diameter / 2.0)))
+    return Quantity(value, low * min(every), high * max(every))
+
+
+def contact(drive: Drive, mm: float | np.ndarray) -> tuple[Any, Any]:
+    """Return the least and the largest factor of `CONTACT` at distances from a unit's edge, mm; 1 inside it."""
+    low, high = (np.interp(mm, CONTACT_MM, factors) for factors in CONTACT[drive])
+    return low, high
+
+
+def ends(variant: EstimateInput) -> list[dict[str, int]]:
+    """Return the inputs that `RANGE` names, each kind at its low and its high end, as `decay` takes it."""
+    ranged = variant.frequency.ends[0] < variant.frequency.ends[1]
+    kinds = ["moduli", "damping", "thicknesses", *(["frequency"] if ranged else [])]
+    return [{kind: end} for kind in kinds for end in (0, 1)]
+
+
+def decay(
+    variant: EstimateInput,
+    radii: np.ndarray,
+    drive: Drive | None = None,
+    hertz: float | None = None,
+    end: Mapping[str, int] | None = None,
+    reading: Reading = "u",
+) -> np.ndarray:
+    """Return the bare skin's motion at `radii` (m, any shape) from a unit's middle, over that at its edge.
+
+    `drive`, `hertz`: else the motor's own and the unit's frequency; `end` as `inputs.body` has it, and "frequency".
+    `reading`: |u| (`WHAT_U_IS`), or |u_z| alone. Radii inside the edge are given too: they are the bare skin's.
+    One response serves all radii. Raises `Refusal` for values that no body has.
+    """
+    if hertz is not None:
+        variant = replace(variant, frequency=Quantity(hertz))
+    wanted = np.asarray(radii, dtype=float)
+    medium, load, omega = _case(variant, drive or variant.drive, end or {})
+    found = components(medium, load, omega, np.append(wanted.ravel(), variant.diameter / 2.0), _RTOL)
+    size = np.abs(found[2]) if reading == "u_z" else np.linalg.norm(found, axis=0)
+    return (size[:-1] / size[-1]).reshape(wanted.shape)
+
+
+def _case(variant: EstimateInput, drive: Drive, end: Mapping[str, int]) -> tuple[LayeredMedium, UniformDisc, float]:
+    """Return the body, the load and omega of a drive; `end` as `decay` takes it."""
+    frequency = variant.frequency
+    hertz = frequency.ends[end["frequency"]] if "frequency" in end else frequency.middle
+    load = UniformDisc(variant.motor_diameter / 2.0, "tangential" if drive == "flat" else "normal")
+    return body(variant.tissue, end), load, 2.0 * np.pi * hertz
+
+
+def _response(variant: EstimateInput, drive: Drive, r: np.ndarray, end: Mapping[str, int], rtol: float) -> Response:
+    """Return the skin's displacement at radii r (m) under one pascal of a drive on the motor's disc."""
+    medium, load, omega = _case(variant, drive, end)
+    return medium.response(load, omega, r, rtol=rtol)
 
 
 def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
     """Return the estimate's `layered`: the skin's motion under either drive, over that at the edge, with its spread.
 
     `drives`: the motor's own first, each over |u| at the edge under the same force. `flat_over_axial_per_newton`: |u|
-    by one newton that turns, over |u| by one newton of axial amplitude. `u_z`, `u_r`, `depths` and
-    `surface_m_per_pa` are the axial pressure's, over |u_z| at the edge. `sensitivities`: of the decay to `EDGE_TO_MM`
-    under the motor's drive. The spread takes each kind of input (moduli,
-    damping, thicknesses, frequency) by itself to its low and high end; that of |u| has `crosstalk.CONTACT` in it.
+    by one newton that turns, over |u| by one newton of axial amplitude. `sensitivities`: of the decay to `EDGE_TO_MM`
+    under the motor's drive. The spread takes each kind of input (moduli, damping, thicknesses, frequency) by itself to
+    its low and high end; that of |u| has `CONTACT` in it.
     """
     r_mm = np.arange(EDGE_TO_MM + 1)
-    radius = variant.diameter / 2.0
-    r = radius + r_mm * 1e-3
+    r = variant.diameter / 2.0 + r_mm * 1e-3
     order: tuple[Drive, ...] = ("flat", "axial") if variant.drive == "flat" else ("axial", "flat")
-    found = _responses(variant, order, r, [{}, *_ends(variant)], rtol)
-    depths = [_responses(variant, order, r[::5], [{}], rtol, z * 1e-3) for z in DEPTHS_MM]
-    below = {drive: [one[drive][0] for one in depths] for drive in order}
-    axial = found["axial"][0]
-    edge = abs(axial.u_z[0])
-    old = [np.abs([one.u_z, one.u_r]) / abs(one.u_z[0]) for one in found["axial"]]
+    cases = [{}, *ends(variant)]
+    found = {drive: [_response(variant, drive, r, end, rtol) for end in cases] for drive in order}
     ratio = [_size(flat) / _size(normal) for flat, normal in zip(found["flat"], found["axial"], strict=True)]
     return {
         "tissue": variant.tissue_name,
@@ -77,22 +153,12 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
         "r_mm": [float(v) for v in r_mm],
         "r_is": "distance from the unit's edge outwards",
         "u_is": WHAT_U_IS,
-        "drives": {drive: _drive_block(variant, drive, found[drive], below[drive]) for drive in order},
+        "drives": {drive: _drive_block(variant, drive, found[drive]) for drive in order},
         "flat_over_axial_per_newton": _curve(ratio),
-        "unit": "of |u_z| of the skin at the edge",
-        "u_z": _curve([one[0] for one in old]),
-        "u_r": _curve([one[1] for one in old]),
         "spread": "each kind of input (moduli, damping, thicknesses, frequency) by itself at both ends of its range; "
         "of |u| also what a unit on the skin changes, bonded or resting, by finite elements",
         **({"far": FAR} if variant.tissue_name == "forearm" else {}),
-        "depths": [
-            {"z_mm": z, "r_mm": [float(v) for v in r_mm[::5]], **{key: _over(one, key, edge) for key in ("u_z", "u_r")}}
-            for z, one in zip(DEPTHS_MM, below["axial"], strict=True)
-        ],
-        "paper_beside": _paper_curves(variant, radius, r),
-        "surface_m_per_pa": {"u_z_at_the_edge": float(edge)},
-        "error_estimate": rounded_error(axial.error / edge),
-        "wavenumbers": axial.wavenumbers,
+        "paper_beside": _paper_curves(variant, r),
         "sensitivities": _sensitivities(variant),
         "hierarchical_over_control": None,
         "hierarchical_over_control_reason": NO_RATIO,
@@ -112,29 +178,15 @@ def _sensitivities(variant: EstimateInput) -> dict[str, Any]:
 
 
 def _decays(variants: Sequence[EstimateInput]) -> list[float]:
-    """Return |u| at `EDGE_TO_MM` over |u| at the edge of each variant under its motor's drive.
-
-    Those of one disc are solved on one path, those of one body and frequency once.
-    """
-    by_disc: dict[tuple[float, Drive], list[EstimateInput]] = {}
+    """Return |u| at `EDGE_TO_MM` over |u| at the edge of each variant under its motor's drive; alike ones once."""
+    decays: dict[Any, float] = {}
     for one in variants:
-        by_disc.setdefault((one.motor_diameter, one.drive), []).append(one)
-    decays: dict[str, float] = {}
-    for (disc, drive), some in by_disc.items():
-        bodies = {_reads(one): (body(one.tissue), 2.0 * np.pi * one.frequency.middle) for one in some}
-        edges = [*dict.fromkeys(one.diameter / 2.0 for one in some)]
-        load = UniformDisc(disc / 2.0, _DIRECTIONS[drive])
-        found = responses([*bodies.values()], [load], np.add.outer(edges, [0.0, 1e-3 * EDGE_TO_MM]), rtol=_SLOPE_RTOL)
-        sizes = {key: _size(response) for key, (response,) in zip(bodies, found, strict=True)}
-        for one in some:
-            edge, far = sizes[_reads(one)][edges.index(one.diameter / 2.0)]
-            decays[repr(one)] = float(far / edge)
-    return [decays[repr(one)] for one in variants]
-
-
-def _reads(variant: EstimateInput) -> str:
-    """Return the part of a variant that sets its body and frequency."""
-    return repr((variant.tissue, variant.frequency))
+        key = one.tissue, one.frequency, one.motor_diameter, one.diameter
+        if key not in decays:
+            r = one.diameter / 2.0 + np.array([0.0, 1e-3 * EDGE_TO_MM])
+            edge, far = _size(_response(one, one.drive, r, {}, _SLOPE_RTOL))
+            decays[key] = float(far / edge)
+    return [decays[one.tissue, one.frequency, one.motor_diameter, one.diameter] for one in variants]
 
 
 def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float, ...]) -> dict[str, list[float]]:
@@ -142,33 +194,11 @@ def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float
 
     Each over its value at the edge, at distances (mm) from the edge and one frequency (Hz), nominal body.
     """
-    r = variant.diameter / 2.0 + 1e-3 * np.array([0.0, *distances_mm])
-    found = _responses(replace(variant, frequency=Quantity(frequency)), ("flat", "axial"), r, [{}], _DECAY_RTOL)
-    sizes = {drive: _size(one) for drive, (one,) in found.items()}
-    parts = {"u": sizes[variant.drive], **sizes, "u_z": np.abs(found["axial"][0].u_z)}
-    return {name: [float(v) for v in part[1:] / part[0]] for name, part in parts.items()}
-
-
-def _responses(
-    variant: EstimateInput,
-    drives: Sequence[Drive],
-    r: np.ndarray,
-    ends: Sequence[dict[str, int]],
-    rtol: float,
-    z: float = 0.0,
-) -> dict[Drive, list[Response]]:
-    """Return the skin's displacement under one pascal of each drive on the motor's disc, for `ends` of `body`."""
-    hertz = variant.frequency
-    bodies = [
-        (
-            body(variant.tissue, end),
-            2.0 * np.pi * (hertz.ends[end["frequency"]] if "frequency" in end else hertz.middle),
-        )
-        for end in ends
-    ]
-    loads = [UniformDisc(variant.motor_diameter / 2.0, _DIRECTIONS[drive]) for drive in drives]
-    found = responses(bodies, loads, r, z=z, rtol=rtol)
-    return {drive: [one[i] for one in found] for i, drive in enumerate(drives)}
+    r = variant.diameter / 2.0 + 1e-3 * np.array(distances_mm)
+    drives: tuple[Drive, ...] = ("flat", "axial")
+    found = {drive: decay(variant, r, drive, frequency) for drive in drives}
+    parts = {"u": found[variant.drive], **found, "u_z": decay(variant, r, "axial", frequency, reading="u_z")}
+    return {name: part.tolist() for name, part in parts.items()}
 
 
 def _size(one: Response) -> np.ndarray:
@@ -176,42 +206,31 @@ def _size(one: Response) -> np.ndarray:
     return np.sqrt(np.abs(one.u_r) ** 2 + np.abs(one.u_theta) ** 2 + np.abs(one.u_z) ** 2)
 
 
-def _drive_block(variant: EstimateInput, drive: Drive, found: list[Response], below: list[Response]) -> dict[str, Any]:
-    """Return a drive's curves over |u| at the edge: nominal and spread at the surface, nominal at `DEPTHS_MM`."""
+def _drive_block(variant: EstimateInput, drive: Drive, found: list[Response]) -> dict[str, Any]:
+    """Return a drive's curves over |u| at the edge, nominal and spread."""
     edges = [_size(one)[0] for one in found]
-    disc = np.pi * (variant.motor_diameter / 2.0) ** 2
     nominal = found[0]
     error = np.sqrt(nominal.error_r**2 + nominal.error_theta**2 + nominal.error_z**2)
+    u = _curve([_size(one) / edge for one, edge in zip(found, edges, strict=True)])
+    factors = contact(drive, np.arange(EDGE_TO_MM + 1))
+    for name, own in zip(("low", "high"), factors, strict=True):
+        u[name] = (np.array(u[name]) * own).tolist()
     return {
         "force": FORCES[drive],
         "unit": "of |u| of the skin at the edge under the same force",
-        "u": _with_contact(drive, _curve([_size(one) / edge for one, edge in zip(found, edges, strict=True)])),
+        "u": u,
         **{
             key: _curve([np.abs(getattr(one, key)) / edge for one, edge in zip(found, edges, strict=True)])
             for key in _COMPONENTS[drive]
         },
-        "depths": [
-            {"z_mm": z, "u": [float(v) for v in _size(one) / edges[0]]} for z, one in zip(DEPTHS_MM, below, strict=True)
-        ],
-        "m_per_n_at_the_edge": float(edges[0] / disc),
+        "m_per_n_at_the_edge": float(edges[0] / (np.pi * (variant.motor_diameter / 2.0) ** 2)),
         "error_estimate": rounded_error(np.max(error) / edges[0]),
     }
-
-
-def _with_contact(drive: Drive, curve: dict[str, list[float]]) -> dict[str, list[float]]:
-    """Return a curve of |u| by mm from the edge whose spread includes the effect of a unit on the skin."""
-    factors = contact(drive, np.arange(len(curve["value"])))
-    ends = zip(("low", "high"), factors, strict=True)
-    return {"value": curve["value"], **{name: (np.array(curve[name]) * own).tolist() for name, own in ends}}
 
 
 def rounded_error(error: float) -> float:
     """Return an error to three digits: a difference of near-equal numbers has no more that all processors agree on."""
     return float(f"{error:.3g}")
-
-
-def _over(one: Response, key: str, edge: float) -> list[float]:
-    return [float(v) for v in np.abs(getattr(one, key)) / edge]
 
 
 def _curve(cases: list[np.ndarray]) -> dict[str, list[float]]:
@@ -220,14 +239,7 @@ def _curve(cases: list[np.ndarray]) -> dict[str, list[float]]:
     return {name: [float(v) for v in data] for name, data in parts}
 
 
-def _ends(variant: EstimateInput) -> list[dict[str, int]]:
-    kinds = ["moduli", "damping", "thicknesses"] + (
-        ["frequency"] if variant.frequency.ends[0] < variant.frequency.ends[1] else []
-    )
-    return [{kind: end} for kind in kinds for end in (0, 1)]
-
-
-def _paper_curves(variant: EstimateInput, radius: float, r: np.ndarray) -> dict[str, Any]:
+def _paper_curves(variant: EstimateInput, r: np.ndarray) -> dict[str, Any]:
     """Return equation 3b's factors for the skin, over their value at the edge: |J0(kr)| and the exponential."""
     skin = variant.tissue[0]
     omega = 2.0 * np.pi * variant.frequency.middle
@@ -244,8 +256,8 @@ def _paper_curves(variant: EstimateInput, radius: float, r: np.ndarray) -> dict[
         "k_per_m": omega / speed,
         "j0": [float(v) for v in bessel / bessel[0]] if bessel[0] > 1e-3 else None,
         "exponential": {
-            "loss_modulus": [float(v) for v in np.exp(-rate * (r - radius))],
-            "kelvin_voigt": [float(v) for v in np.exp(-rate / 2.0 * (r - radius))],
+            "loss_modulus": [float(v) for v in np.exp(-rate * (r - r[0]))],
+            "kelvin_voigt": [float(v) for v in np.exp(-rate / 2.0 * (r - r[0]))],
         },
         "readings_of_eta": {name: cf.READINGS[name] for name in ("loss_modulus", "kelvin_voigt")},
     }

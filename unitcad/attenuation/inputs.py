@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
 import msgspec
 import numpy as np
 
+from unitcad.attenuation.layered import LayeredMedium
 from unitcad.attenuation.layered.medium import HalfSpace, KelvinVoigt, Layer, LossFactor
-from unitcad.attenuation.layered.response import LayeredMedium
 
 Drive = Literal["flat", "axial"]
 
@@ -144,7 +145,7 @@ class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
         return 2.0 * self.geometry.motor_radius
 
 
-def body(tissue: tuple[TissueLayer, ...], end: dict[str, int] | None = None) -> LayeredMedium:
+def body(tissue: tuple[TissueLayer, ...], end: Mapping[str, int] | None = None) -> LayeredMedium:
     """Return the body as a layered medium; `end` sets "moduli", "damping" or "thicknesses" to low (0) or high (1)."""
     end = end or {}
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
+from unitcad.attenuation.layered import LayeredMedium, components
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.response import LayeredMedium, components
 from unitcad.errors import Refusal
 
 FORCES: dict[Drive, tuple[complex, complex, complex]] = {"flat": (1.0, -1.0j, 0.0), "axial": (0.0, 0.0, 1.0)}

@@ -9,9 +9,8 @@ import msgspec
 import numpy as np
 
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.lab_fit import PERCENT, ModelFit, quantiles
-from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE
-from unitcad.attenuation.edge.scores import sign_flip_p
+from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE, sign_flip_p
+from unitcad.attenuation.edge.ranges import PERCENT, ModelFit, quantiles
 from unitcad.export.chart import Series, chart
 from unitcad.lab.fitting import Fitted
 from unitcad.spec.toml import text_of, without_none

@@ -14,22 +14,23 @@ from scipy.special import stdtrit
 
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.lab_fit import InputFile, LabFit, ModelFit, OwnLevel, unit_key
-from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable, Moduli, measured_table
-from unitcad.attenuation.edge.models import BASELINE, COMPARED, KAPPA, RULE, Model, leader
-from unitcad.attenuation.edge.nearest import coordinates_of
-from unitcad.attenuation.edge.scores import SEED
-from unitcad.attenuation.edge.shrunk_fit import (
+from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable, Moduli, coordinates_of, measured_table, nominal
+from unitcad.attenuation.edge.models import BASELINE, COMPARED, KAPPA, RULE, SEED, Model, leader
+from unitcad.attenuation.edge.ranges import (
     BETWEEN_LABS,
     Campaigns,
+    InputFile,
     Judged,
+    LabFit,
+    ModelFit,
+    OwnLevel,
     Shrunk,
     gradients,
     judge,
     paired,
     shrunk,
+    unit_key,
 )
-from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import materials
 from unitcad.catalogue.entries import Frequency, MaterialEntry

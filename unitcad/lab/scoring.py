@@ -12,10 +12,9 @@ import numpy as np
 
 from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
+from unitcad.attenuation.edge.measured import CONTROL, measured_table, nominal
 from unitcad.attenuation.edge.models import COMPARED
 from unitcad.attenuation.edge.ranges import predictive_of
-from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import figures, measurements
 from unitcad.designs import shipped as designs

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import Any, NotRequired, TypedDict
 
 from unitcad import __version__, catalogue
-from unitcad.attenuation.edge.estimate_summary import summary
+from unitcad.attenuation.edge.estimates import summary
 from unitcad.checks.finding import FindingRecord
 from unitcad.designs import design_of, no_estimate
 from unitcad.designs.design import Reason

@@ -13,11 +13,11 @@ import numpy as np
 from msgspec import structs
 
 from unitcad import catalogue
-from unitcad.attenuation.crosstalk import crosstalk_ratio
-from unitcad.attenuation.edge import nearest
+from unitcad.attenuation.curve import crosstalk_ratio
+from unitcad.attenuation.edge import measured as nearest
 from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.measured import FIELDS, stacked
 from unitcad.attenuation.edge.ranges import Predictive, lead_of
-from unitcad.attenuation.edge.variant_units import FIELDS, stacked
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 from unitcad.casting.figures import at_room
 from unitcad.casting.procedure import procedure

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.crosstalk import crosstalk_ratio
+from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.errors import Refusal
 from unitcad.search.candidates import Candidates

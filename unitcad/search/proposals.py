@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.crosstalk import RANGE as CROSSTALK_RANGE
-from unitcad.attenuation.crosstalk import crosstalk_ratio
+from unitcad.attenuation.curve import RANGE as CROSSTALK_RANGE
+from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.ranges import lead_of
 from unitcad.casting.figures import MOST_ERROR_PCT, mix

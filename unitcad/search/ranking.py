@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.edge.lab_fit import own_block
-from unitcad.attenuation.edge.nearest import measured_block, nearest
+from unitcad.attenuation.edge.measured import measured_block, nearest
+from unitcad.attenuation.edge.ranges import own_block
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.search.candidates import Candidates
 from unitcad.search.target_file import Target

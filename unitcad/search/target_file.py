@@ -21,7 +21,7 @@ from typing import Annotated, Any
 from msgspec import Meta, Struct
 
 from unitcad import catalogue
-from unitcad.attenuation.edge.lab_fit import LabFit
+from unitcad.attenuation.edge.ranges import LabFit
 from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.measured_levels import Moduli, whole_ratio
+from unitcad.attenuation.edge.measured import Moduli, whole_ratio
 from unitcad.attenuation.edge.models import edge_levels, stored
 from unitcad.errors import UnitcadError
 from unitcad.estimate_inputs import closed_forms, drawn_input

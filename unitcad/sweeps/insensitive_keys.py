@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from unitcad.attenuation.edge.answer import left_out
+from unitcad.attenuation.edge.estimates import left_out
+from unitcad.attenuation.edge.measured import nominal
 from unitcad.attenuation.edge.models import edge_levels, stored
-from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import measurements
 from unitcad.errors import UnitcadError

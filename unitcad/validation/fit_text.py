@@ -13,7 +13,7 @@ from unitcad.spec.raw import EstimateTable
 from unitcad.text import with_article
 
 if TYPE_CHECKING:
-    from unitcad.attenuation.edge.lab_fit import LabFit
+    from unitcad.attenuation.edge.ranges import LabFit
 
 FIELD = "estimate.fit"
 _NEXT = "name a lab-fit.toml, which `unitcad fit LAB` writes from measured units"
@@ -38,7 +38,7 @@ def check_fit(table: EstimateTable) -> None:
 @lru_cache(maxsize=16)
 def lab_fit(text: str) -> LabFit:
     """Return the fit of a lab-fit.toml's text. Raises Refusal, at `estimate.fit`, for the first fault."""
-    from unitcad.attenuation.edge.lab_fit import LabFit, fault
+    from unitcad.attenuation.edge.ranges import LabFit, fault
 
     try:
         data = tomllib.loads(text)

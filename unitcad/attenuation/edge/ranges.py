@@ -1,4 +1,20 @@
-"""The range of a new unit's level: a Student-t distribution of ln level about the model that leads.
+"""A lab's stored fit: the models' constants, the prediction for a new unit, the lab's own measurements.
+
+A new unit's ln level is Student-t distributed: `scale`^2 = model_error^2 (1 + g' C g), where g is the gradient of the
+model's ln level in the logarithms of its constants, and C their covariance over model_error^2.
+
+Models fitted to two campaigns, the paper's and a lab's, whose constants may differ: shrunk, judged, predictive.
+
+A unit's ln level scatters about its model with the standard deviation sigma (the model error), and between campaigns
+the logarithms of a model's constants scatter by `between_labs` times the information of a unit of the other campaign.
+The likelihood of a campaign of n units then counts for another one with the weight 1/(n between_labs^2 + 1) a unit: a
+power prior (Ibrahim and Chen, Statistical Science 15, 46, 2000), for a model that is linear in its constants the
+conjugate normal prior centred at the other campaign's own fit. Nine units count as 0.9 of a lab's own if between_labs
+is 1. sigma^2 has the conjugate inverse gamma's estimate, so a prediction is Student-t with units less constants degrees
+of freedom. A unit measured with the standard error u of ln level counts 1/(1 + (u/sigma0)^2), where sigma0 is the
+paper's own sigma.
+
+The range of a new unit's level: a Student-t distribution of ln level about the model that leads.
 
 Its scale is the standard deviation of the leading model's left-out residuals (of a lab's fit: the fit's own). It grows
 with everything that no measured unit had, and the residual of measured units that are near enters with half its
@@ -7,21 +23,376 @@ weight, less the farther they are.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta, Struct
 from scipy.special import stdtr, stdtrit
 
 from unitcad.attenuation.edge.closed_form import Units, borders
-from unitcad.attenuation.edge.lab_fit import PERCENT, LabFit
-from unitcad.attenuation.edge.measured_levels import MeasuredTable, Moduli, measured_table
-from unitcad.attenuation.edge.models import COMPARED, RULE, assessments, leader, left_out_logs, stored
-from unitcad.attenuation.edge.nearest import LENGTHS, Lengths, coordinates, lengths
-from unitcad.attenuation.edge.variant_units import stacked
+from unitcad.attenuation.edge.measured import (
+    COORDINATES,
+    LENGTHS,
+    Lengths,
+    MeasuredTable,
+    Moduli,
+    coordinates,
+    lengths,
+    measured_table,
+    nominal,
+    stacked,
+)
+from unitcad.attenuation.edge.models import (
+    BASELINE,
+    COMPARED,
+    MODELS,
+    RULE,
+    Model,
+    assessments,
+    bootstrap_range,
+    edge_levels,
+    leader,
+    left_out_logs,
+    sign_flip_p,
+    stored,
+)
 from unitcad.attenuation.inputs import EstimateInput
+from unitcad.text import some
+
+Positive = Annotated[float, Meta(ge=1e-9, le=1e9)]
+PERCENT = (10, 90)
+"""Ends of a predictive range."""
+
+
+class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A model fitted to a lab's units: constants, their stored values, and the predictive.
+
+    `model_error`: standard deviation of a unit's ln level about the model. `covariance`: of the constants' logarithms,
+    in the order of `constants`, over model_error^2. `left_out` is the factor with the unit left out.
+    `at_bound`: the constant that the search left on its bound, None if the units determine all.
+    """
+
+    constants: dict[str, Positive]
+    low: dict[str, Positive]
+    high: dict[str, Positive]
+    stored: dict[str, Positive]
+    degrees_of_freedom: Annotated[int, Meta(ge=1, le=100000)]
+    model_error: Annotated[float, Meta(ge=1e-6, le=10)]
+    covariance: list[list[Annotated[float, Meta(ge=-1e9, le=1e9)]]]
+    left_out: Positive
+    left_out_low: Positive
+    left_out_high: Positive
+    own_left_out: Positive | None = None
+    own_by_stored: Positive | None = None
+    against_baseline: float | None = None
+    against_baseline_error: float | None = None
+    against_baseline_p: float | None = None
+    held: str = ""
+    at_bound: str | None = None
+
+
+class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A unit's level as the lab measured it, with its 95 % interval; `key` is its `unit_key`.
+
+    `place`: its `nearest.COORDINATES`; `residual`: ln(measured/predicted) by the model that leads.
+    """
+
+    unit: str
+    key: str
+    value: Positive
+    low: Positive | None = None
+    high: Positive | None = None
+    frequency_hz: Positive
+    place: Annotated[list[float], Meta(min_length=len(COORDINATES), max_length=len(COORDINATES))]
+    residual: float
+    source: str = ""
+
+
+class InputFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A file that the fit read."""
+
+    file: str
+    sha256: str
+
+
+class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A lab's fit: `units` of its own, with or without the paper's nine, by which moduli; `leads`: `models.leader`.
+
+    `between_labs`: standard deviation between labs of a constant's logarithm over that between units of one lab.
+    """
+
+    format: Annotated[int, Meta(ge=1, le=1)]
+    name: Annotated[str, Meta(min_length=1, max_length=100)]
+    units: Annotated[int, Meta(ge=1, le=100000)]
+    moduli: Literal["small-strain", "quasi-static"]
+    include_paper_units: bool
+    between_labs: Annotated[float, Meta(ge=0, le=100)]
+    seed: int
+    leads: Literal["rule", "published", "corrected", "divider"]
+    model: dict[str, ModelFit]
+    measured: Annotated[list[OwnLevel], Meta(min_length=1)]
+    input: list[InputFile] = []
+
+    def constants(self, model: str) -> dict[str, float]:
+        """Return a model's constants. Raises KeyError for one that it does not have."""
+        return self.model[model].constants
+
+
+def fault(fit: LabFit) -> tuple[str, Any, str] | None:
+    """Return (field, value, limit) of the first thing wrong with a fit that its types do not show."""
+    for model in (*MODELS, BASELINE):
+        names = set(COMPARED[model].names)
+        if model not in fit.model:
+            return f"model.{model}", None, "is required"
+        one = fit.model[model]
+        if set(one.constants) != names:
+            return f"model.{model}.constants", some(sorted(one.constants)), f"must be {' and '.join(sorted(names))}"
+        matrix = one.covariance
+        if [len(row) for row in matrix] != [len(names)] * len(names):
+            return f"model.{model}.covariance", len(matrix), f"needs {len(names)} rows of as many numbers"
+        # A file has six digits; a combination of constants that the units do not determine has eigenvalues near 0.
+        size = float(np.max(np.abs(matrix)))
+        symmetric = np.allclose(matrix, np.transpose(matrix), rtol=1e-5, atol=1e-5 * size)
+        if not symmetric or np.linalg.eigvalsh(matrix).min() < -1e-5 * size:
+            return f"model.{model}.covariance", None, "is no covariance: not symmetric, or negative in a direction"
+    return None
+
+
+def predictive(fit: LabFit, model: str, variant: EstimateInput) -> tuple[int, float, float]:
+    """Return (degrees of freedom, centre, scale) of the Student-t distribution of a variant's ln level in the lab.
+
+    At the middle of the inputs' ranges, for a unit like the measured ones; centre and scale are NaN if an input is not
+    known.
+    """
+    units, one = nominal(variant), fit.model[model]
+    centre = float(np.log(edge_levels(units, model, one.constants))[0])
+    own = np.array([one.constants[name] for name in COMPARED[model].names])
+    g = COMPARED[model].gradient(units, own)[0]
+    scale = one.model_error * float(np.sqrt(1.0 + g @ np.array(one.covariance) @ g))
+    return one.degrees_of_freedom, centre, scale if np.isfinite(centre) else float("nan")
+
+
+def quantiles(df: int, centre: float, scale: float) -> tuple[float, ...]:
+    """Return the levels at `PERCENT` of a predictive of ln level."""
+    return tuple(float(np.exp(centre + scale * stdtrit(df, percent / 100))) for percent in PERCENT)
+
+
+def predictive_block(fit: LabFit, model: str, variant: EstimateInput, reason: str) -> dict[str, Any]:
+    """Return a variant's predictive as data: P10, P90, and the distribution of ln level; `reason` says why not."""
+    df, centre, scale = predictive(fit, model, variant)
+    if not np.isfinite(centre):
+        return {"p10": None, "p90": None, "reason": reason}
+    low, high = quantiles(df, centre, scale)
+    return {
+        "p10": low,
+        "p90": high,
+        "degrees_of_freedom": df,
+        "centre": centre,
+        "scale": scale,
+        "model_error": fit.model[model].model_error,
+        "what": "where a new unit of this kind is expected in this lab: Student-t of ln level, at the inputs' middle",
+    }
+
+
+def error_block(fit: LabFit, model: str) -> dict[str, Any]:
+    """Return a model's error by a fit, as factors: each unit left out, then of the lab's own units alone.
+
+    `own_by_stored`: the own units' by the stored constants, without the fit. `baseline`: of the class means.
+    """
+    one = fit.model[model]
+    return {
+        "left_out": {"geometric_mean": one.left_out, "low": one.left_out_low, "high": one.left_out_high},
+        "own_left_out": one.own_left_out,
+        "own_by_stored": one.own_by_stored,
+        "held_80": one.held,
+        BASELINE: fit.model[BASELINE].left_out,
+    }
+
+
+def unit_key(variant: EstimateInput) -> str:
+    """Return the identity of a unit: a hash of design, silicones and lengths; not of body or frequency."""
+    geometry = variant.geometry
+    lengths = [
+        geometry.cavity_radius,
+        geometry.core_height,
+        geometry.motor_radius,
+        geometry.motor_height,
+        *(length for layer in geometry.layers for length in (layer.outer_radius, layer.top, layer.cap)),
+    ]
+    names = [layer.material for layer in variant.layers]
+    text = json.dumps([variant.design, names, [f"{1e3 * length:.6f}" for length in lengths]])
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def own_block(fit: LabFit, variant: EstimateInput) -> list[dict[str, Any]]:
+    """Return the lab's own measurements of this unit."""
+    key = unit_key(variant)
+    return [
+        {name: getattr(one, name) for name in ("unit", "value", "low", "high", "frequency_hz", "source")}
+        for one in fit.measured
+        if one.key == key
+    ]
+
+
+BETWEEN_LABS = 1.0
+"""Assumed: another phantom, motor and axis shift a model as much as one unit scatters."""
+
+
+@dataclass(frozen=True)
+class Campaigns:
+    """Units of two campaigns: which are the lab's own, and the standard error of each ln level (0: in sigma)."""
+
+    table: MeasuredTable
+    own: np.ndarray
+    error: np.ndarray
+    between_labs: float = BETWEEN_LABS
+
+    def without(self, index: int) -> Campaigns:
+        """Return the campaigns without one unit."""
+        kept = np.arange(self.own.size) != index
+        return replace(self, table=self.table.without(index), own=self.own[kept], error=self.error[kept])
+
+
+@dataclass(frozen=True)
+class Shrunk:
+    """Constants for one campaign: values, covariance of their logarithms over sigma^2, sigma, degrees of freedom."""
+
+    constants: np.ndarray
+    covariance: np.ndarray
+    sigma: float
+    df: int
+
+    def predictive(self, log_level: float, gradient: np.ndarray) -> tuple[int, float, float]:
+        """Return (df, centre, scale) of a further unit's ln level without error of measurement."""
+        return self.df, log_level, self.sigma * float(np.sqrt(1.0 + gradient @ self.covariance @ gradient))
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A model with each unit left out, unit by unit: ln(predicted/measured), and the predictive of ln measured.
+
+    `share`: the predictive's distribution function at the measured level. `by_stored`: the errors by the constants of
+    the paper's units alone, None without them.
+    """
+
+    errors: np.ndarray
+    share: np.ndarray
+    centre: np.ndarray
+    scale: np.ndarray
+    df: int
+    own: np.ndarray
+    by_stored: np.ndarray | None
+
+    @property
+    def score(self) -> float:
+        """The geometric-mean factor."""
+        return _factor(self.errors)
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Bootstrap range of the score over units."""
+        return bootstrap_range(np.abs(self.errors))
+
+    @property
+    def own_score(self) -> float:
+        """The factor over the lab's own units."""
+        return _factor(self.errors[self.own])
+
+    @property
+    def stored_score(self) -> float | None:
+        """The same by the stored constants."""
+        return None if self.by_stored is None else _factor(self.by_stored[self.own])
+
+    def held(self, content: float = 0.8) -> int:
+        """Return how many units are in the middle `content` of their prediction without them."""
+        return int(np.sum(np.abs(self.share - 0.5) <= content / 2))
+
+
+def shrunk(model: Model, campaigns: Campaigns, own: bool = True) -> Shrunk:
+    """Fit a model for the lab (`own`) or for the paper, the other campaign's units as prior.
+
+    Raises ValueError if units are no more than the constants that they determine.
+    """
+    table, here = campaigns.table, campaigns.own == own
+    logs, count = np.log(table.levels), table.levels.size
+    precision = _precision(model, campaigns)
+    there = int(np.sum(~here))
+    power = 1.0 / (there * campaigns.between_labs**2 + 1.0)
+    weights = np.where(here, precision, power * precision)
+    constants = _fitted(model, table, weights)
+    left = float(weights @ (logs - _logs(model, table, constants)) ** 2)
+    if there:
+        others = np.where(here, 0.0, precision)
+        misfit = float(others @ (logs - _logs(model, table, _fitted(model, table, others))) ** 2)
+        left += (1.0 - power) * misfit
+    g = gradients(model, table, constants)
+    df = count - int(np.linalg.matrix_rank(g))
+    if df < 1:
+        raise ValueError(f"{count} units fit no model of {count - df} constants")
+    covariance = np.linalg.pinv(g.T @ (weights[:, None] * g), hermitian=True)
+    return Shrunk(constants, covariance, float(np.sqrt(left / df)), df)
+
+
+def judge(model: Model, campaigns: Campaigns) -> Judged:
+    """Predict each unit by the constants of its campaign, fitted without it, and by only the paper's."""
+    table, logs = campaigns.table, np.log(campaigns.table.levels)
+    centre, scale, df = np.empty(logs.size), np.empty(logs.size), 1
+    for i in range(logs.size):
+        found = shrunk(model, campaigns.without(i), bool(campaigns.own[i]))
+        at = float(_logs(model, table, found.constants)[i])
+        df, centre[i], scale[i] = found.predictive(at, gradients(model, table, found.constants)[i])
+    scale = np.hypot(scale, campaigns.error)
+    errors = centre - logs
+    paper = ~campaigns.own
+    by_stored = None
+    if paper.any():
+        by_stored = _logs(model, table, _fitted(model, table, paper.astype(float))) - logs
+    return Judged(errors, stdtr(df, -errors / scale), centre, scale, df, campaigns.own, by_stored)
+
+
+def paired(judged: Judged, other: Judged) -> tuple[float, float, float]:
+    """Return the mean difference of |ln(predicted/measured)| to another model's, its standard error, sign-flip p."""
+    one, two = np.abs(judged.errors), np.abs(other.errors)
+    differences = one - two
+    error = float(differences.std(ddof=1) / np.sqrt(differences.size))
+    return float(differences.mean()), error, sign_flip_p(one, two)
+
+
+def _factor(errors: np.ndarray) -> float:
+    return float(np.exp(np.mean(np.abs(errors))))
+
+
+def _precision(model: Model, campaigns: Campaigns) -> np.ndarray:
+    """Return 1/(1 + (u/sigma0)^2) of every unit, sigma0 of the units whose error is not known, or of all."""
+    if not campaigns.error.any():
+        return np.ones(campaigns.own.size)
+    table = campaigns.table
+    used = ~campaigns.own if np.sum(~campaigns.own) > len(model.names) else np.ones(campaigns.own.size, dtype=bool)
+    weights = used.astype(float)
+    left = np.log(table.levels) - _logs(model, table, _fitted(model, table, weights))
+    sigma2 = float(weights @ left**2) / max(int(used.sum()) - len(model.names), 1)
+    return sigma2 / (sigma2 + campaigns.error**2) if sigma2 > 0 else np.ones(campaigns.own.size)
+
+
+def gradients(model: Model, table: MeasuredTable, constants: np.ndarray) -> np.ndarray:
+    """Return d ln level / d ln constant of every unit, (units, constants)."""
+    return table.mean(lambda units: model.gradient(units, constants))
+
+
+def _logs(model: Model, table: MeasuredTable, constants: np.ndarray) -> np.ndarray:
+    """Return ln level of every unit, (units,)."""
+    return table.mean(lambda units: model.logs(units, constants))
+
+
+def _fitted(model: Model, table: MeasuredTable, weights: np.ndarray) -> np.ndarray:
+    return model.fit(table, weights[None])[0]
+
 
 LENGTH_SLOPES = np.array([1.2, 0.5, 0.5, 0.5, 1.0, 0.5, 0.5, 0.5, 0.5])
 MODULUS_SLOPE = 1.0

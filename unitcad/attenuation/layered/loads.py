@@ -1,15 +1,9 @@
-"""Functions of only wavenumbers, radii and loads, cached for the last of them: most calls have the same radii.
+"""Loads on the surface, in the Hankel domain: their transforms, Bessel functions, a static half-space under each.
 
-Bessel functions of the Hankel transforms, and the moment of J1 that is a radial disc's transform.
-
-A static homogeneous half-space under each load, in closed form.
-
-It is taken out of a Hankel integral at the surface.
+A static homogeneous half-space, known in closed form, is taken out of a Hankel integral at the surface.
 
 Rows are those of a load's kernel, with its `orders`: (u_r, u_z) under an axisymmetric load, and under a sideways one
 (A, B, Z), of which u_r = A - B, u_theta = -(A + B) and u_z = -Z are made.
-
-Loads on the surface, in the Hankel domain.
 
 A normal load (F1 of the paper's equation 2a) is a pressure, positive into the body, with a J0 transform; a radial load
 (F2, equation 2b) is a traction outwards from the axis, with a J1 transform. q(k) = integral of q(r) J(kr) r dr.
@@ -24,10 +18,9 @@ along theta = pi/2. Together they move a point at theta by F e^{-i theta} (u_r, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from functools import cache, lru_cache, wraps
-from typing import Any, Literal, TypeVar, get_args
+from functools import cache
+from typing import Any, Literal, get_args
 
 import numpy as np
 from scipy import special
@@ -35,41 +28,6 @@ from scipy import special
 from unitcad.attenuation.layered.medium import MOST, finite
 from unitcad.attenuation.layered.propagation import Array, Material
 from unitcad.errors import Refusal, unknown_name
-
-_MOST_BYTES = 500_000
-"""Of a result that is kept, with the arrays that it is of."""
-_RESULTS = 16
-"""Kept of each function: 8 MB at most."""
-
-Made = TypeVar("Made", bound=tuple[Any, ...])
-
-
-def kept(make: Callable[..., Made]) -> Callable[..., Made]:
-    """Return a function of arrays and hashable values that keeps its last small results: tuples, arrays read-only."""
-    results: dict[Hashable, Made] = {}
-
-    @wraps(make)
-    def found(*arguments: Any) -> Made:
-        key = tuple(
-            [(one.tobytes(), one.shape, one.dtype.char) if isinstance(one, np.ndarray) else one for one in arguments]
-        )
-        result = results.pop(key, None)
-        if result is not None:
-            results[key] = result  # the last one now
-            return result
-        result = make(*arguments)
-        own = [one for one in result if isinstance(one, np.ndarray)]
-        for array in own:
-            array.flags.writeable = False
-        arrays = (*own, *(one for one in arguments if isinstance(one, np.ndarray)))
-        if sum(array.nbytes for array in arrays) <= _MOST_BYTES:
-            results[key] = result
-            for oldest in list(results)[:-_RESULTS]:
-                results.pop(oldest, None)
-        return result
-
-    return found
-
 
 _SERIES = 1.0  # |x| up to which the power series of the moment is summed
 _FAR = 40.0  # |x| from which the expansion in 1/x is good to 1e-16
@@ -196,14 +154,6 @@ def static_kernel(material: Material, direction: Direction) -> Array:
     if direction == "tangential":
         return np.array([(1.5 - eps) / twice, -(0.5 - eps) / twice, across])
     return np.array([across, along] if direction == "normal" else [along, across])
-
-
-@lru_cache(maxsize=64)
-def static_kernels(material: Material, directions: tuple[Direction, ...]) -> Array:
-    """Return the rows of `static_kernel` of each direction, one after the other, read-only."""
-    rows = np.concatenate([static_kernel(material, direction) for direction in directions])
-    rows.flags.writeable = False
-    return rows
 
 
 def disc_integrals(s: Any, direction: Direction) -> Any:
@@ -406,7 +356,7 @@ class Point:
         return np.broadcast_to(1.0 / (2.0 * np.pi * r), (len(self.orders), *np.shape(r)))
 
     def static_rounding(self, r: Any) -> Any:
-        """Return a bound of the rounding of `statics.static_kernel` times `static`, over the kernel's largest row."""
+        """Return a bound of the rounding of `static_kernel` times `static`, over the kernel's largest row."""
         return static_rounding(self.static(r))
 
 
@@ -475,17 +425,12 @@ class UniformDisc:
 
     def static(self, r: Any) -> Any:
         """Return the integrals of q(k) J_n(kr) dk in m, a row an order, r in m."""
-        return self._static(np.asarray(r, dtype=float))[0]
+        return self.radius * disc_integrals(np.asarray(r, dtype=float) / self.radius, self.direction)
 
     def static_rounding(self, r: Any) -> Any:
-        """Return a bound of the rounding of `statics.static_kernel` times `static`, over the kernel's largest row."""
-        return self._static(np.asarray(r, dtype=float))[1]
-
-    @kept
-    def _static(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        s = r / self.radius
-        integrals = disc_integrals(s, self.direction)
-        return self.radius * integrals, self.radius * static_rounding(integrals, s)
+        """Return a bound of the rounding of `static_kernel` times `static`, over the kernel's largest row."""
+        s = np.asarray(r, dtype=float) / self.radius
+        return self.radius * static_rounding(disc_integrals(s, self.direction), s)
 
 
 Load = Point | UniformDisc

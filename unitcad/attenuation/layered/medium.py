@@ -286,7 +286,6 @@ class Stack:
         self.half_space = half_space
         self.least_loss = least_loss
         self._last: tuple[float, tuple[Material, ...]] | None = None
-        self._pole: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
         count, thickness = len(self.layers), sum(layer.thickness for layer in self.layers)
@@ -336,9 +335,7 @@ class Stack:
 
         The softest layer bends with the layers under it, not as a plate. Raises as `materials`.
         """
-        if self._pole is None or self._pole[0] != omega:
-            self._pole = omega, _last_pole(self.layers, self.materials(omega), omega)
-        return self._pole[1]
+        return _last_pole(self.layers, self.materials(omega), omega)
 
     def planes(self, k: Array, omega: float, depth: float = 0.0) -> list[Plane]:
         """Return the stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).

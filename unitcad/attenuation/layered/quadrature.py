@@ -3,10 +3,6 @@
 A panel runs from s = a to b, straight in s. The wavenumber is s itself, or, next to a branch point on the axis,
 base + turn s^2, in which the kernel has no root any more.
 
-Gauss's rule over panels, times all that a kernel meets there: the load's transform and the Bessel functions.
-
-Nothing of it is the medium's: it is kept for the next medium, frequency or tolerance whose path has the same panels.
-
 Detours of the path around single poles that lie on the real axis or next to it.
 
 If nothing is damped, or only a body that a wave hardly reaches, poles are on the axis or closer to it than any panel.
@@ -25,15 +21,15 @@ sampled as it varies, not as the waves do. The sum of the waves of all pieces at
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.special import factorial2
 
-from unitcad.attenuation.layered.loads import Load, bessel_bounds, bessels, kept
+from unitcad.attenuation.layered.loads import Load, bessel_bounds, bessels
 from unitcad.attenuation.layered.propagation import Array, Material
 
 PHASE = 8.0 * np.pi
@@ -49,18 +45,6 @@ Panels there are as long as a third of the path to the last pole: of 200 random 
 for it at rtol 1e-3, and two at 1e-6.
 """
 _MAX_HALVINGS = 40
-NODES = 16
-"""Of a panel, but for the first ones of a damped medium."""
-_FEWER = ((0.05, 8), (5e-3, 10))
-"""From which rtol on so many do for those."""
-_DAMPED = 0.1
-"""Loss factor from which on a layer's poles are seen from afar."""
-_STIFF = 100.0
-"""Over the stiffest layer: a half-space whose poles are next to 0, where panels are short."""
-_ALIKE = 12.0
-"""The last pole over the least wavenumber of a layer: up to that, no panel is longer than its features."""
-_NEAR = 4.0 * PHASE
-"""Up to the last pole: farther out, waves turn so much over a panel that few nodes save no time."""
 _CLOSE = 4
 """Halvings between the first panel and those beyond the least wavenumber's pole, each a panel."""
 
@@ -71,20 +55,6 @@ def wavenumbers(panels: Array, s: Array) -> tuple[Array, Array]:
     if not np.any(turn):
         return s, np.ones_like(s)
     return np.where(turn == 0, s, base + turn * s * s), np.where(turn == 0, 1.0, 2.0 * turn * s)
-
-
-def first_nodes(rtol: float, end: float, span: float, layers: Sequence[Material], half_space: Material) -> int:
-    """Return how many nodes each panel has at first; end, span: the last pole (1/m), phase per unit wavenumber (m).
-
-    If all layers are damped, and their waves not too different, the kernel is smooth over each panel, and few nodes
-    show it to a loose rtol.
-    """
-    stiffest = max((abs(m.shear) for m in layers), default=np.inf)
-    bodies = layers if abs(half_space.shear) > _STIFF * stiffest else (*layers, half_space)
-    damped = all(m.shear.imag >= _DAMPED * m.shear.real for m in bodies)
-    if not damped or end * span > _NEAR or end > _ALIKE * min(abs(m.ks2) ** 0.5 for m in bodies):
-        return NODES
-    return next((count for least, count in _FEWER if rtol >= least), NODES)
 
 
 def from_origin(end: float, stop: float, span: float, materials: tuple[Material, ...]) -> Array:
@@ -190,162 +160,26 @@ def pieced(panels: Array, corners: Array) -> Array:
     return np.concatenate([ends, np.repeat(panels[:, 2:], pieces, axis=0)], axis=1)
 
 
-class Rule(NamedTuple):
-    """Gauss's rule of n nodes from -1 to 1.
-
-    to_legendre (n, n): from values at the nodes to coefficients of degrees 0 to n - 1; degrees (n,): of the waves, the
-    least that meets an error of the rule for each coefficient; odd_factorials: (2m - 1)!! of these.
-    """
-
-    nodes: np.ndarray
-    weights: np.ndarray
-    to_legendre: np.ndarray
-    degrees: np.ndarray
-    odd_factorials: np.ndarray
+NODES = 16
+"""Of a panel: Gauss's rule."""
+_AT, _WEIGHTS = np.polynomial.legendre.leggauss(NODES)
+_TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_AT, NODES - 1))
+"""From values at the nodes to coefficients of degrees 0 to 15."""
+_DEGREES = np.arange(2 * NODES, NODES, -1)
+"""Of the waves: for each coefficient of the kernel the least degree that meets an error of the rule."""
+_ODD_FACTORIALS = np.array([float(factorial2(2 * m - 1)) for m in _DEGREES])
 
 
-@cache
-def rule(count: int) -> Rule:
-    """Return the rule of `count` nodes."""
-    at, weighing = np.polynomial.legendre.leggauss(count)
-    to_legendre = np.linalg.inv(np.polynomial.legendre.legvander(at, count - 1))
-    degrees = np.arange(2 * count, count, -1)
-    return Rule(at, weighing, to_legendre, degrees, np.array([float(factorial2(2 * m - 1)) for m in degrees]))
-
-
-class Turns(NamedTuple):
-    """How panels lie to the waves, shape (panels,).
-
-    closeness: the wavenumber over half of the panel's span of it; off_axis: whether it leaves the real axis; pieces:
-    into how many it has to be cut, that the waves turn little enough over each; level: whether none leaves the axis;
-    total: pieces of all.
-    """
-
-    closeness: np.ndarray
-    off_axis: np.ndarray
-    pieces: np.ndarray
-    level: bool
-    total: int
-
-
-class Weights(NamedTuple):
-    """Factors of the kernel at each node, a row an order, shape (orders, panels, nodes, radii).
-
-    values: of each panel's nodes, or of those of each piece; covered (orders, panels, radii): the integral of the
-    absolute waves; swing (panels, degrees) and most (orders, panels, radii): a bound of the rule's error is the sum of
-    the kernel's coefficients times `swing`, times `most`.
-    """
-
-    values: Array
-    covered: np.ndarray
-    swing: np.ndarray
-    most: np.ndarray
-
-
-def nodes(panels: Array, count: int) -> tuple[Array, Array]:
-    """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, count)."""
+def nodes(panels: Array) -> tuple[Array, Array]:
+    """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, nodes)."""
     half = (panels[:, 1] - panels[:, 0]) / 2.0
-    return wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * rule(count).nodes)
+    return wavenumbers(panels, (panels[:, 0] + half)[:, None] + half[:, None] * _AT)
 
 
 def closeness(panels: Array) -> np.ndarray:
     """Return the wavenumber over half of a panel's span of it, shape (panels,)."""
     ends = wavenumbers(panels, panels[:, :2])[0]
     return np.abs(ends).max(axis=1) / (np.abs(ends[:, 1] - ends[:, 0]) / 2.0)
-
-
-def _span(load: Load, r: np.ndarray) -> float:
-    return float(r.max()) + load.reach
-
-
-@kept
-def turns(load: Load, r: np.ndarray, panels: Array, phase: float) -> Turns:
-    """Return how panels lie to the waves at radii r (m), shape (n,), which may turn by `phase` over a piece."""
-    slope = wavenumbers(panels, panels[:, :2])[1]
-    turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(load, r)
-    pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
-    off_axis = np.any(panels[:, :2].imag, axis=1)
-    return Turns(closeness(panels), off_axis, pieces, not off_axis.any(), int(pieces.sum()))
-
-
-@kept
-def weights(
-    load: Load,
-    orders: tuple[int, ...],
-    r: np.ndarray,
-    panels: Array,
-    pieces: np.ndarray,
-    count: int,
-    folded: bool,
-) -> Weights:
-    """Return the weights of panels of `count` nodes, all on the axis or all off it, each cut into so many `pieces`.
-
-    At the nodes of a piece the kernel has the value of its panel's Legendre series. folded: whether the weights are
-    summed to those of the panel's nodes, which pays if they are cached.
-    """
-    if pieces.sum() == len(panels):
-        return _of_pieces(load, orders, r, panels, count)
-    first = np.cumsum(pieces) - pieces
-    of = np.repeat(np.arange(len(panels)), pieces)
-    place = np.arange(len(of)) - first[of]
-    cut = panels[of]
-    for side in (0, 1):
-        share = (place + side) / pieces[of]
-        cut[:, side] = panels[of, 0] * (1.0 - share) + panels[of, 1] * share
-    found = _of_pieces(load, orders, r, cut, count)
-    values = np.empty((len(orders), len(panels), count, r.size)) if folded else found.values
-    swing = np.empty((len(panels), count))
-    for number in np.unique(pieces):
-        at, here = pieces == number, pieces[of] == number
-        onto, restricted = spread(int(number), count)
-        if folded:
-            values[:, at] = onto @ found.values[:, here].reshape(len(orders), -1, number * count, r.size)
-        by_piece = found.swing[here].reshape(-1, number, 1, count)
-        swing[at] = (by_piece @ restricted).max(axis=1)[:, 0]
-    covered, most = (np.add.reduceat(one, first, axis=1) for one in (found.covered, found.most))
-    return Weights(values, covered, swing, most)
-
-
-@lru_cache(maxsize=128)
-def spread(number: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the matrices from a panel of `count` nodes to its equal pieces.
-
-    The matrix from the nodes' values (one more row) to those at the nodes of the pieces, and of each piece one that
-    bounds the coefficients of the kernel there by those of the panel, shape (pieces, count, count).
-    """
-    middles = (2.0 * np.arange(number) + 1.0) / number - 1.0
-    at = (middles[:, None] + rule(count).nodes / number).ravel()
-    degrees = np.polynomial.legendre.legvander(at, count - 1)
-    to_legendre = rule(count).to_legendre
-    return (degrees @ to_legendre).T, np.abs(to_legendre @ degrees.reshape(number, count, count))
-
-
-def _of_pieces(load: Load, orders: tuple[int, ...], r: np.ndarray, panels: Array, count: int) -> Weights:
-    """Return the weights of panels over which the waves turn little.
-
-    The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `load.weight`: their coefficient of degree m is
-    at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
-    meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times a factor that hardly changes
-    within six halves: there their envelope replaces the weight. Off the axis both grow by e^{|Im k| span}.
-    """
-    span = _span(load, r)
-    half = (panels[:, 1] - panels[:, 0]) / 2.0
-    gauss = rule(count)
-    k = nodes(panels, count)[0]
-    if not np.any(panels[:, :2].imag):
-        k, half = k.real, half.real  # Bessel functions of real numbers are cheaper
-    scale = load.transform(k) * (half[:, None] * gauss.weights)
-    values = bessels(orders, k[..., None] * r) * scale[..., None]
-    ends, slope = wavenumbers(panels, panels[:, :2])
-    half = np.abs(half)
-    phi = half * np.abs(slope).max(axis=1) * span
-    swing = phi[:, None] ** gauss.degrees / gauss.odd_factorials
-    swing = swing * (3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span))[:, None]
-    least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
-    at = np.maximum(least, covers) / 2.0
-    envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None]
-    most = np.minimum(envelope * bessel_bounds(orders, at[:, None] * r), load.weight)
-    return Weights(values, np.abs(values).sum(axis=-2), swing, most)
 
 
 _LAST = 4  # coefficients in which a pole is looked for
@@ -375,15 +209,15 @@ class Poles(NamedTuple):
     rest: np.ndarray
 
 
-def poles(kernel: Array, nodes: np.ndarray, to_legendre: np.ndarray, k: np.ndarray) -> Poles:
-    """Return the pole that each panel's kernel, shape (rows, panels, nodes), would have; k: wavenumber over half."""
-    last = to_legendre[-_LAST:].T
-    plain, turned = kernel @ last, (kernel * nodes) @ last
+def poles(kernel: Array, close: np.ndarray) -> Poles:
+    """Return the pole that each panel's kernel (with dk/ds), (rows, panels, nodes), would have; close: `closeness`."""
+    last = _TO_LEGENDRE[-_LAST:].T
+    plain, turned = kernel @ last, (kernel * _AT) @ last
     size = np.sum(np.abs(plain) ** 2, axis=(0, 2))
     safe = np.where(size > 0, size, 1.0)
     at = np.sum(np.conj(plain) * turned, axis=(0, 2)) / safe
     left = np.abs(turned - at[:, None] * plain)
-    uncertainty = np.sqrt(np.sum(left**2, axis=(0, 2)) / safe) + LOST * k
+    uncertainty = np.sqrt(np.sum(left**2, axis=(0, 2)) / safe) + LOST * close
     return Poles(np.where(size > 0, at, np.inf), uncertainty, left.sum(axis=-1))
 
 
@@ -421,23 +255,14 @@ _CANCELLED = 4e-15
 """Of the part taken out of the kernel: rounding in the last coefficients of the difference."""
 _SINGLE = 1e-7
 """Uncertainty of a pole below which a panel has no other, or only a negligible one."""
-_LESS = 0.75
-"""Times their share of the phase: of fewer nodes, which see less of the waves."""
 _CHUNK = 200_000  # integrand values held at once
 
 
 class Seen(Protocol):
-    """Loads that have one transform, on bodies that are alike, seen at radii r (m), shape (n,)."""
+    """A load, seen at radii r (m), shape (n,)."""
 
     @property
-    def load(self) -> Load:
-        """Return one of the loads: all have its transform."""
-        ...
-
-    @property
-    def orders(self) -> tuple[int, ...]:
-        """Return the orders of the Bessel functions that the rows of each body's kernel meet."""
-        ...
+    def load(self) -> Load: ...
 
     @property
     def r(self) -> np.ndarray: ...
@@ -448,76 +273,55 @@ class Seen(Protocol):
         ...
 
 
-class Each(NamedTuple):
-    """Of each panel, row and radius: the integral, that of the waves' absolute size, the rule's error.
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """Integrals over panels.
 
-    Shape (panels, rows, radii).
+    parts, covered, swing (panels, rows, radii): the integral over each, that of the waves' absolute size, the rule's
+    error; kernel (with dk/ds): the integrand; closeness: the wavenumber over half of the panel's span of it; peak, rest
+    (rows, panels): the kernel's largest value, a bound of the error of its Legendre series; known: the constant taken
+    out of each row.
     """
 
     parts: Array
     covered: np.ndarray
     swing: np.ndarray
-
-    def errors(self, rest: np.ndarray) -> np.ndarray:
-        """Return bounds of the errors; rest (rows, panels): the error of the kernel's series."""
-        return self.times(rest) + self.swing
-
-    def times(self, kernel: np.ndarray) -> np.ndarray:
-        """Return the integral of a kernel of that size over each panel; kernel (rows, panels)."""
-        return kernel.T[..., None] * self.covered
-
-
-@dataclass(frozen=True, eq=False)
-class Evaluated:
-    """Integrals over panels, of all together and, when asked, of each.
-
-    total, error, size (rows, radii): the integral over all panels, a bound of its error, its size if nothing cancelled;
-    kernel (with dk/ds): the integrand; closeness: the wavenumber over half of the panel's span of it; peak, rest (rows,
-    panels): the kernel's largest value, a bound of the error of its Legendre series; known: the constant taken out of
-    each row. Values of single panels are computed on request: only bad panels need them.
-    """
-
-    total: Array
-    error: np.ndarray
-    size: np.ndarray
     kernel: Array
     closeness: np.ndarray
     peak: np.ndarray
     rest: np.ndarray
     known: np.ndarray
-    by_panel: Callable[[], Each]
 
-    @cached_property
-    def each(self) -> Each:
-        return self.by_panel()
+    def _times(self, kernel: np.ndarray) -> np.ndarray:
+        """Return the integral of a kernel of that size over each panel; kernel (rows, panels)."""
+        return kernel.T[..., None] * self.covered
 
     @cached_property
     def errors(self) -> np.ndarray:
         """A bound of the error of each panel's part."""
-        return self.each.errors(self.rest)
+        return self._times(self.rest) + self.swing
 
-    @cached_property
+    @property
     def sizes(self) -> np.ndarray:
         """Size of each panel's part if nothing cancelled."""
-        return self.each.times(self.peak)
+        return self._times(self.peak)
 
     @cached_property
     def gains(self) -> np.ndarray:
         """By how much halving a panel lessens the largest part of its error, shape (panels,)."""
-        halved = 2.0 * self.each.times(
-            2.0 * _rounding(self.peak, self.closeness) + _CANCELLED * np.abs(self.known)[:, None]
-        )
+        left = 2.0 * _rounding(self.peak, self.closeness) + _CANCELLED * np.abs(self.known)[:, None]
+        halved = 2.0 * self._times(left)
         return np.maximum(self.errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0)
 
     @cached_property
     def poles(self) -> Poles:
         """The pole of each panel."""
-        return _poles(self.kernel, self.closeness)
+        return poles(self.kernel, self.closeness)
 
     @cached_property
     def hidden(self) -> np.ndarray:
         """Error of a detour around each panel's pole, shape (panels, rows, radii)."""
-        return HIDDEN * self.each.times(self.poles.rest)
+        return HIDDEN * self._times(self.poles.rest)
 
     @property
     def blurred(self) -> np.ndarray:
@@ -525,23 +329,10 @@ class Evaluated:
         return self.poles.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * self.closeness)
 
 
-def panel_poles(panels: Array, kernel: Array) -> Poles:
-    """Return the pole that each panel's kernel (with dk/ds), shape (rows, panels, nodes), would have."""
-    return _poles(kernel, closeness(panels))
-
-
-def _poles(kernel: Array, close: np.ndarray) -> Poles:
-    gauss = rule(kernel.shape[-1])
-    return poles(kernel, gauss.nodes, gauss.to_legendre, close)
-
-
 def evaluate(seen: Seen, panels: Array, kernel: Array, phase: float) -> Evaluated:
     """Integrate over each panel, on the axis or off it, its kernel (with dk/ds) of shape (rows, panels, nodes).
 
-    The rows are those of the first body, of the second one, and so on.
-
-    phase: the most that the fastest Bessel product may turn over a piece of a panel of 16 nodes; where there are fewer,
-    `_LESS` of their share of it.
+    phase: the most that the fastest Bessel product may turn over a piece of a panel.
 
     The kernel is its Legendre series to degree n - 1 and a rest. The rest is at most twice the last two coefficients
     that were seen, as soon as they halve within n degrees or so (to count on the rate at which they seem to fall was
@@ -550,25 +341,24 @@ def evaluate(seen: Seen, panels: Array, kernel: Array, phase: float) -> Evaluate
     all that is left of the last coefficients: halving doubles it. If the kernel is small relative to the constant taken
     out, their difference's rounding is left, and stays.
     """
-    count = kernel.shape[-1]
-    lie = turns(seen.load, seen.r, panels, phase if count == NODES else phase * _LESS * count / NODES)
+    close = closeness(panels)
     peak = np.abs(kernel).max(axis=-1)
-    series = np.abs(kernel @ rule(count).to_legendre.T)
-    rest = 2.0 * np.maximum(2.0 * series[..., -2:].sum(axis=-1), _rounding(peak, lie.closeness))
-    if not lie.level or len(kernel) * lie.total * count * seen.r.size > _CHUNK:
-        each = _in_chunks(seen, panels, lie, kernel, series)
-        total, error, size = (one.sum(axis=0) for one in (each.parts, each.errors(rest), each.times(peak)))
-
-        def by_panel() -> Each:
-            return each
-    else:
-        met = weights(seen.load, seen.orders, seen.r, panels, lie.pieces, count, True)
-        total, error, size = _together(met, kernel, series, np.array([rest, peak]))
-
-        def by_panel() -> Each:
-            return _integrated(met, kernel, series, lie.pieces)
-
-    return Evaluated(total, error, size, kernel, lie.closeness, peak, rest, seen.taken_out, by_panel)
+    series = np.abs(kernel @ _TO_LEGENDRE.T)
+    rest = 2.0 * np.maximum(2.0 * series[..., -2:].sum(axis=-1), _rounding(peak, close))
+    slope = wavenumbers(panels, panels[:, :2])[1]
+    turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(seen)
+    pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
+    off_axis = np.any(panels[:, :2].imag, axis=1)
+    shape = (len(panels), len(kernel), seen.r.size)
+    parts, covered, swing = np.empty(shape, dtype=np.complex128), np.empty(shape), np.empty(shape)
+    step = max(1, _CHUNK // (NODES * seen.r.size * len(kernel)))
+    for which in (np.flatnonzero(~off_axis), np.flatnonzero(off_axis)):
+        ends = np.cumsum(pieces[which])
+        for at in np.split(which, np.flatnonzero(np.diff(ends // step)) + 1):
+            if at.size:
+                found = _integrated(seen, panels[at], pieces[at], kernel[:, at], series[:, at])
+                parts[at], covered[at], swing[at] = found
+    return Evaluated(parts, covered, swing, kernel, close, peak, rest, seen.taken_out)
 
 
 def _rounding(peak: np.ndarray, close: np.ndarray) -> np.ndarray:
@@ -576,67 +366,81 @@ def _rounding(peak: np.ndarray, close: np.ndarray) -> np.ndarray:
     return ROUNDING * close * peak
 
 
-def _together(
-    met: Weights, kernel: Array, series: np.ndarray, rest_and_peak: np.ndarray
+def _span(seen: Seen) -> float:
+    return float(seen.r.max()) + seen.load.reach
+
+
+def _integrated(
+    seen: Seen, panels: Array, pieces: np.ndarray, kernel: Array, series: np.ndarray
 ) -> tuple[Array, np.ndarray, np.ndarray]:
-    """Return the integral over all panels, a bound of its error and its size if nothing cancelled, (rows, radii).
+    """Return the integrals over panels, all on the axis or all off it, each cut into so many `pieces`.
 
-    series (rows, panels, degrees): the kernel's coefficients, absolute; rest_and_peak (2, rows, panels): their error,
-    and the kernel's largest value.
+    At a piece's nodes the kernel has the value of its panel's Legendre series; `series`: its coefficients, absolute.
+    With them that of the waves' absolute size and a bound of the rule's error, each of shape (panels, rows, radii).
     """
-    orders, *_, radii = met.values.shape
-    total = products(kernel.reshape(-1, orders, kernel[0].size), met.values.reshape(orders, -1, radii))
-    swing = (series.reshape(-1, orders, *series.shape[1:]) * met.swing).sum(axis=-1)
-    left_out, size = rest_and_peak.reshape(2, *swing.shape)[..., None, :] @ met.covered
-    error = swing[..., None, :] @ met.most + left_out
-    return total.reshape(-1, radii), error.reshape(-1, radii), size.reshape(-1, radii)
+    first = np.cumsum(pieces) - pieces
+    of = np.repeat(np.arange(len(panels)), pieces)
+    share = ((np.arange(len(of)) - first[of])[:, None] + [0.0, 1.0]) / pieces[of, None]
+    cut = panels[of]
+    cut[:, :2] = panels[of, :1] * (1.0 - share) + panels[of, 1:2] * share
+    kernel, series, number = kernel[:, of], series[:, of], pieces[of]
+    for count in np.unique(pieces[pieces > 1]):
+        here = np.flatnonzero(number == count)
+        onto, restricted = _spread(int(count))
+        values, sizes = products(kernel[:, here[::count]], onto), series[:, here[::count]] @ restricted
+        kernel[:, here], series[:, here] = (one.reshape(len(kernel), -1, NODES) for one in (values, sizes))
+    values, swing, most = _waves(seen, cut)
+    found = (
+        products(kernel, values),
+        np.abs(values).sum(axis=-2),
+        (series * swing).sum(axis=-1)[..., None] * most,
+    )
+    parts, covered, error = (np.add.reduceat(one, first, axis=1).swapaxes(0, 1) for one in found)
+    return parts, covered, error
 
 
-def _integrated(met: Weights, kernel: Array, series: np.ndarray, pieces: np.ndarray) -> Each:
-    """Return the integrals over each panel, all on the axis or all off it.
+@lru_cache(maxsize=128)
+def _spread(number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrices from a panel to its `number` equal pieces, shape (nodes, pieces * nodes).
 
-    series: coefficients, absolute; pieces (panels,): of each panel, if the weights are not of panels but of pieces.
+    From the values at its nodes to those at theirs, and from the sizes of its coefficients to bounds of theirs.
     """
-    coefficients = series.reshape(-1, len(met.values), *series.shape[1:])
-    swing = (coefficients * met.swing).sum(axis=-1)[..., None] * met.most
-    of_panels = met.values.shape[1] == len(pieces)
-    values = kernel if of_panels else _at_pieces(kernel, pieces)
-    parts = products(values.reshape(-1, *met.values.shape[:3]), met.values)
-    if not of_panels:
-        parts = np.add.reduceat(parts, np.cumsum(pieces) - pieces, axis=2)
-    quantities = (parts, np.broadcast_to(met.covered, swing.shape), swing)
-    return Each(*(one.reshape(*kernel.shape[:2], -1).swapaxes(0, 1) for one in quantities))
+    middles = (2.0 * np.arange(number) + 1.0) / number - 1.0
+    degrees = np.polynomial.legendre.legvander((middles[:, None] + _AT / number).ravel(), NODES - 1)
+    bounds = np.abs(_TO_LEGENDRE @ degrees.reshape(number, NODES, NODES))
+    return (degrees @ _TO_LEGENDRE).T, bounds.reshape(-1, NODES).T
 
 
-def _at_pieces(kernel: Array, pieces: np.ndarray) -> Array:
-    """Return the kernel at the nodes of each panel's pieces, shape (rows, pieces, nodes)."""
-    count = kernel.shape[-1]
-    values, numbers = np.repeat(kernel, pieces, axis=1), np.repeat(pieces, pieces)
-    for number in np.unique(pieces[pieces > 1]):
-        onto, _ = spread(int(number), count)
-        values[:, numbers == number] = products(kernel[:, pieces == number], onto).reshape(len(kernel), -1, count)
-    return values
+def _waves(seen: Seen, panels: Array) -> tuple[Array, np.ndarray, np.ndarray]:
+    """Return the weights of panels over which the waves turn little, shape (rows, panels, nodes, radii).
 
+    With them `swing` (panels, degrees) and `most` (rows, panels, radii): a bound of the rule's error is the sum of the
+    kernel's coefficients times `swing`, times `most`.
 
-def _in_chunks(seen: Seen, panels: Array, lie: Turns, kernel: Array, series: np.ndarray) -> Each:
-    """Return the integrals over each panel, some of them at once that are all on the axis or all off it."""
-    count = kernel.shape[-1]
-    shape = (len(panels), len(kernel), seen.r.size)
-    sums = Each(np.empty(shape, dtype=np.complex128), *np.empty((2, *shape)))
-    step = max(1, _CHUNK // (count * seen.r.size * len(kernel)))
-    for which in (np.flatnonzero(~lie.off_axis), np.flatnonzero(lie.off_axis)):
-        ends = np.cumsum(lie.pieces[which])
-        for at in np.split(which, np.flatnonzero(np.diff(ends // step)) + 1):
-            if at.size:
-                pieces = lie.pieces[at]
-                met = weights(seen.load, seen.orders, seen.r, panels[at], pieces, count, False)
-                for whole, part in zip(sums, _integrated(met, kernel[:, at], series[:, at], pieces), strict=True):
-                    whole[at] = part
-    return sums
+    The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `load.weight`: their coefficient of degree m is
+    at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
+    meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times a factor that hardly changes
+    within six halves: there their envelope replaces the weight. Off the axis both grow by e^{|Im k| span}.
+    """
+    load, r, span = seen.load, seen.r, _span(seen)
+    half = (panels[:, 1] - panels[:, 0]) / 2.0
+    k = nodes(panels)[0]
+    if not np.any(panels[:, :2].imag):
+        k, half = k.real, half.real  # Bessel functions of real numbers are cheaper
+    values = bessels(load.orders, k[..., None] * r) * (load.transform(k) * (half[:, None] * _WEIGHTS))[..., None]
+    ends, slope = wavenumbers(panels, panels[:, :2])
+    half = np.abs(half)
+    phi = half * np.abs(slope).max(axis=1) * span
+    swing = phi[:, None] ** _DEGREES / _ODD_FACTORIALS
+    swing = swing * (3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span))[:, None]
+    least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
+    at = np.maximum(least, covers) / 2.0
+    envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None]
+    return values, swing, np.minimum(envelope * bessel_bounds(load.orders, at[:, None] * r), load.weight)
 
 
 def products(kernel: Array, waves: Array) -> Array:
-    """Sum kernel (.., rows, panels, nodes) times waves (rows, panels, nodes, radii); (.., rows, panels, radii).
+    """Sum kernel (rows, panels, nodes) times waves (rows, panels, nodes, radii) over the nodes.
 
     By products of real matrices with two columns. A matrix by a complex vector starts BLAS's threads for each of them
     from 256 radii on.
