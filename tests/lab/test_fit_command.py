@@ -21,7 +21,7 @@ from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_input, estimate_spec
-from unitcad.lab.fit_files import contents
+from unitcad.lab.fit_command import contents
 from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.validation import load
 

@@ -17,7 +17,7 @@ from unitcad.attenuation.edge.models import stored
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input, estimate_spec, fit_of, frequency_table_of_spec
-from unitcad.lab.fit_files import fit_toml
+from unitcad.lab.fit_command import fit_toml
 from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.validation import load
 
