@@ -20,8 +20,7 @@ from benchmarks.accuracy.synthetic_records import (
     synthetic,
 )
 from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE
-from unitcad.lab.chains import bandpass
-from unitcad.lab.chains.chain import ChainTable
+from unitcad.lab.chains import ChainTable, bandpass
 from unitcad.lab.chains.line import Mains, fit_line
 from unitcad.lab.measuring import level
 

@@ -30,9 +30,8 @@ from unitcad.arrays.crosstalk_maps import crosstalk_files  # noqa: E402
 from unitcad.arrays.patch import patch_moulds  # noqa: E402
 from unitcad.arrays.patch_pictures import pictures as patch_pictures  # noqa: E402
 from unitcad.cache import MemoryStore  # noqa: E402
-from unitcad.lab.phantom import phantom_set  # noqa: E402
-from unitcad.lab.phantom.phantom_files import box_picture  # noqa: E402
-from unitcad.lab.phantom.recipe import load_phantom  # noqa: E402
+from unitcad.lab.phantom import load_phantom, phantom_set  # noqa: E402
+from unitcad.lab.phantom_command import box_picture  # noqa: E402
 from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # noqa: E402
 from unitcad.pipeline.write import build  # noqa: E402
 from unitcad.report import write_report  # noqa: E402

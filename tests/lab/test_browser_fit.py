@@ -3,7 +3,7 @@
 import pytest
 from chromium import Visit
 
-from unitcad.lab.fit_files import fit_toml
+from unitcad.lab.fit_command import fit_toml
 from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.pipeline.write import build
 from unitcad.report import write_report

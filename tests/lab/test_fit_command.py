@@ -13,15 +13,15 @@ import pytest
 import tomli_w
 from scipy import stats
 from typer.testing import CliRunner
+from unitcad.attenuation.edge.variant_units import nominal
 
 from unitcad.attenuation.edge.closed_form import crossings, published_path
-from unitcad.attenuation.edge.measured import nominal
 from unitcad.attenuation.edge.models import COMPARED
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimate_inputs import estimate_input, estimate_spec
-from unitcad.lab.fit_files import contents
+from unitcad.lab.fit_command import contents
 from unitcad.lab.fitting import fit_lab, load_fit_lab
 from unitcad.validation import load
 

@@ -5,8 +5,8 @@ import pytest
 from recordings import COUNT, RATE, columns
 
 from unitcad.lab.campaign import RecordingTable, SensorTable
-from unitcad.lab.columns import column_of
-from unitcad.lab.columns import columns as columns_of_test
+from unitcad.lab.material import column_of
+from unitcad.lab.material import columns as columns_of_test
 from unitcad.lab.readers import AS_FOUND, Layout, open_recording
 from unitcad.lab.record import open_signal
 

@@ -16,9 +16,7 @@ from unitcad.attenuation import FractionalKelvinVoigt
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimate_inputs import estimate_input
-from unitcad.lab.columns import declared
-from unitcad.lab.dynamic import evaluate_dynamic, read_dynamic
-from unitcad.lab.tensile import Specimen, evaluate, header_of, read_curve
+from unitcad.lab.material import Specimen, declared, evaluate, evaluate_dynamic, header_of, read_curve, read_dynamic
 from unitcad.validation import load
 
 C10 = 1.2e4

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from unitcad.lab import measured_files
+from unitcad.lab import measure_command
 from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measuring import measure
 
@@ -72,12 +72,12 @@ def test_two_motors_at_once_give_no_level(tmp_path):
     said = {one.where: one.message for one in result.findings if one.code == "L104"}
     assert said["m0.wav"] == "118.00 Hz, 126.00 Hz, of 1.00, 0.50 of the strongest; run one motor at a time"
     assert said["e0.wav"] == "126.00 Hz, 118.00 Hz, of 1.00, 0.67 of the strongest; run one motor at a time"
-    data = measured_files.as_data(result)["records"]
+    data = measure_command.as_data(result)["records"]
     assert [record["amplitude_um"] for record in data] == [None] * 6
     assert [round(line["frequency_hz"]) for line in data[0]["lines"]] == [118, 126]
-    shown = [text for text in measured_files.lines(result) if ".wav" in text]
+    shown = [text for text in measure_command.lines(result) if ".wav" in text]
     assert all(text.endswith("not used, L104 several lines") for text in shown)
-    assert "<td>no</td>" in measured_files.page(result, {})
+    assert "<td>no</td>" in measure_command.page(result, {})
 
 
 def test_a_motor_below_the_band_is_not_measured_by_its_harmonic(tmp_path):

@@ -7,10 +7,9 @@ import pytest
 from scipy.io import wavfile
 
 from unitcad.errors import Refusal
-from unitcad.lab import measured_files
+from unitcad.lab import measure_command
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable, read_campaign
 from unitcad.lab.chains import CHAINS
-from unitcad.lab.chains.chain import Chain
 from unitcad.lab.chains.line import Mains
 from unitcad.lab.measuring import measure
 from unitcad.lab.record import measure_record
@@ -108,14 +107,14 @@ RECORDS = {f"{key}{i}": line(size + i, i, 121.3) for key, size in (("m", 300), (
 def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path):
     clipped = {**RECORDS, "e1": np.clip(RECORDS["e1"], -30, 30)}
     result = campaign_of(tmp_path, clipped, UNIT)
-    lines = {text.split(", ")[2].split(": ")[0]: text for text in measured_files.lines(result)}
+    lines = {text.split(", ")[2].split(": ")[0]: text for text in measure_command.lines(result)}
     assert "not used" in lines["e1.wav"]
     assert "+-" not in lines["e1.wav"]
     assert "+-" in lines["e0.wav"]
-    data = {one["file"]: one for one in measured_files.as_data(result)["records"]}
+    data = {one["file"]: one for one in measure_command.as_data(result)["records"]}
     assert (data["e1.wav"]["usable"], data["e1.wav"]["u_um"]) == (False, None)
     assert data["e0.wav"]["u_um"] > 0
-    measured_files.write(result, tmp_path / "out")
+    measure_command.write(result, tmp_path / "out")
     page = (tmp_path / "out" / "measure.html").read_text()
     row = page[page.index("<td>e1.wav") :][: page[page.index("<td>e1.wav") :].index("</tr>")]
     assert row.startswith("<td>e1.wav</td><td>no</td>")
@@ -127,10 +126,10 @@ def test_a_run_leaves_its_own_files_alone(tmp_path):
     point = "[[unit.point]]\ndistance_mm = 5.0\nrecords = " + '["e0.wav", "e1.wav", "e2.wav"]\n'.replace("e", "p", 1)
     more = {**RECORDS, **{f"p{i}": line(40 + i, 7 + i) for i in range(3)}}
     out = tmp_path / "out"
-    measured_files.write(campaign_of(tmp_path, more, UNIT + point.replace('"e', '"p')), out)
+    measure_command.write(campaign_of(tmp_path, more, UNIT + point.replace('"e', '"p')), out)
     (out / "notes.txt").write_text("mine")
     (out / "record-01-time.svg.bak").write_text("mine")
-    measured_files.write(campaign_of(tmp_path, RECORDS, UNIT), out)
+    measure_command.write(campaign_of(tmp_path, RECORDS, UNIT), out)
     found = {path.name for path in out.iterdir()}
     kinds = ("time", "periods", "spectrum")
     charts = {f"record-{i:02d}-{kind}.svg" for i in range(1, 7) for kind in kinds} | {"decay-01.svg"}
@@ -141,7 +140,7 @@ def test_a_run_leaves_its_own_files_alone(tmp_path):
 def test_an_interrupted_run_leaves_no_measured_toml(tmp_path, monkeypatch):
     """The levels never stand beside another run's charts."""
     out = tmp_path / "out"
-    measured_files.write(campaign_of(tmp_path, RECORDS, UNIT), out)
+    measure_command.write(campaign_of(tmp_path, RECORDS, UNIT), out)
     whole = Path.replace
 
     def full(self, target):
@@ -151,7 +150,7 @@ def test_an_interrupted_run_leaves_no_measured_toml(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(OSError, match="disk full"):
-        measured_files.write(campaign_of(tmp_path, RECORDS, UNIT), out)
+        measure_command.write(campaign_of(tmp_path, RECORDS, UNIT), out)
     assert not (out / "measured.toml").exists()
     assert not [path for path in out.iterdir() if path.name.startswith(".tmp")]
 
@@ -174,19 +173,19 @@ def test_the_motors_sensor_has_a_blank_of_its_own(tmp_path):
 
 def test_a_chain_is_one_module_and_one_entry(tmp_path, monkeypatch):
     """A chain that reads the standard deviation: its name, gain, levels and refusals come with the entry."""
-
-    def rms(table):
-        return Chain(
-            "rms",
-            lambda x, rate, fit: float(np.sqrt(2) * np.std(x)),
-            unfit=lambda fits: "it is out of order" if table.q == 7 else "",
-            gain=lambda hertz: 0.95,
-        )
-
+    (tmp_path / "rms_chain.py").write_text(
+        "import numpy as np\n"
+        "from unitcad.lab.chains import Chain\n"
+        "def chain(table):\n"
+        "    broken = 'it is out of order' if table.q == 7 else ''\n"
+        "    rms = lambda x, rate, fit: float(np.sqrt(2) * np.std(x))\n"
+        "    return Chain('rms', rms, unfit=lambda fits: broken, gain=lambda hertz: 0.95)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(Refusal, match="rms") as refused:
         campaign_of(tmp_path, RECORDS, '[chain]\nuse = ["line", "rms"]\n' + UNIT)
     assert refused.value.field == "chain.use.1"
-    monkeypatch.setitem(CHAINS, "rms", rms)
+    monkeypatch.setitem(CHAINS, "rms", "rms_chain:chain")
     result = campaign_of(tmp_path, RECORDS, '[chain]\nuse = ["line", "rms"]\n' + UNIT)
     levels = {one.chain: one.level.value for one in result.levels}
     assert levels["rms"] == pytest.approx(levels["line"], rel=1e-3)

@@ -5,9 +5,9 @@ import pytest
 from scipy.io import wavfile
 
 from unitcad.errors import Refusal
-from unitcad.lab import measured_files
+from unitcad.lab import measure_command
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, UnitTable, read_campaign
-from unitcad.lab.chains.chain import ChainTable
+from unitcad.lab.chains import ChainTable
 from unitcad.lab.chains.line import FALSE_ALARM, Mains, most_of_noise
 from unitcad.lab.measuring import measure
 from unitcad.lab.readers import expect_ending
@@ -116,11 +116,11 @@ def test_the_length_that_was_used_is_shown(tmp_path):
     records = {f"m{i}": line(300, 127.3, i) for i in range(3)} | {f"e{i}": line(100, 127.3, 9 + i) for i in range(3)}
     records["e1"] = np.where(TIME > 0.6, records["e1"], 0.0)
     result = measured(tmp_path, records)
-    (shown,) = [text for text in measured_files.lines(result) if "e1.wav" in text]
+    (shown,) = [text for text in measure_command.lines(result) if "e1.wav" in text]
     used = result.records["a"][4].steady_s
     assert 1.0 < used < 1.4
     assert f"127.30 Hz over {used:.3g} s of 2 s" in shown
-    measured_files.write(result, tmp_path / "out")
+    measure_command.write(result, tmp_path / "out")
     assert f"<td>{used:.3g} of 2</td>" in (tmp_path / "out/measure.html").read_text()
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unitcad.lab.tensile import default_method, fit_start, moduli, secant
+from unitcad.lab.material import default_method, fit_start, moduli, secant
 
 YOUNG = 6e4
 

@@ -16,8 +16,8 @@ from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.kernels.mesh import realise
-from unitcad.lab.phantom import bench, phantom_files, phantom_set
-from unitcad.lab.phantom.recipe import PhantomTable, load_phantom, modulus_by_table
+from unitcad.lab import phantom_command
+from unitcad.lab.phantom import PhantomTable, load_phantom, modulus_by_table, phantom_set
 from unitcad.shape import box, exact_volume
 from unitcad.shape.lettering import engraving
 from unitcad.spec import convert
@@ -74,11 +74,11 @@ def test_the_range_has_what_the_frequency_may_bring_and_every_page_says_quasi_st
         value, low, high = modulus_by_table(layer.silicone, layer.thinner_pct, "layers.0")
         assert one.high_kpa == pytest.approx(factor * high)
         assert (one.modulus_kpa, one.low_kpa) == (value, low)
-    words = bench.casting_markdown(made)
+    words = phantom_command.casting_markdown(made)
     assert "They are quasi-static" in words
     assert "has a factor of 1.62 for 125 Hz" in words
     assert "from quasi-static compression" in words.split("## What to expect")[1]
-    assert phantom_files.tissue_toml(made).count("quasi-static compression; high: also times 1.62") == 3
+    assert phantom_command.tissue_toml(made).count("quasi-static compression; high: also times 1.62") == 3
 
 
 def test_the_response_is_the_layered_solver_s():
@@ -115,7 +115,7 @@ def test_tools_and_layers_fill_the_box_without_overlap():
 
 def test_the_grams_are_the_volumes_and_the_thinner_the_recipe():
     made = _skin()
-    pours = bench.pours(made)
+    pours = phantom_command.pours(made)
     assert [pour.name for pour in pours] == ["muscle", "hypodermis", "skin"]
     for pour in pours:
         layer, one = made.table.layers[pour.layer], made.recipes[pour.layer]
@@ -157,7 +157,7 @@ def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path):
     axial = layered["drives"]["axial"]
     value = axial["u_z"]["value"]
     assert value[30] / value[0] == pytest.approx(found["response"]["value"][-1], rel=1e-2)
-    again = phantom_files.contents(_skin())
+    again = phantom_command.contents(_skin())
     assert all((folder / name).read_bytes() == content for name, content in again.items())
 
 
@@ -217,16 +217,17 @@ def test_a_solid_of_the_box_is_exact():
 
 
 def test_the_bill_has_what_the_procedure_asks_for():
-    text = bench.casting_markdown(_skin()).split("## Needed")[0].lower()
-    items = " ".join(f"{one.item} {one.note}" for one in bench.bill(_skin())).lower()
+    text = phantom_command.casting_markdown(_skin()).split("## Needed")[0].lower()
+    items = " ".join(f"{one.item} {one.note}" for one in phantom_command.bill(_skin())).lower()
     for asked in ("tape", "clips", "pen", "rubber band", "emery paper", "primer", "degas", "talc", "calliper", "blade"):
         assert asked in text or asked == "calliper", asked
         assert asked in items, asked
-    assert next(one for one in bench.bill(_skin()) if one.item == "silicone primer").note.startswith("optional")
+    (primer,) = [one for one in phantom_command.bill(_skin()) if one.item == "silicone primer"]
+    assert primer.note.startswith("optional")
 
 
 def test_the_sheet_wants_the_first_layer_s_height_of_the_tray_and_the_others_of_frames():
-    lines = bench.sheet_markdown(_skin()).splitlines()
+    lines = phantom_command.sheet_markdown(_skin()).splitlines()
     frames = next(line for line in lines if line.startswith("Frame heights"))
     assert "muscle" not in frames
     assert "hypodermis (4)" in frames

@@ -9,8 +9,8 @@ from msgspec.structs import replace
 
 from unitcad.export.svg import text_width
 from unitcad.kernels.mesh import bounds, realise
-from unitcad.lab.phantom import phantom_files, phantom_set
-from unitcad.lab.phantom.recipe import load_phantom
+from unitcad.lab import phantom_command
+from unitcad.lab.phantom import load_phantom, phantom_set
 from unitcad.shape import box, cylinder, moved, union
 from unitcad.shape.lettering import engraving
 
@@ -59,7 +59,7 @@ def test_a_frame_has_the_number_of_its_pour_where_the_blade_does_not_run():
 
 def test_every_name_of_the_section_is_on_the_page():
     made = _skin()
-    root = ET.fromstring(phantom_files.contents(made)["section.svg"])
+    root = ET.fromstring(phantom_command.contents(made)["section.svg"])
     named = {body.name for body in (*made.tools, *made.layers)}
     texts = {str(one.text): float(one.get("x", "nan")) for one in root.iter("{http://www.w3.org/2000/svg}text")}
     rows = sorted((x - text_width(t) / 2, x + text_width(t) / 2) for t, x in texts.items() if t in named)

@@ -14,7 +14,7 @@ from unitcad.catalogue import figures
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimate_inputs import estimate_spec
-from unitcad.lab.scoring import COLUMNS, load_figure, score
+from unitcad.lab.scoring import COLUMNS, load_figure, score_figure
 from unitcad.validation import load
 
 HEAD = ",".join(COLUMNS) + "\n"
@@ -29,7 +29,7 @@ def written(folder: Path, *rows: str) -> str:
 def test_the_levels_are_those_of_an_estimate_and_do_not_depend_on_the_figure(tmp_path: Path) -> None:
     """Blind: a figure that is ten times off changes its score, and no model's level."""
     row = "embedded D30/E10,0,{},0.05,figure 8"
-    data = score(load_figure(written(tmp_path, row.format(0.62))))
+    data = score_figure(load_figure(written(tmp_path, row.format(0.62))))
     spec = load("embedded", {"layers.0.material": "dragon-skin-30", "layers.1.material": "ecoflex-00-10"})
     expected = estimate_spec(spec)
     (one,) = data["units"]
@@ -38,13 +38,13 @@ def test_the_levels_are_those_of_an_estimate_and_do_not_depend_on_the_figure(tmp
         factor = np.exp(abs(np.log(one["levels"][model] / 0.62)))
         assert data["scores"][model] == pytest.approx(factor, rel=1e-4)
     assert (one["p10"], one["p90"]) == pytest.approx((expected["answer"]["p10"], expected["answer"]["p90"]), rel=1e-5)
-    other = score(load_figure(written(tmp_path, row.format(0.062))))
+    other = score_figure(load_figure(written(tmp_path, row.format(0.062))))
     assert other["units"][0]["levels"] == one["levels"]
     assert (data["held"], other["held"]) == ("1 of 1", "0 of 1")
 
 
 def test_a_unit_that_the_constants_were_fitted_to_is_not_scored(tmp_path: Path) -> None:
-    data = score(load_figure(written(tmp_path, "embedded E10/D30,0,0.156,,text", "single E10,0,0.4518,,text")))
+    data = score_figure(load_figure(written(tmp_path, "embedded E10/D30,0,0.156,,text", "single E10,0,0.4518,,text")))
     assert [one["blind"] for one in data["units"]] == [False, False]
     assert set(data["scores"].values()) == {None}
     s = stored()["rule"]["s"]
@@ -53,7 +53,7 @@ def test_a_unit_that_the_constants_were_fitted_to_is_not_scored(tmp_path: Path) 
 
 def test_points_farther_out_are_over_the_unit_s_own_level(tmp_path: Path) -> None:
     rows = ["embedded D30/D10,0,0.5,,f", "embedded D30/D10,10,0.1,,f"]
-    data = score(load_figure(written(tmp_path, *rows)))
+    data = score_figure(load_figure(written(tmp_path, *rows)))
     (one,) = data["decay"]
     curve = estimate_spec(load("embedded"))["layered"]["drives"]["flat"]["u"]
     assert one["measured"] == 0.2
@@ -69,7 +69,7 @@ def test_the_shipped_figure_says_that_it_is_synthetic_and_is_scored(tmp_path: Pa
     assert "encapsulating E10/D30 *" in done.stdout
     assert "factor error, blind" in done.stdout
     data = json.loads(CliRunner().invoke(app, ["score", "synthetic", "--json"]).stdout)
-    assert data == json.loads(json.dumps(score(load_figure("synthetic"))))
+    assert data == json.loads(json.dumps(score_figure(load_figure("synthetic"))))
     assert len(data["decay"]) == 5
 
 

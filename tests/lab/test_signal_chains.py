@@ -9,8 +9,7 @@ from scipy.stats import ttest_ind, ttest_rel
 
 from benchmarks.accuracy.synthetic_records import LENGTH_S, PLAIN, RATE, Scenario, synthetic
 from unitcad.errors import Refusal
-from unitcad.lab.chains import bandpass
-from unitcad.lab.chains.chain import ChainTable
+from unitcad.lab.chains import ChainTable, bandpass
 from unitcad.lab.chains.line import Mains, fit_line
 from unitcad.lab.measuring import level
 

@@ -9,8 +9,7 @@ import pytest
 
 from unitcad import catalogue
 from unitcad.estimate_inputs import estimate_input, estimate_spec
-from unitcad.lab.columns import declared
-from unitcad.lab.tensile import Specimen, evaluate, read_curve
+from unitcad.lab.material import Specimen, declared, evaluate, read_curve
 from unitcad.validation import load
 
 DATA = Path(__file__).parent / "data" / "soft-robotics-materials-database"

@@ -21,7 +21,7 @@ from unitcad.arrays.patch import patch_moulds, patch_parts
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import read_campaign
-from unitcad.lab.measured_files import charts_of
+from unitcad.lab.measure_command import charts_of
 from unitcad.lab.measuring import measure
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.serve.server import serve

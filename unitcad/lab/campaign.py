@@ -14,11 +14,9 @@ from msgspec import Meta
 
 from unitcad.errors import Refusal
 from unitcad.files import sha256
-from unitcad.lab.chains import chains_of
-from unitcad.lab.chains.chain import ChainTable
-from unitcad.lab.readers import expect_ending
+from unitcad.lab.chains import ChainTable, chains_of
+from unitcad.lab.readers import Quantity, expect_ending, to_si
 from unitcad.lab.unit_files import Cavity, file_of, source_file
-from unitcad.lab.units import Quantity, to_si
 from unitcad.spec.convert import convert
 from unitcad.spec.raw import Table
 from unitcad.validation.typed_files import load_file

@@ -1,18 +1,238 @@
-"""unitcad fit."""
+"""unitcad fit: lab-fit.toml, fit.json, fit.md and fit.svg. The same input, the same bytes."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import msgspec
+import numpy as np
 import typer
 from rich.table import Column, Table
 
 from unitcad import files
+from unitcad.attenuation.edge.estimates import rounded
+from unitcad.attenuation.edge.lab_fit import PERCENT, ModelFit, quantiles
+from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE
+from unitcad.attenuation.edge.scores import sign_flip_p
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
-from unitcad.lab import fit_files
+from unitcad.export.chart import Series, chart
 from unitcad.lab.fitting import Fitted, fit_lab, load_fit_lab
+from unitcad.spec.toml import text_of, without_none
+
+FIT = "lab-fit.toml"
+DIFFERING = (
+    "Level by each model, fitted without the unit, and the factor between the highest and the lowest. "
+    "A second cast of these units decides most."
+)
+_MOST_DIFFERING = 5
+
+
+def contents(result: Fitted) -> dict[str, str]:
+    """Return the files by name."""
+    return {
+        FIT: fit_toml(result),
+        "fit.json": json.dumps(as_data(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+        "fit.svg": _chart(result),
+        "fit.md": page(result),
+    }
+
+
+def fit_toml(result: Fitted) -> str:
+    """Return the fit as an estimate takes it (`[estimate] fit`)."""
+    return text_of(without_none(msgspec.to_builtins(result.fit)))
+
+
+def as_data(result: Fitted) -> dict[str, Any]:
+    """Return everything as JSON-ready data."""
+    settings = result.lab.settings
+    scores = {
+        source: {"reason": compared.reason}
+        if compared.reason
+        else {
+            name: {"left_out": one.score, "range": one.range, "held_80": one.held()}
+            for name, one in compared.judged.items()
+        }
+        for source, compared in result.by_source.items()
+    }
+    return {
+        "name": settings.name,
+        "note": settings.note,
+        "moduli": settings.moduli,
+        "by_moduli": rounded(scores, 6),
+        "units": unit_rows(result),
+        "models_differ_on": differing_units(result),
+        "fit": without_none(msgspec.to_builtins(result.fit)),
+        "prior": prior_text(result),
+        "warnings": warnings(result),
+    }
+
+
+def unit_rows(result: Fitted) -> list[dict[str, Any]]:
+    """Return each unit's measured level and the leading model's prediction without it."""
+    chosen = result.chosen
+    assert chosen.campaigns is not None
+    name = chosen.leads
+    judged, table = chosen.judged[name], chosen.campaigns.table
+    rows = []
+    for i, unit in enumerate(table.names):
+        low, high = map(float, quantiles(judged.df, judged.centre[i], judged.scale[i]))
+        numbers = {"predicted": float(np.exp(judged.centre[i])), "p10": low, "p90": high}
+        row = {"unit": unit, "own": bool(judged.own[i]), "measured": float(table.levels[i]), "model": name, **numbers}
+        rows.append(rounded(row, 6))
+    return rows
+
+
+def differing_units(result: Fitted) -> list[dict[str, Any]]:
+    """Return the lab's own units with the level by each model, fitted without the unit, and the extremes' factor.
+
+    The unit on which the models differ most comes first.
+    """
+    judged = {name: one for name, one in result.chosen.judged.items() if name != BASELINE}
+    own = next(iter(judged.values())).own
+    rows = []
+    for i, unit in zip(np.flatnonzero(own), result.lab.units, strict=True):
+        levels = {name: float(np.exp(one.centre[i])) for name, one in judged.items()}
+        factor = max(levels.values()) / min(levels.values())
+        rows.append(rounded({"unit": unit.name, "levels": levels, "factor": factor, "measured": unit.level.value}, 6))
+    return sorted(rows, key=lambda row: -row["factor"])
+
+
+def prior_text(result: Fitted) -> str:
+    """State the weight of the stored constants."""
+    settings, chosen = result.lab.settings, result.chosen
+    assert chosen.campaigns is not None
+    count = int(np.sum(~chosen.campaigns.own))
+    if not count:
+        return "Only the lab's own units count: nothing is shrunk."
+    weight = count / (count * settings.between_labs**2 + 1)
+    return (
+        f"The stored constants, of {count} units, weigh as much as {weight:.2g} of the lab's own "
+        f"(between_labs {settings.between_labs:g}: assumed, not measured)."
+    )
+
+
+def constants_text(one: ModelFit) -> str:
+    """Return stored -> fitted (90 % range) of each constant."""
+    parts = []
+    for name, value in one.constants.items():
+        stored = f"{one.stored[name]:.3g} -> " if one.stored else ""
+        parts.append(f"{name} {stored}{value:.3g} ({one.low[name]:.3g} to {one.high[name]:.3g})")
+        parts[-1] += ", not determined" if name == one.at_bound else ""
+    return "; ".join(parts)
+
+
+def warnings(result: Fitted) -> list[str]:
+    """Say which models have a constant that the units do not determine."""
+    return [
+        f"{name}: the units do not determine {one.at_bound} ({one.constants[one.at_bound]:.3g}); its range says "
+        "nothing, and the model comes last"
+        for name, one in result.fit.model.items()
+        if one.at_bound
+    ]
+
+
+def against_text(one: ModelFit) -> str:
+    """Return the paired difference to the baseline in ln, with its standard error and p."""
+    if one.against_baseline is None:
+        return "-"
+    return f"{one.against_baseline:+.2f} +- {one.against_baseline_error:.2f}, p {one.against_baseline_p:.2g}"
+
+
+def leads_text(result: Fitted) -> str:
+    """Say which model leads, by which rule, and the test that decided."""
+    judged = result.chosen.judged
+    errors = {name: np.abs(one.errors[one.own]) for name, one in judged.items()}
+    lead = result.fit.leads
+    tests = [
+        f"{other} x {judged[other].own_score:.2f}, p {sign_flip_p(errors[lead], errors[other]):.2g}"
+        for other in (RULE, BASELINE)
+        if other != lead
+    ]
+    return (
+        f"{lead} leads: x {judged[lead].own_score:.2f} on the lab's own units ({'; '.join(tests)}). Another "
+        f"model than {RULE} leads only if, on the lab's own units each left out, its "
+        f"mean error is less than {RULE}'s and the {BASELINE}'s and p is at most {OVERTURNED:g} against both."
+    )
+
+
+def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
+    """Return title, table with its head, and remarks of each section, for the page and the terminal."""
+    chosen, by_source = result.chosen, result.by_source.items()
+    models = [["model", "leave-one-out", "own units", "own, stored constants", "against the baseline", "in 80 %"]]
+    for name in chosen.order:
+        one = result.fit.model[name]
+        own = ["-" if value is None else f"{value:.2f}" for value in (one.own_left_out, one.own_by_stored)]
+        score = f"{one.left_out:.2f} ({one.left_out_low:.2f} to {one.left_out_high:.2f})"
+        models.append([name, score, *own, against_text(one), one.held])
+    moduli = [["moduli", *chosen.judged]]
+    for source, compared in by_source:
+        moduli.append([source, *(f"{compared.judged[n].score:.2f}" if compared.judged else "-" for n in chosen.judged)])
+    units = [["unit", "measured", "predicted", "P10", "P90"]]
+    for row in unit_rows(result):
+        numbers = (f"{row[key]:.3g}" for key in ("measured", "predicted", "p10", "p90"))
+        units.append([f"{row['unit']}{' (own)' if row['own'] else ''}", *numbers])
+    rows = differing_units(result)[:_MOST_DIFFERING]
+    differing = [["unit", *rows[0]["levels"], "factor"]]
+    for row in rows:
+        differing.append([row["unit"], *(f"{level:.2g}" for level in row["levels"].values()), f"x {row['factor']:.2f}"])
+    constants = [f"{name}: {constants_text(result.fit.model[name])}." for name in chosen.order]
+    return [
+        (
+            "Models",
+            models,
+            [
+                leads_text(result),
+                prior_text(result),
+                "Constants, stored -> fitted (90 %):",
+                *constants,
+                *(f"Warning: {one}." for one in warnings(result)),
+                "Factors are geometric means of predicted over measured, 1 is exact; in brackets 5 to 95 % over units "
+                "drawn again. Against the baseline: mean difference of |ln(predicted/measured)| with its standard "
+                "error, and the sign-flip test; below 0 is better than four class means. In 80 %: units within the "
+                "range that was predicted without them.",
+            ],
+        ),
+        (
+            "Leave-one-out error, by source of the moduli",
+            moduli,
+            [f"{source}: {one.reason}." for source, one in by_source if one.reason],
+        ),
+        ("Units", units, [f"Predicted without the unit by {chosen.leads}; 80 % intervals."]),
+        ("Units on which the models differ most", differing, [DIFFERING]),
+    ]
+
+
+def page(result: Fitted) -> str:
+    """Return the result as Markdown."""
+    settings = result.lab.settings
+    paper = " in addition to the paper's nine" if settings.include_paper_units else ""
+    lines = [f"# Models fitted with the units of {settings.name}", "", *([settings.note, ""] if settings.note else [])]
+    lines += [f"{result.fit.units} units of the lab's own{paper}, {settings.moduli} moduli.", ""]
+    for title, (head, *rows), remarks in sections(result):
+        lines += [f"## {title}", ""]
+        lines += [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
+        lines += [f"\n{remark}" for remark in remarks]
+        lines += ["", *(["![predicted against measured](fit.svg)", ""] if title == "Units" else [])]
+    lines += ["## Files that were read", "", *(f"- {one.file}: SHA-256 {one.sha256}" for one in result.fit.input)]
+    return "\n".join(lines) + "\n"
+
+
+def _chart(result: Fitted) -> str:
+    rows = unit_rows(result)
+    series = []
+    for label, own in (("the paper's units", False), ("the lab's own", True)):
+        there = [row for row in rows if row["own"] == own]
+        if there:
+            measured, predicted = ([row[key] for row in there] for key in ("measured", "predicted"))
+            bars = [(row["p10"], row["p90"]) for row in there]
+            series.append(Series(f"{label}, with {PERCENT[0]} to {PERCENT[1]} %", measured, predicted, True, bars=bars))
+    ends = [min(row["measured"] for row in rows), max(row["measured"] for row in rows)]
+    series.append(Series("predicted = measured", ends, ends, dashed=True))
+    title = f"{result.fit.name}: {result.fit.leads}, leave-one-out"
+    return chart(series, title, "measured level", "predicted level", log_x=True, log_y=True)
 
 
 def fit(
@@ -39,11 +259,11 @@ def fit(
     loaded = load_fit_lab(lab)
     with progress("fit") as stage:
         result = fit_lab(loaded, stage)
-        made = fit_files.contents(result) if out is not None else {}
+        made = contents(result) if out is not None else {}
     if out is not None:
-        files.replace_all(out, {name: text.encode() for name, text in made.items()}, fit_files.FIT)
+        files.replace_all(out, {name: text.encode() for name, text in made.items()}, FIT)
     if as_json:
-        print_json({**fit_files.as_data(result), **({"folder": str(out)} if out is not None else {})})
+        print_json({**as_data(result), **({"folder": str(out)} if out is not None else {})})
         return
     _print(result)
     if out is not None:
@@ -51,44 +271,14 @@ def fit(
 
 
 def _print(result: Fitted) -> None:
-
-    screen, chosen, settings = console(), result.chosen, result.lab.settings
+    screen, settings = console(), result.lab.settings
     screen.print(f"{settings.name}: {result.fit.units} units of its own, {settings.moduli} moduli", soft_wrap=True)
     if settings.note:
         screen.print(f"  {settings.note}", soft_wrap=True)
-    table = Table("model", "leave-one-out", "own: stored -> fitted", "against the baseline", "80 %")
-    for name in chosen.order:
-        one = result.fit.model[name]
-        own = "-" if one.own_left_out is None else f"x {one.own_left_out:.2f}"
-        if one.own_by_stored is not None:
-            own = f"{one.own_by_stored:.2f} -> {one.own_left_out:.2f}"
-        score = f"x {one.left_out:.2f} ({one.left_out_low:.2f} to {one.left_out_high:.2f})"
-        table.add_row(name, score, own, fit_files.against_text(one), one.held)
-    screen.print(table)
-    screen.print(f"  {fit_files.leads_text(result)}", soft_wrap=True)
-    screen.print("constants, stored -> fitted (90 %):")
-    for name in chosen.order:
-        screen.print(f"  {name}: {fit_files.constants_text(result.fit.model[name])}", soft_wrap=True)
-    for one in fit_files.warnings(result):
-        screen.print(f"  warning: {one}", soft_wrap=True)
-    by_source = Table("moduli", *chosen.judged, title="leave-one-out error, by source of the moduli")
-    for source, compared in result.by_source.items():
-        by_source.add_row(
-            source, *[f"{compared.judged[n].score:.2f}" if compared.judged else "-" for n in chosen.judged]
-        )
-    screen.print(by_source)
-    for source, compared in result.by_source.items():
-        if compared.reason:
-            screen.print(f"  {source}: {compared.reason}", soft_wrap=True)
-    head, *rows = fit_files.differing_table(result)
-    differing = Table(Column("unit", overflow="fold"), *head[1:], title="units on which the models differ most")
-    for cells in rows:
-        differing.add_row(*cells)
-    screen.print(differing)
-    screen.print(f"  {fit_files.DIFFERING}.", soft_wrap=True)
-    screen.print(f"  {fit_files.prior_text(result)}", soft_wrap=True)
-    screen.print(
-        "  against the baseline (four class means): difference of |ln(predicted/measured)|, below 0 is better; 80 %: "
-        "units in their range",
-        soft_wrap=True,
-    )
+    for title, (head, *rows), remarks in sections(result):
+        table = Table(Column(head[0], overflow="fold"), *head[1:], title=title)
+        for cells in rows:
+            table.add_row(*cells)
+        screen.print(table)
+        for remark in remarks:
+            screen.print(f"  {remark}", soft_wrap=True)

@@ -1,19 +1,327 @@
-"""unitcad measure."""
+"""unitcad measure: its files and page, and the page of the live server. The same input, the same bytes."""
 
 from __future__ import annotations
 
+import json
+import re
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
+from html import escape
+from itertools import groupby
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import msgspec
+import numpy as np
 import typer
 
+from unitcad import files
+from unitcad.attenuation.edge.estimates import rounded
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson
+from unitcad.errors import UnitcadError
+from unitcad.export.chart import Series, chart
 from unitcad.files import sha256
-from unitcad.lab import measured_files, measuring
+from unitcad.lab import measuring
 from unitcad.lab.campaign import read_campaign
+from unitcad.lab.chains import Chain
+from unitcad.lab.measuring import Measured, PlaceLevel
+from unitcad.lab.record import RULES, RecordResult
+from unitcad.spec.toml import text_of
+
+MEASURED = "measured.toml"
+OURS = re.compile(r"measured\.toml|measure\.(json|html)|record-\d+-(time|periods|spectrum)\.svg|decay-\d+\.svg")
+"""Names of the files that a run writes, and removes if a former run left more of them."""
+
+
+def write(result: Measured, folder: Path) -> None:
+    """Write all files of a result into a folder, in place of a former run's; measured.toml last. Raises OSError."""
+    charts = charts_of(result)
+    texts = {
+        "measure.json": json.dumps(as_data(result), indent=1, allow_nan=False) + "\n",
+        **charts,
+        "measure.html": page(result, charts),
+        MEASURED: text_of(measured_table(result)),
+    }
+    files.replace_all(folder, {name: text.encode() for name, text in texts.items()}, MEASURED, OURS)
+
+
+def _each_record(result: Measured) -> Iterator[tuple[str, RecordResult]]:
+    """Yield all records with the names of their units."""
+    for unit, several in result.records.items():
+        for record in several:
+            yield unit, record
+
+
+def _place(distance_mm: float) -> str:
+    return "edge" if distance_mm == 0 else f"{distance_mm:g} mm"
+
+
+def measured_table(result: Measured) -> dict[str, Any]:
+    """Return measured.toml's data: a level per unit, place and chain, and the hash of every record behind them."""
+    campaign = result.campaign
+    units = {unit.name: unit for unit in campaign.unit}
+    levels = []
+    for one in result.levels:
+        unit, found = units[one.unit], one.level
+        source = {"spec": unit.spec} if unit.spec else {"cast": unit.cast} if unit.cast else {}
+        source |= {"cavity": unit.cavity} if unit.cavity else {}
+        levels.append(
+            {
+                "unit": one.unit, **source, "distance_mm": one.distance_mm,
+                "value": found.value, "low": found.low, "high": found.high, "status": "measured", "chain": one.chain,
+                "frequency_hz": one.frequency_hz, "repeats": found.repeats, "scatter": found.scatter,
+            }
+        )  # fmt: skip
+    records = [
+        {"unit": unit, "place": record.role, "file": record.file, "sha256": record.sha256, "usable": record.usable}
+        for unit, record in _each_record(result)
+    ]
+    sources = [{"file": name, "sha256": found} for name, found in result.specs.items()]
+    assumed = {"assumed": result.assumed} if result.assumed else {}
+    return {
+        "name": campaign.name, "status": "measured", "chain": campaign.chain.use[0], "interval": 0.95, **assumed,
+        "level": rounded(levels, 6), "record": records, "source": sources,
+    }  # fmt: skip
+
+
+def as_data(result: Measured) -> dict[str, Any]:
+    """Return everything as JSON-ready data."""
+    hertz = result.campaign.chain.mains_hz
+
+    def mains(blank: tuple[tuple[int, float], ...]) -> list[dict[str, float]]:
+        return rounded([{"hz": order * hertz, "amplitude": value} for order, value in blank], 6)
+
+    return {
+        "campaign": msgspec.to_builtins(result.campaign),
+        "levels": measured_table(result)["level"],
+        "records": [{"unit": unit, **record.as_dict()} for unit, record in _each_record(result)],
+        "findings": [finding.as_dict() for finding in result.findings],
+        "assumed": result.assumed,
+        "mains_of_blank": mains(result.mains),
+        "mains_of_blank_motor": mains(result.motor_mains),
+    }
+
+
+def lines(result: Measured) -> Iterator[str]:
+    """Yield the levels and the records as lines for a person."""
+    for one in result.levels:
+        value = f"{one.level.value:.3f} ({one.level.low:.3f} to {one.level.high:.3f})"
+        yield (
+            f"{one.unit}, {_place(one.distance_mm)}, {one.chain}: {value} of the motor's amplitude, "
+            f"{one.frequency_hz:.1f} Hz"
+        )
+    for unit, r in _each_record(result):
+        if not r.frequency_hz:
+            why = ", ".join(f"{one.code} {RULES[one.code].title}" for one in r.findings if one.severity == "error")
+            yield f"  {unit}, {r.role}, {r.file}: not used, {why}"
+            continue
+        gain = "".join(f", filters of {name} pass {value:.3f}" for name, value in r.gains.items())
+        ratio = f", {r.ratio:.4f} of the motor" if r.ratio is not None else ""
+        size = f"{r.amplitude_um:.4g} +- {2 * r.u_um:.2g} um" if r.usable else f"not used, {r.amplitude_um:.4g} um"
+        yield (
+            f"  {unit}, {r.role}, {r.file}: {size}{ratio}, "
+            f"{r.frequency_hz:.2f} Hz over {r.steady_s:.3g} s of {r.length_s:.3g} s, "
+            f"drift {r.drift:.2%}, signal to noise {r.snr:.3g}{gain}"
+        )
+    for chain in result.chains:
+        if chain.assumed:
+            yield f"  chain {chain.name}, assumed: {chain.assumed_text}"
+
+
+_STYLE = """:root{color-scheme:light dark;--text:#222;--back:#fff;--edge:#ccc;--error:#a11;--warning:#850}
+@media(prefers-color-scheme:dark){:root{--text:#ddd;--back:#181a1b;--edge:#555;--error:#f99;--warning:#eb6}}
+body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem;color:var(--text);
+background:var(--back);overflow-wrap:anywhere}
+.wide{overflow-x:auto;overflow-wrap:normal}table{border-collapse:collapse}td{white-space:nowrap}
+td,th{border:1px solid var(--edge);padding:.2rem .5rem;text-align:left}tr.out td{color:var(--error)}
+figure{display:inline-block;margin:.5rem 0;max-width:100%}svg{max-width:100%;height:auto}
+.error{color:var(--error)}.warning{color:var(--warning)}@media(max-width:500px){
+h1{font-size:1.4rem}table{font-size:13px}td,th{padding:.15rem .3rem}td:first-child{white-space:normal}
+figure{overflow-x:auto}svg{max-width:none;width:31rem}}"""
+
+
+def page(result: Measured, charts: dict[str, str], lead: str = "") -> str:
+    """Return the page as HTML; `charts` are SVG documents by file name, `lead` is HTML that comes first."""
+    found = "".join(
+        f'<li class="{one.severity}"><b>{one.code}</b> {escape(one.where)}: {escape(one.message)}. '
+        f"{escape(one.as_dict()['fix'])}</li>"
+        for one in result.findings
+    )
+    assumed = "".join(
+        f"<p>Chain {escape(chain.name)}, assumed: {escape(chain.assumed_text)}.</p>"
+        for chain in result.chains
+        if chain.assumed
+    )
+    decay = figures = ""
+    for name, svg in charts.items():
+        figure = f"<figure>{re.sub(r'<[?!][^>]*>', '', svg)}</figure>"
+        decay, figures = (decay + figure, figures) if name.startswith("decay") else (decay, figures + figure)
+    levels = [
+        (
+            one.unit, _place(one.distance_mm), one.chain,
+            f"{one.level.value:.3f}", f"{one.level.low:.3f} to {one.level.high:.3f}",
+            " + ".join(map(str, one.level.repeats)), f"{one.frequency_hz:.2f}",
+        )
+        for one in result.levels
+    ]  # fmt: skip
+    table = _table(("unit", "place", "chain", "level", "95 %", "repeats", "Hz"), levels, [""] * len(levels))
+    gains = [chain.name for chain in result.chains if chain.gain]
+    head = ("unit", "place", "file", "used", "um", "2 u, um", "Hz", "steady, s", "drift", "signal to noise")
+    records, kinds = [], []
+    for unit, r in _each_record(result):
+        figures_of = (
+            f"{r.amplitude_um:.4g}", f"{2 * r.u_um:.2g}" if r.usable else "", f"{r.frequency_hz:.2f}",
+            f"{r.steady_s:.3g} of {r.length_s:.3g}", f"{r.drift:.2%}",
+            f"{r.snr:.3g}", *(f"{r.gains[name]:.3f}" for name in gains if name in r.gains),
+        )  # fmt: skip
+        figures_of = figures_of if r.frequency_hz else ("",) * (6 + len(gains))
+        records.append((unit, r.role, r.file, "yes" if r.usable else "no", *figures_of, r.sha256[:12]))
+        kinds.append("" if r.usable else "out")
+    return _document(
+        result.campaign.name,
+        f"{lead}<p>{escape(result.campaign.note)}</p><h2>Levels</h2>"
+        f"{table if levels else '<p>None: see the findings.</p>'}{assumed}{decay}"
+        f"<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
+        f"<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
+        f"comes from the scatter of the repeats.</p>"
+        f"{_table((*head, *(f'gain of {name}' for name in gains), 'SHA-256'), records, kinds)}"
+        f"<h2>Charts of the records</h2>{figures}",
+    )
+
+
+def fault_page(name: str, fault: str, lead: str = "") -> str:
+    """Return the page of a campaign that can't be measured, as HTML: the reason, then the HTML `lead`."""
+    return _document(name, f'<h2>Not measured</h2><p class="error">{escape(fault)}</p>{lead}')
+
+
+def _document(name: str, body: str) -> str:
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
+        f"<title>{escape(name)}</title><style>{_STYLE}</style></head><body><h1>{escape(name)}</h1>{body}</body></html>\n"
+    )
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], kinds: list[str]) -> str:
+    cells = "".join(f"<th>{escape(word)}</th>" for word in head)
+    body = "".join(
+        f'<tr class="{kind}">' + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
+        for row, kind in zip(rows, kinds, strict=True)
+    )
+    return f'<div class="wide"><table><tr>{cells}</tr>{body}</table></div>'
+
+
+SHOWN_S = 0.1
+"""Seconds of a record's middle that a chart shows."""
+STRETCHES = 100
+"""Parts of a record of which its chart shows the least and the largest value."""
+BESIDE_HZ = 30.0
+"""Width of a spectrum to either side of the lines: one multiple of 50 Hz at least."""
+APART = 0.008
+"""Part of the axis by which the levels of two chains are drawn apart, so that no bar covers another."""
+LEAST_WIDE_MM = 10.0
+"""Smallest span of the axis of distances, against which APART is no distance."""
+
+
+def charts_of(result: Measured) -> dict[str, str]:
+    """Return the charts as SVG by file name."""
+    out = {}
+    for number, (_, record) in enumerate(_each_record(result), 1):
+        time, samples = record.picture[:2]
+        unit = f"signal, {record.unit}"
+        step = max(len(time) // STRETCHES, 1)
+        count = len(time) // step
+        folded = samples[: count * step].reshape(count, step)
+        middles = time[step // 2 : count * step : step][:count]
+        ends = {"largest": np.fmax.reduce(folded, axis=1), "least": np.fmin.reduce(folded, axis=1)} if count else {}
+        whole = [Series(f"{name} of each stretch", middles, values) for name, values in ends.items()]
+        middle = len(time) // 2
+        half = max(int(SHOWN_S / 2 * len(time) / max(time[-1], 1e-9)), 8) if len(time) else 0
+        part = slice(max(middle - half, 0), middle + half)
+        periods = [Series("signal", time[part], samples[part])]
+        stem = f"record-{number:02d}"
+        out[f"{stem}-time.svg"] = chart(whole, f"{record.file}: whole record", "time, s", unit)
+        out[f"{stem}-periods.svg"] = chart(periods, f"{record.file}: middle", "time, s", unit)
+        out[f"{stem}-spectrum.svg"] = _spectrum_chart(record, result.chains)
+    for i, unit in enumerate(result.campaign.unit, 1):
+        levels = [one for one in result.levels if one.unit == unit.name]
+        if levels:
+            out[f"decay-{i:02d}.svg"] = _decay_chart(unit.name, levels)
+    return out
+
+
+def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
+    """Chart the spectrum near the lines with the zeros of the chains' combs, or all of it without a sure line."""
+    frequency, size = record.picture[2:]
+    at = list(record.lines) or [record.frequency_hz] * bool(record.frequency_hz)
+    if at and not any(one.code == "L117" for one in record.findings):
+        near = (frequency > min(at) - BESIDE_HZ) & (frequency < max(at) + BESIDE_HZ)
+        frequency, size = frequency[near], size[near]
+    floor = float(np.median(size)) / 10 if len(size) and np.median(size) > 0 else 1e-12
+    kept = size > floor
+    series = [Series("spectrum (Hann)", frequency[kept], size[kept])]
+    if at:
+        tops = [float(np.interp(hertz, frequency, size)) for hertz in at]
+        series.append(Series("fitted line" if len(at) == 1 else "fitted lines", at, tops, points=True))
+    for chain in chains:
+        if chain.zeros_hz and len(frequency):
+            first = np.ceil(frequency[0] / chain.zeros_hz) or 1.0
+            zeros = np.arange(first * chain.zeros_hz, frequency[-1] + 1e-9, chain.zeros_hz)
+            bars = [(floor, float(size.max()))] * len(zeros)
+            name = f"zeros of {chain.name}'s comb"
+            series.append(Series(name, zeros, np.full(len(zeros), floor), points=True, bars=bars))
+    filtered = next((chain for chain in chains if chain.pass_hz), None)
+    return chart(
+        series, f"{record.file}: spectrum", "frequency, Hz", f"amplitude, {record.unit}", log_y=True,
+        shaded=filtered.pass_hz if filtered else None,
+        shaded_name=f"pass band of {filtered.name}" if filtered else "",
+        x_range=(float(frequency[0]), float(frequency[-1])) if len(frequency) else None,
+    )  # fmt: skip
+
+
+def _decay_chart(name: str, levels: list[PlaceLevel]) -> str:
+    """Chart the levels over the distance, a colour for each chain."""
+    kinds = {
+        key: list(there) for key, there in groupby(sorted(levels, key=lambda one: one.chain), lambda one: one.chain)
+    }
+    wide = max(LEAST_WIDE_MM, *(one.distance_mm for one in levels))
+    series = []
+    for i, (key, there) in enumerate(kinds.items()):
+        there.sort(key=lambda one: one.distance_mm)
+        shift = APART * wide * (i - (len(kinds) - 1) / 2)
+        x = [one.distance_mm + shift for one in there]
+        bars = [(one.level.low, one.level.high) for one in there]
+        series.append(Series(f"{key}, 95 % interval", x, [one.level.value for one in there], points=True, bars=bars))
+    title = f"{name}: level over the distance from the edge"
+    return chart(series, title, "distance, mm", "level", log_y=True, x_range=(-0.03 * wide, 1.03 * wide))
+
+
+def measured(path: bytes) -> bytes:
+    """Return {"page": HTML} of a campaign file, or {"refused": why}. Runs in a worker process."""
+
+    file = Path(path.decode())
+    try:
+        result = measuring.measure(read_campaign(file), file.parent)
+    except UnitcadError as error:
+        return msgspec.json.encode({"refused": str(error)})
+    lead = (
+        f"<p>Measured from {escape(str(file))} as it is saved. Its recordings are files that it names by "
+        f"patterns, so it has no form here: change the file in an editor, then {_AGAIN}.</p>"
+    )
+    return msgspec.json.encode({"page": page(result, charts_of(result), lead)})
+
+
+def refused(file: Path, why: str) -> str:
+    """Return the page that says why a campaign file can't be measured, as HTML."""
+    folder, named = escape(str(file.parent)), escape(file.name)
+    lead = f"<p>The file is {named} in {folder}, with its recordings. Change it, then {_AGAIN}.</p>"
+    return fault_page(file.name, why, lead)
+
+
+_AGAIN = '<a href="/">measure again</a>'
 
 
 def measure(
@@ -39,13 +347,13 @@ def measure(
         result = measuring.measure(asked, campaign.parent, say)
         result = replace(result, specs={campaign.name: sha256(campaign), **result.specs})
         say("files")
-        measured_files.write(result, folder)
+        write(result, folder)
     for finding in result.findings:
         warn(f"{finding.code} {finding.severity}: {finding.where}: {finding.message}")
     if as_json:
-        print_json({"folder": str(folder), **measured_files.as_data(result)})
+        print_json({"folder": str(folder), **as_data(result)})
     else:
-        for line in measured_files.lines(result):
+        for line in lines(result):
             typer.echo(line)
         typer.echo(str(folder))
     if result.findings:

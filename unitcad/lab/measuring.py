@@ -30,8 +30,7 @@ from unitcad.lab.campaign import (
     own_keys,
     recording_of,
 )
-from unitcad.lab.chains import chains_of
-from unitcad.lab.chains.chain import Chain, Mains
+from unitcad.lab.chains import Chain, Mains, chains_of
 from unitcad.lab.chains.line import mains_columns, mains_orders, solve, trend_columns
 from unitcad.lab.readers import Layout, open_recording
 from unitcad.lab.record import LabFinding, RecordResult, expect_one_unit, found, measure_record, open_signal

@@ -13,11 +13,9 @@ from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, own_keys, recording_of
-from unitcad.lab.chains import chains_of
-from unitcad.lab.chains.chain import LineFit, Mains
+from unitcad.lab.chains import LineFit, Mains, chains_of
 from unitcad.lab.chains.line import clip_level, fit_line, spectrum
-from unitcad.lab.readers import TIME_NAMES, Layout, Recording, open_recording
-from unitcad.lab.units import UNITS, plain, ratio, seconds, to_si
+from unitcad.lab.readers import TIME_NAMES, UNITS, Layout, Recording, open_recording, plain, ratio, seconds, to_si
 from unitcad.meshcheck.rules.registry import Rule
 
 RULES = {

@@ -1,4 +1,4 @@
-"""A digitised figure against every model, blind: the constants are those of the catalogue's nine levels."""
+"""unitcad score: a digitised figure against every model, blind. Constants are those of the catalogue's nine levels."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
+from rich.table import Table
 
 from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.edge.estimates import rounded
@@ -17,6 +19,8 @@ from unitcad.attenuation.edge.models import COMPARED
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import figures, measurements
+from unitcad.cli.output import console, print_json, progress
+from unitcad.cli.shared_options import AsJson
 from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import estimate_input
@@ -135,7 +139,7 @@ def variants_of(unit: str) -> list[EstimateInput]:
     return made
 
 
-def score(points: tuple[Point, ...]) -> dict[str, Any]:
+def score_figure(points: tuple[Point, ...]) -> dict[str, Any]:
     """Return {units, scores, decay, decay_scores} as JSON-ready data.
 
     `units`: each measured level, at 0 mm, with every model's, the 80 % range, and `blind`: whether the constants were
@@ -206,3 +210,56 @@ def _decay(point: Point, measured: float, layered: Mapping[str, Any]) -> dict[st
 def _factor(pairs: list[tuple[float, float]]) -> float | None:
     """Return the geometric-mean factor between predicted and measured values."""
     return float(np.exp(np.mean([abs(np.log(one / other)) for one, other in pairs]))) if pairs else None
+
+
+def score(
+    figure: Annotated[
+        str,
+        typer.Argument(metavar="FIGURE", help="CSV file of a digitised figure, or name of a shipped one."),
+    ],
+    as_json: AsJson = False,
+) -> None:
+    """Score every model on a digitised figure, blind.
+
+    The constants are those of the nine measured levels. Columns: unit, distance_mm, value, error, source.
+    Points at 0 mm are levels at the edge, farther points are on the skin.
+    """
+    points = load_figure(figure)
+    with progress("score"):
+        data = score_figure(points)
+    if as_json:
+        print_json(data)
+        return
+    screen = console()
+    models = list(data["scores"])
+    table = Table("unit", "measured %", "80 % range", *models, title="level at the edge, %; *: fitted to it, not blind")
+    for one in data["units"]:
+        name = one["unit"] + ("" if one["blind"] else " *")
+        ends = f"{100 * one['p10']:.2g} to {100 * one['p90']:.2g}"
+        levels = [f"{100 * one['levels'][model]:.2g}" for model in models]
+        table.add_row(name, f"{100 * one['measured']:.3g}", ends, *levels)
+    table.add_section()
+    table.add_row(
+        "factor error, blind", "", f"held {data['held']}", *[_factor_text(data["scores"][model]) for model in models]
+    )
+    screen.print(table)
+    if data["decay"]:
+        screen.print(_decay_table(data))
+
+
+def _decay_table(data: dict[str, Any]) -> Table:
+    curves = list(data["decay_scores"])
+    table = Table("unit", "mm", "measured %", *curves, title="on the skin, % of the unit's own level at the edge")
+    for one in data["decay"]:
+        cells = []
+        for name in curves:
+            ends = [f"{100 * one[name][key]:.2g}" for key in ("low", "high") if key in one[name]]
+            cells.append(f"{100 * one[name]['value']:.2g}" + (f" ({' to '.join(ends)})" if ends else ""))
+        table.add_row(one["unit"], f"{one['distance_mm']:g}", f"{100 * one['measured']:.2g}", *cells)
+    table.add_section()
+    table.add_row("factor error", "", "", *[_factor_text(data["decay_scores"][name]) for name in curves])
+    return table
+
+
+def _factor_text(value: float | None) -> str:
+    return "-" if value is None else f"x {value:.2f}"

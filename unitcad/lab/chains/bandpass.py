@@ -14,7 +14,7 @@ from scipy.signal import butter, filtfilt, freqz, iircomb, lfilter, resample_pol
 
 from unitcad.errors import Refusal
 from unitcad.geometry.arrays import Floats
-from unitcad.lab.chains.chain import Chain, ChainTable, LineFit
+from unitcad.lab.chains import Chain, ChainTable, LineFit
 
 RATE_HZ = 2000.0
 LOW_HZ, HIGH_HZ, COMB_HZ = 40.0, 200.0, 50.0

@@ -18,7 +18,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from unitcad.geometry.arrays import Bools, Floats
-from unitcad.lab.chains.chain import Chain, ChainTable, Line, LineFit, Mains, Phase
+from unitcad.lab.chains import Chain, ChainTable, Line, LineFit, Mains, Phase
 
 BAND_HZ = (60.0, 250.0)
 NO_MAINS = Mains()

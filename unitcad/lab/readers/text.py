@@ -15,8 +15,7 @@ import numpy as np
 
 from unitcad import files
 from unitcad.geometry.arrays import Floats
-from unitcad.lab.readers import Channel, Layout, Unreadable
-from unitcad.lab.units import known
+from unitcad.lab.readers import Channel, Layout, Unreadable, known
 
 ENDINGS = (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tab")
 HEAD = 1_000_000

@@ -1,0 +1,583 @@
+"""A skin phantom that any lab can cast: description, recipes, box, expected response, each made once."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from itertools import chain, pairwise
+from typing import Annotated, Any
+
+import numpy as np
+from msgspec import Meta, Struct
+
+from unitcad.attenuation.curve import rounded_error
+from unitcad.attenuation.edge.estimates import rounded
+from unitcad.attenuation.inputs import TissueLayer, body
+from unitcad.attenuation.layered import FractionalKelvinVoigt, HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
+from unitcad.catalogue import Material, Printer, choose, materials, printers, tissue
+from unitcad.catalogue import entries as kinds
+from unitcad.designs import layer_colour
+from unitcad.errors import Refusal, unknown_name
+from unitcad.estimate_inputs import tissue_layer
+from unitcad.kernels.mesh import bounds, realise
+from unitcad.moulds.pieces import bar
+from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union
+from unitcad.shape.body import Body
+from unitcad.shape.lettering import HEIGHT, engraving, text_width
+from unitcad.spec import convert
+from unitcad.text import some
+from unitcad.validation.typed_files import load_file
+
+LEAST_LAYER, MOST_DEPTH = 0.5, 100.0
+_LAYER_NAME = "small letters a to z, digits and -, the first a letter"
+_NAME = "small letters a to z, digits and -, the first a letter or digit"
+
+
+class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One layer of the phantom, from the skin down."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[a-z][a-z0-9-]*$", description=_LAYER_NAME)]
+    silicone: Annotated[str, Meta(description="tested silicone: ecoflex-00-10, ecoflex-00-30 or ecoflex-00-50")]
+    thinner_pct: Annotated[float, Meta(ge=0, le=100, description="thinner, in parts by weight to 100 of A and B")]
+    thickness_mm: Annotated[float, Meta(ge=LEAST_LAYER, le=60, description="thickness of the layer")]
+    loss_factor: Annotated[float, Meta(ge=0.01, le=1, description="tan delta (assumed)")] = 0.2
+
+
+class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A skin phantom: one box of silicone layers."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=60, pattern=r"^[a-z0-9][a-z0-9-]*$", description=_NAME)]
+    layers: Annotated[tuple[PhantomLayer, ...], Meta(min_length=1, max_length=6)]
+    unit_diameter_mm: Annotated[float, Meta(ge=4, le=40, description="diameter of the unit to measure")] = 14.0
+    motor_diameter_mm: Annotated[float, Meta(ge=2, le=40, description="diameter of its motor")] = 7.0
+    frequency_hz: kinds.Frequency = 125.0
+    points_mm: Annotated[
+        tuple[Annotated[float, Meta(ge=0, le=60)], ...],
+        Meta(min_length=2, max_length=13, description="distances of the measuring points from the unit's edge"),
+    ] = (0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
+    inside_mm: Annotated[
+        Annotated[float, Meta(ge=40, le=400)] | None,
+        Meta(description="inner side of the box; default: the smallest with an echo below most_echo_pct"),
+    ] = None
+    most_echo_pct: Annotated[
+        float, Meta(ge=0.5, le=50, description="largest echo of the walls at the last point, in percent")
+    ] = 5.0
+    plate_thickness_mm: Annotated[float, Meta(ge=2, le=20, description="thickness of the acrylic plate below")] = 5.0
+    stage_pitch_mm: Annotated[float, Meta(ge=5, le=50, description="pitch of the table's threaded holes")] = 25.0
+    stage_bolt_mm: Annotated[float, Meta(ge=2, le=12, description="thread of the table's holes")] = 6.0
+    printer: Annotated[str, Meta(description="printer of the catalogue")] = "fdm-0.4"
+    waste: Annotated[float, Meta(ge=0, le=2, description="extra mix, as a fraction")] = 0.1
+    scale_resolution_g: Annotated[float, Meta(ge=1e-4, le=10, description="smallest step of the scale")] = 0.1
+    room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room")] = 23.0
+
+    @property
+    def depth_mm(self) -> float:
+        """All layers together."""
+        return sum(layer.thickness_mm for layer in self.layers)
+
+
+def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
+    """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for an invalid one."""
+    return load_file(source, "phantom", lambda data, _: convert(data, PhantomTable))
+
+
+THINNER_DENSITY = 0.97
+"""g/cm3 (assumed: a silicone oil)."""
+LOSS_RANGE = (0.5, 1.5)
+"""Range of an assumed loss factor, as factors: 0.1 to 0.3 for 0.2."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A silicone with thinner: Young's modulus kPa, tan delta and their ranges, density g/cm3.
+
+    The modulus is the table's, its range two standard deviations. `high_kpa` includes the stiffening at the frequency.
+    """
+
+    silicone: Material
+    thinner_pct: float
+    modulus_kpa: float
+    low_kpa: float
+    high_kpa: float
+    density_g_cm3: float
+    source: str
+    loss: tuple[float, float, float]
+
+
+def recipe(layer: PhantomLayer, frequency_hz: float, field: str) -> Recipe:
+    """Return a layer's recipe for a phantom that moves at a frequency; `field` is for refusals.
+
+    Raises Refusal for a silicone or a share of thinner that nobody tested.
+    """
+    value, low, high = modulus_by_table(layer.silicone, layer.thinner_pct, field)
+    material = materials()[layer.silicone]
+    volume = 100.0 / float(material.density_g_cm3) + layer.thinner_pct / THINNER_DENSITY
+    least, most = LOSS_RANGE
+    return Recipe(
+        material,
+        layer.thinner_pct,
+        value,
+        low,
+        stiffening(frequency_hz) * high,
+        (100.0 + layer.thinner_pct) / volume,
+        str(_table()["source"]),
+        (layer.loss_factor, least * layer.loss_factor, most * layer.loss_factor),
+    )
+
+
+def modulus_by_table(silicone: str, thinner_pct: float, field: str) -> tuple[float, float, float]:
+    """Return the modulus, kPa, of a silicone with parts of thinner to 100 of A and B, with two standard deviations.
+
+    Between two tested shares the logarithm of the modulus is interpolated. Raises Refusal for a silicone that was not
+    tested, and for a share outside the tested ones.
+    """
+    known = {name: table for name, table in _table().items() if isinstance(table, dict)}
+    if silicone not in known:
+        raise unknown_name(f"{field}.silicone", silicone, known)
+    shares, moduli, deviations = (
+        np.array(known[silicone][key]) for key in ("thinner_pct", "modulus_kpa", "deviation_kpa")
+    )
+    if not shares[0] <= thinner_pct <= shares[-1]:
+        limit = f"was tested from {shares[0]:g} to {shares[-1]:g} parts of thinner to 100"
+        raise Refusal(f"{field}.thinner_pct", thinner_pct, limit, float(np.clip(thinner_pct, shares[0], shares[-1])))
+    modulus = math.exp(float(np.interp(thinner_pct, shares, np.log(moduli))))
+    spread = 2.0 * float(np.interp(thinner_pct, shares, deviations / moduli))
+    return modulus, modulus * (1 - spread), modulus * (1 + spread)
+
+
+def stiffening(frequency_hz: float) -> float:
+    """Return how much stiffer silicone may be at a frequency than at rest: the catalogue's fractional law of Ecoflex.
+
+    The law is assumed to be valid with thinner; the moduli of the table were measured slowly.
+    """
+    material = materials()["ecoflex-00-30"]
+    assert material.fractional_tau_us
+    assert material.fractional_n
+    law = FractionalKelvinVoigt(float(material.fractional_tau_us) * 1e-6, float(material.fractional_n))
+    return abs(law.complex_shear(1.0, 2.0 * math.pi * frequency_hz))
+
+
+@cache
+def _table() -> dict[str, Any]:
+    return tomllib.loads((resources.files("unitcad.catalogue") / "thinned.toml").read_text("utf-8"))
+
+
+POINT_RADIUS = 1.25
+LEAST_APART = 2 * POINT_RADIUS + 1.0
+"""Between two points, mm: the holes of nearer ones would leave no wall."""
+
+
+def expect_apart(points_mm: Sequence[float]) -> None:
+    """Raise Refusal for points whose holes in the lid would meet."""
+    for one, other in pairwise(sorted(points_mm)):
+        if other - one < LEAST_APART:
+            limit = f"{one:g} and {other:g} are nearer than {LEAST_APART:g} mm: their holes in the lid would meet"
+            raise Refusal("points_mm", list(points_mm), limit)
+
+
+WALL, FLOOR, LID, HOLDER = 4.0, 3.0, 4.0, 6.0
+"""Walls around the cavity at its rim, the tray's floor, thickness of lid and holder, mm."""
+DRAFT_DEG = 1.0
+EAR, EAR_HALF, EAR_AT = 14.0, 9.0, 0.65
+"""Length of an ear, its half width, and its middle as a part of the half side, mm."""
+PEG_RADIUS, PEG_FROM_WALL = 3.0, 8.0
+PUSH_RADIUS = 8.0
+PLATE_PLAY = 0.3
+"""Of the plate in the tray, per side, mm."""
+FENCE, FENCE_LONG, FENCE_HIGH = 4.0, 12.0, 10.0
+_COLOURS = {
+    "base": (0.76, 0.76, 0.76),
+    "frame": (0.96, 0.83, 0.66),
+    "lid": (0.55, 0.75, 0.55),
+    "holder": (0.6, 0.66, 0.8),
+}
+_PLATE, _BLADE = (0.8, 0.9, 0.95), (0.90, 0.30, 0.30)
+
+
+@dataclass(frozen=True)
+class BoxLengths:
+    """Lengths of a box, mm: half sides of the cavity at the plate and at the rim, of the walls, and the heights.
+
+    `tops`: the height above the plate that each layer is struck off at, skin first.
+    """
+
+    inner: float
+    rim: float
+    outer: float
+    tops: tuple[float, ...]
+    plate: float
+    hole: float
+    peg_x: float
+    ear_y: float
+
+    @property
+    def tray_rim(self) -> float:
+        """Height of the tray's rim: the lowest layer's."""
+        return self.tops[-1]
+
+    @property
+    def bottom(self) -> float:
+        """Height of the tray's foot, below the plate."""
+        return -self.plate - FLOOR
+
+
+def lengths(phantom: PhantomTable, inside_mm: float, printer: Printer) -> BoxLengths:
+    """Return the box's lengths for a cavity of `inside_mm` at the plate."""
+    thickness = [layer.thickness_mm for layer in phantom.layers]
+    tops = tuple(sum(thickness[i:]) for i in range(len(thickness)))
+    rim = inside_mm / 2 + tops[-1] * math.tan(math.radians(DRAFT_DEG))
+    outer = rim + WALL
+    play = float(printer.plinth_clearance_mm) + 0.1
+    return BoxLengths(
+        inside_mm / 2,
+        rim,
+        outer,
+        tops,
+        phantom.plate_thickness_mm,
+        PEG_RADIUS + play,
+        outer + PEG_FROM_WALL,
+        EAR_AT * outer,
+    )
+
+
+def cast(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
+    """Draw the cast layers, skin first."""
+    bodies = []
+    for i, layer in enumerate(phantom.layers):
+        low = size.tops[i + 1] if i + 1 < len(size.tops) else 0.0
+        shape: Shape = Extrude(_square(size.rim), low, size.tops[i])
+        if low == 0.0:
+            shape = Extrude(_square(size.inner), 0.0, size.tops[i], top=_square(size.rim))
+        bodies.append(Body(layer.name, "unit", "layer", shape, layer_colour(i), made="cast", step=len(size.tops) - i))
+    return bodies
+
+
+def pieces(phantom: PhantomTable, size: BoxLengths, printer: Printer) -> list[Body]:
+    """Draw tray, plate, frames (skin first, each with its pour's number), lid, blade and holder as assembled."""
+    stroke, depth = float(printer.engraving_stroke_mm), float(printer.engraving_depth_mm)
+    frames = [
+        Body(
+            f"frame{len(size.tops) - i}",
+            "tool",
+            "frame",
+            _frame(size, size.tops[i + 1], size.tops[i], str(len(size.tops) - i), stroke, depth),
+            _COLOURS["frame"],
+            step=len(size.tops) - i,
+        )
+        for i in range(len(size.tops) - 1)
+    ]
+    blade = moved(turned(bar(size.outer + PEG_FROM_WALL - PEG_RADIUS - 1.0, 0.0), "z", 1), 0, 0, size.tray_rim)
+    plate = Extrude(_square(size.inner - PLATE_PLAY), -size.plate, 0.0)
+    return [
+        Body("tray", "tool", "base", _tray(size), _COLOURS["base"]),
+        Body("plate", "tool", "holder", plate, _PLATE, made="cut"),
+        *frames,
+        Body("lid", "tool", "lid", _lid(phantom, size), _COLOURS["lid"]),
+        Body("blade", "tool", "blade", blade, _BLADE, upside_down=True),
+        Body("holder", "tool", "holder", _holder(phantom, size), _COLOURS["holder"]),
+    ]
+
+
+def _square(half: float) -> Profile:
+    return rectangle(-half, -half, half, half)
+
+
+def _at_corners(shape: Shape, x: float, y: float) -> list[Shape]:
+    return [moved(shape, sx * x, sy * y) for sx in (-1, 1) for sy in (-1, 1)]
+
+
+def _tray(size: BoxLengths) -> Shape:
+    # The taper runs on above the rim, so that no face of the tool is in the rim's plane.
+    beyond = 1.0
+    wide = size.rim + beyond * (size.rim - size.inner) / size.tray_rim
+    cavity = Extrude(_square(size.inner), 0.0, size.tray_rim + beyond, top=_square(wide))
+    pocket = Extrude(_square(size.inner), -size.plate, 0.5)
+    hole = cylinder(PUSH_RADIUS, size.bottom - 1.0, -size.plate + 1.0)
+    holes = _at_corners(hole, 0.6 * size.inner, 0.6 * size.inner)
+    pegs = _at_corners(cylinder(PEG_RADIUS, size.tray_rim - 1.0, size.tops[0] + LID), size.peg_x, size.ear_y)
+    return union((cut(_outline(size, size.bottom, size.tray_rim), [cavity, pocket, *holes]), *pegs))
+
+
+def _frame(size: BoxLengths, low: float, high: float, number: str, stroke: float, depth: float) -> Shape:
+    """Draw a frame; its pour's number is engraved on an ear, beyond the peg, out of the blade's way."""
+    y = size.ear_y + (size.hole + EAR_HALF - HEIGHT * stroke) / 2
+    depth = min(depth, (high - low) / 2)
+    figure = moved(engraving(number, stroke, high - depth, high + 1.0), size.peg_x - text_width(number, stroke) / 2, y)
+    opening = Extrude(_square(size.rim), low - 1.0, high + 1.0)
+    return cut(_outline(size, low, high), [opening, figure, *_peg_holes(size, low, high)])
+
+
+def _outline(size: BoxLengths, low: float, high: float) -> Shape:
+    half = EAR / 2 + 1.0
+    ear = box(-half, half, -EAR_HALF, EAR_HALF, low, high)
+    return union((Extrude(_square(size.outer), low, high), *_at_corners(ear, size.outer + half - 2.0, size.ear_y)))
+
+
+def _peg_holes(size: BoxLengths, low: float, high: float) -> list[Shape]:
+    return _at_corners(cylinder(size.hole, low - 1.0, high + 1.0), size.peg_x, size.ear_y)
+
+
+def _lid(phantom: PhantomTable, size: BoxLengths) -> Shape:
+    """Draw the lid with the unit's seat and a hole at each point, all from its middle along x."""
+    low, high = size.tops[0], size.tops[0] + LID
+    seat = phantom.unit_diameter_mm / 2
+    points = [moved(cylinder(POINT_RADIUS, low - 1.0, high + 1.0), seat + one, 0.0) for one in phantom.points_mm]
+    seat_hole = cylinder(seat, low - 1.0, high + 1.0)
+    return cut(_outline(size, low, high), [seat_hole, *points, *_peg_holes(size, low, high)])
+
+
+def _holder(phantom: PhantomTable, size: BoxLengths) -> Shape:
+    """Draw the plate that fixes the tray on a table with threaded holes: fences at its corners, four bolt holes."""
+    low, high = size.bottom - HOLDER, size.bottom
+    x_bolt, y_bolt = bolts(phantom, size)
+    face, beside = size.outer + 0.3, phantom.stage_bolt_mm + 4.0
+    half_x, half_y = max(face + FENCE, x_bolt + beside), y_bolt + beside
+    half, middle = (FENCE + FENCE_LONG) / 2, face + (FENCE - FENCE_LONG) / 2
+    along = box(-half, half, -FENCE / 2, FENCE / 2, high - 1.0, high + FENCE_HIGH)
+    across = box(-FENCE / 2, FENCE / 2, -half, half, high - 1.0, high + FENCE_HIGH)
+    fences = zip(
+        _at_corners(along, middle, face + FENCE / 2), _at_corners(across, face + FENCE / 2, middle), strict=True
+    )
+    solids = [box(-half_x, half_x, -half_y, half_y, low, high), *chain.from_iterable(fences)]
+    window = Extrude(_square(0.75 * size.inner), low - 1.0, high + 1.0)
+    hole = cylinder(phantom.stage_bolt_mm / 2 + 0.3, low - 1.0, high + 1.0)
+    return cut(union(solids), [window, *_at_corners(hole, x_bolt, y_bolt)])
+
+
+def bolts(phantom: PhantomTable, size: BoxLengths) -> tuple[float, float]:
+    """Return x and y of the holder's bolt holes: on the table's pitch, beyond the fences along y."""
+    half = phantom.stage_pitch_mm / 2
+    needed = size.outer + 0.3 + FENCE + phantom.stage_bolt_mm + 1.0
+    across = math.floor(0.8 * size.outer / half)
+    return max(across, 1) * half, math.ceil(needed / half) * half
+
+
+ACRYLIC = {"density_kg_m3": 1190.0, "youngs_modulus_kpa": 3e6, "poisson_ratio": 0.37, "loss_factor": 0.05}
+"""Cast acrylic at room temperature (secondary: data sheets)."""
+POISSON = 0.4999
+THINNER_MM = 0.1
+FARTHEST_MM = 125.0
+"""Walls farther from the unit are not looked at: no shipped printer makes such a box."""
+_RTOL, _DECIMALS = 1e-4, 6
+
+
+@dataclass(frozen=True)
+class Expected:
+    """The response: |u_z| over its value at the unit's edge at distances (mm) from it, and its source.
+
+    `low`, `high`: each kind of input by itself at both ends. `sensitivity`: relative change at the farthest point for a
+    layer thinner by `THINNER_MM`. `wall_mm`: least distance of a wall from the unit's centre for the asked echo;
+    `echo_pct`: at the actual wall, `soft_echo_pct`: there with the least loss factors. `forearm`: the body template's
+    curve, `factor` the mean factor between the two.
+    """
+
+    distances_mm: tuple[float, ...]
+    value: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    sensitivity: Mapping[str, float]
+    wall_mm: float
+    echo_pct: float
+    soft_echo_pct: float
+    forearm: tuple[float, ...]
+    factor: float
+    error: float
+
+
+def medium(phantom: PhantomTable, recipes: Sequence[Recipe], **changed: Sequence[float]) -> LayeredMedium:
+    """Return the stack; `changed` overrides thickness (mm), modulus (kPa) or loss factor, a value each layer."""
+    usual = {
+        "thickness": [layer.thickness_mm for layer in phantom.layers],
+        "modulus": [one.modulus_kpa for one in recipes],
+        "loss": [one.loss[0] for one in recipes],
+    }
+    layers = [
+        Layer(thickness * 1e-3, one.density_g_cm3 * 1e3, modulus * 1e3, POISSON, LossFactor(loss))
+        for thickness, modulus, loss, one in zip(*(usual | changed).values(), recipes, strict=True)
+    ]
+    density, modulus, poisson, loss = ACRYLIC.values()
+    return LayeredMedium(layers, HalfSpace(density, modulus * 1e3, poisson, LossFactor(loss)))
+
+
+def _farthest(phantom: PhantomTable) -> float:
+    return phantom.unit_diameter_mm / 2 + max(phantom.points_mm)
+
+
+def wall_distance(phantom: PhantomTable, recipes: Sequence[Recipe]) -> float:
+    """Return the least distance (mm) of a wall from the unit's centre that keeps the echo at the farthest point small.
+
+    Beyond it no wall up to `FARTHEST_MM` echoes more. Infinite if that is not far enough.
+    """
+    walls = np.arange(_farthest(phantom) + 1.0, FARTHEST_MM, 0.25)
+    loud = np.flatnonzero(_echo(phantom, medium(phantom, recipes), walls) > phantom.most_echo_pct / 100)
+    at = loud[-1] + 1 if len(loud) else 0
+    return float(walls[at]) if at < len(walls) else math.inf
+
+
+def echo_pct(phantom: PhantomTable, recipes: Sequence[Recipe], wall_mm: float, **changed: Sequence[float]) -> float:
+    """Return the echo at the farthest point from a wall at a distance (mm) from the unit's centre, percent.
+
+    `changed` as in `medium`.
+    """
+    return 100 * float(_echo(phantom, medium(phantom, recipes, **changed), np.array([wall_mm]))[0])
+
+
+def _echo(phantom: PhantomTable, stack: LayeredMedium, walls: np.ndarray) -> np.ndarray:
+    at = _farthest(phantom)
+    return _curve(phantom, stack, np.concatenate([[at], 2 * walls - at]))[0]
+
+
+def _curve(phantom: PhantomTable, stack: LayeredMedium, r_mm: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return |u_z| at radii over that at the first one, and the last one's relative error."""
+    load = UniformDisc(phantom.motor_diameter_mm / 2e3)
+    response = stack.response(load, 2 * math.pi * phantom.frequency_hz, r_mm * 1e-3, rtol=_RTOL)
+    u = np.abs(response.u_z)
+    return u[1:] / u[0], rounded_error(np.max(response.error_z) / u[-1])
+
+
+def expected(
+    phantom: PhantomTable,
+    recipes: Sequence[Recipe],
+    wall_mm: float,
+    least_wall_mm: float,
+    forearm: tuple[TissueLayer, ...],
+) -> Expected:
+    """Work out the response at the phantom's points; `wall_mm` is the box's, `least_wall_mm` of `wall_distance`."""
+    distances = np.array(sorted(phantom.points_mm))
+    r = phantom.unit_diameter_mm / 2 + np.concatenate([[0.0], distances])
+
+    def curve(**changed: Sequence[float]) -> np.ndarray:
+        return _curve(phantom, medium(phantom, recipes, **changed), r)[0]
+
+    value, error = _curve(phantom, medium(phantom, recipes), r)
+    losses = [[one.loss[end] for one in recipes] for end in (1, 2)]
+    cases = [value, *(curve(loss=loss) for loss in losses)]
+    cases += [curve(modulus=[one.low_kpa for one in recipes]), curve(modulus=[one.high_kpa for one in recipes])]
+    sensitivity = {}
+    for i, layer in enumerate(phantom.layers):
+        thickness = [one.thickness_mm - (THINNER_MM if j == i else 0.0) for j, one in enumerate(phantom.layers)]
+        cases.append(curve(thickness=thickness))
+        sensitivity[layer.name] = round(float(cases[-1][-1] / value[-1] - 1), _DECIMALS)
+    arm, beyond = _curve(phantom, body(forearm), r)[0], distances > 0
+    factor = math.exp(float(np.mean(np.abs(np.log(value[beyond] / arm[beyond])))))
+    value, low, high, arm = (tuple(one.tolist()) for one in (value, np.min(cases, 0), np.max(cases, 0), arm))
+    echoes = echo_pct(phantom, recipes, wall_mm), echo_pct(phantom, recipes, wall_mm, loss=losses[0])
+    return Expected(
+        tuple(distances.tolist()), value, low, high, sensitivity, least_wall_mm, *echoes, arm, factor, error
+    )
+
+
+SEGMENTS = 96
+_STEP_MM = 5.0
+LONGEST_SOURCE = 500
+"""Characters of a source in a spec."""
+
+
+@dataclass(frozen=True)
+class PhantomSet:
+    """A phantom ready to be written.
+
+    `volumes_mm3`: of each layer, skin first.
+    """
+
+    table: PhantomTable
+    recipes: tuple[Recipe, ...]
+    printer: Printer
+    inside_mm: float
+    size: BoxLengths
+    tools: tuple[Body, ...]
+    layers: tuple[Body, ...]
+    volumes_mm3: tuple[float, ...]
+    expected: Expected
+
+
+def phantom_set(table: PhantomTable) -> PhantomSet:
+    """Work out a phantom; its response is compared with that of the catalogue's forearm.
+
+    Raises Refusal for walls that echo too much, for layers that nobody tested, and for pieces beyond the bed.
+    """
+    recipes = tuple(recipe(one, table.frequency_hz, f"layers.{i}") for i, one in enumerate(table.layers))
+    if len({layer.name for layer in table.layers}) < len(table.layers):
+        raise Refusal("layers", some(layer.name for layer in table.layers), "each layer needs a name of its own")
+    expect_apart(table.points_mm)
+    printer = choose("printer", table.printer, printers())
+    wall, farthest = wall_distance(table, recipes), f"at {max(table.points_mm):g} mm"
+    if math.isinf(wall):
+        limit = f"no wall is far enough for an echo below {table.most_echo_pct:g} % {farthest}"
+        raise Refusal("most_echo_pct", table.most_echo_pct, limit)
+    needed = _STEP_MM * math.ceil(2 * wall / _STEP_MM)
+    inside = table.inside_mm or needed
+    if inside < 2 * wall:
+        limit = (
+            f"the walls' echo is {echo_pct(table, recipes, inside / 2):.3g} % {farthest}; for "
+            f"{table.most_echo_pct:g} % they must be {wall:g} mm from the unit's centre"
+        )
+        raise Refusal("inside_mm", inside, limit, needed)
+    size = lengths(table, inside, printer)
+    tools = tuple(pieces(table, size, printer))
+    for piece in printed(tools):
+        x0, y0, z0, x1, y1, z1 = bounds(realise(piece.shape, SEGMENTS))
+        long, short = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
+        bed = _bed(printer)
+        if short <= bed[0] and long <= bed[1] and z1 - z0 <= bed[2]:
+            continue
+        fitting = [
+            name
+            for name, one in printers().items()
+            if short <= _bed(one)[0] and long <= _bed(one)[1] and z1 - z0 <= _bed(one)[2]
+        ]
+        over = max(short - bed[0], long - bed[1], 0.0)
+        left = inside - over
+        limit = f"the {piece.name} is {long:.0f} x {short:.0f} x {z1 - z0:.0f} mm, the bed {bed[1]:g} x {bed[0]:g}"
+        if over and left > 40:
+            echo = echo_pct(table, recipes, left / 2)
+            limit += f"; about {left:.0f} mm inside would fit, whose walls echo {echo:.2g} %"
+        raise Refusal("printer", printer.name, limit, fitting[0] if fitting else None)
+    layers = tuple(cast(table, size))
+    volumes = tuple(float(realise(body.shape, SEGMENTS).volume()) for body in layers)
+    response = expected(table, recipes, inside / 2, wall, tuple(map(tissue_layer, tissue())))
+    return PhantomSet(table, recipes, printer, inside, size, tools, layers, volumes, response)
+
+
+def _bed(printer: Printer) -> tuple[float, float, float]:
+    """Return the bed's shorter and longer side, and the height above it."""
+    short, long = sorted((float(printer.bed_x_mm), float(printer.bed_y_mm)))
+    return short, long, float(printer.bed_z_mm)
+
+
+def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
+    """Return the layers of [tissue.NAME] of a spec, skin first, the plate last."""
+    found: dict[str, dict[str, object]] = {}
+    hertz = phantom.table.frequency_hz
+    also = f"; high: also times {stiffening(hertz):.3g}, which {hertz:g} Hz may add (assumed)"
+
+    def ranged(value: float, low: float, high: float) -> dict[str, Any]:
+        return rounded({"value": value, "low": low, "high": high}, 4)
+
+    for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True):
+        source = f"{one.silicone.name} + {one.thinner_pct:g} % thinner, {one.source}"
+        found[layer.name] = {
+            "status": "secondary",
+            "source": source[: LONGEST_SOURCE - len(also)] + also,
+            "thickness_mm": layer.thickness_mm,
+            "density_kg_m3": rounded(1e3 * one.density_g_cm3, 4),
+            "youngs_modulus_kpa": ranged(one.modulus_kpa, one.low_kpa, one.high_kpa),
+            "poisson_ratio": {"value": POISSON, "status": "assumed", "source": "silicone hardly changes its volume"},
+            "loss_factor": {
+                **ranged(*one.loss),
+                "status": "assumed",
+                "source": "tan delta of soft silicones at 100 to 150 Hz",
+            },
+        }
+    found["plate"] = {"status": "secondary", "source": "cast acrylic, data sheets", **ACRYLIC}
+    return found
+
+
+def printed(tools: Sequence[Body]) -> list[Body]:
+    """Return the pieces that a printer makes."""
+    return [body for body in tools if body.made == "printed"]
