@@ -13,9 +13,9 @@ import pytest
 import tomli_w
 from scipy import stats
 from typer.testing import CliRunner
-from unitcad.attenuation.edge.variant_units import nominal
 
 from unitcad.attenuation.edge.closed_form import crossings, published_path
+from unitcad.attenuation.edge.measured import nominal
 from unitcad.attenuation.edge.models import COMPARED
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.cli import app

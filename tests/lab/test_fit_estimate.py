@@ -11,9 +11,9 @@ import pytest
 import tomli_w
 from scipy import stats
 from typer.testing import CliRunner
-from unitcad.attenuation.edge.lab_fit import predictive
 
 from unitcad.attenuation.edge.models import stored
+from unitcad.attenuation.edge.ranges import predictive
 from unitcad.cli import app
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec, fit_of, frequency_table_of_spec

@@ -13,9 +13,8 @@ from rich.table import Column, Table
 
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.lab_fit import PERCENT, ModelFit, quantiles
-from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE
-from unitcad.attenuation.edge.scores import sign_flip_p
+from unitcad.attenuation.edge.models import BASELINE, OVERTURNED, RULE, sign_flip_p
+from unitcad.attenuation.edge.ranges import PERCENT, ModelFit, quantiles
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
 from unitcad.export.chart import Series, chart
