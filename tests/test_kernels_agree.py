@@ -10,7 +10,6 @@ from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from sample_bodies import LAYER1, QUARTER, all_bodies
 
-from unitcad.designs import shipped
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline.variant import Variant
@@ -89,13 +88,13 @@ def test_kernels_agree_on_bodies(name):
         assert_mesh_within_bound(shape, mesh.segment_count(20, tolerance), reference)
 
 
-IN_CI = (*shipped(), "chain")
-"""Templates that `python -m benchmarks.accuracy kernels --quick` compares in the same way."""
+QUICK = {"three-layer", "single-embedded"}
+"""`python -m benchmarks.accuracy kernels --quick` compares the shipped templates in the same way."""
 
 
 @pytest.mark.parametrize(
     "template",
-    [pytest.param(one, marks=pytest.mark.long if one in IN_CI else ()) for one in sorted(templates())],
+    [pytest.param(one, marks=() if one in QUICK else pytest.mark.long) for one in sorted(templates())],
 )
 def test_kernels_agree_on_every_part_of_every_template(template):
     variant = Variant.of(template)

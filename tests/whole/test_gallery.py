@@ -20,7 +20,13 @@ POCKET = math.pi * 3.5**2 * 2.0
 """The volume that the motor of 7 x 2 mm takes from a gel, mm3."""
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda path: path.stem)
+IN_CI = {"gel-dome", "sleeve-cluster", "lra-8mm"}
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [pytest.param(one, marks=() if one.stem in IN_CI else pytest.mark.long, id=one.stem) for one in SPECS],
+)
 def test_it_builds_and_all_its_checks_hold(spec: Path, tmp_path: Path) -> None:
     assert len(spec.read_text().splitlines()) <= 30
     assert re.search(r"not expressible", spec.read_text(), re.I)

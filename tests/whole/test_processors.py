@@ -63,7 +63,12 @@ def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], dict[str,
     return written(tmp_path_factory.mktemp("usual") / "out")
 
 
-@pytest.mark.parametrize("core", ["Haswell", "Zen", "SkylakeX", "Prescott"])
+LONG = pytest.mark.long
+
+
+@pytest.mark.parametrize(
+    "core", ["Haswell", *(pytest.param(core, marks=LONG) for core in ("Zen", "SkylakeX", "Prescott"))]
+)
 def test_another_core_of_openblas_writes_the_same_bytes(
     core: str, usual: tuple[set[str], dict[str, str]], tmp_path: Path
 ) -> None:

@@ -12,9 +12,13 @@ from unitcad.shape import cut, cylinder
 from unitcad.validation.load import every_template
 
 ALL_FORMATS = {"encapsulating", "forearm-patch", "forearm-pockets"}
+IN_CI = {*ALL_FORMATS, "embedded", "hex-19"}
 
 
-@pytest.mark.parametrize("template", sorted(every_template()))
+@pytest.mark.parametrize(
+    "template",
+    [pytest.param(one, marks=() if one in IN_CI else pytest.mark.long) for one in sorted(every_template())],
+)
 def test_a_result_passes_check_and_its_manifest(template: str, tmp_path: Path) -> None:
     passes(template, tmp_path, "stl,3mf,step,glb" if template in ALL_FORMATS else "stl,3mf")
 
