@@ -63,9 +63,6 @@ def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], dict[str,
     return written(tmp_path_factory.mktemp("usual") / "out")
 
 
-LONG = pytest.mark.long
-
-
 @pytest.mark.parametrize(
     "core", ["Haswell", *(pytest.param(core, marks=LONG) for core in ("Zen", "SkylakeX", "Prescott"))]
 )
