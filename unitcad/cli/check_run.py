@@ -15,10 +15,11 @@ from unitcad.cli import check_settings
 from unitcad.cli.check_settings import Configuration
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.export import finding_pictures
+from unitcad.files import no_such_file
 from unitcad.meshcheck import Limits, Options, file_checks, output
 from unitcad.meshcheck import baseline as baselines
 from unitcad.meshcheck import manifest as listing
-from unitcad.meshcheck.findings import MOST, SHOWN, FileReport
+from unitcad.meshcheck.findings import MOST, SHOWN
 from unitcad.meshcheck.output import FORMATS, render
 from unitcad.meshcheck.rules.registry import check_prefixes, rules
 from unitcad.meshcheck.rules.registry import explain as explanation
@@ -127,11 +128,13 @@ def run(arguments: CheckArguments) -> int:
     check_all = partial(file_checks.check_files, jobs=arguments.jobs, memory_mb=memory, then=draw)
     left_out = configuration.left_out(arguments.exclude or [])
     files, unread = file_checks.expand(arguments.files or [], left_out)
-    absent = [name for name in files if not os.path.lexists(name)]
-    without_files = [report for report in unread if report.verdict == "error"]
-    incomplete = bool(absent or without_files)
-    if incomplete and arguments.manifest is None and len(absent) == len(files) and len(without_files) == len(unread):
-        raise _no_files(without_files, absent)
+    faults = [
+        Refusal("FILE", report.path, report.findings[0].message) for report in unread if report.verdict == "error"
+    ]
+    faults += [Refusal("FILE", name, no_such_file(name)) for name in files if not os.path.lexists(name)]
+    if faults and arguments.manifest is None and len(faults) == len({*files, *(report.path for report in unread)}):
+        faults[0].others = tuple(faults[1:])
+        raise faults[0]
     of_path = partial(_options_of, configuration, options)
     if arguments.manifest is None:
         reports = unread + list(check_all([(path, of_path(path)) for path in files]))
@@ -155,15 +158,7 @@ def run(arguments: CheckArguments) -> int:
         written = render(reports, output_format, fail_on, configuration.shown, used)
         _write(written, plain=output_format == "text")
         sys.stderr.write(table)
-    return 2 if incomplete else file_checks.worst(reports, fail_on)
-
-
-def _no_files(without_files: Sequence[FileReport], absent: Sequence[str]) -> Refusal:
-    """Return the refusal of arguments that all name nothing to check."""
-    faults = [Refusal("FILE", report.path, report.findings[0].message) for report in without_files]
-    faults += [Refusal("FILE", name, files.no_such_file(name)) for name in absent]
-    faults[0].others = tuple(faults[1:])
-    return faults[0]
+    return 2 if faults else file_checks.worst(reports, fail_on)
 
 
 def _copy(given: str, formats: Sequence[str]) -> tuple[str, Path]:

@@ -118,6 +118,7 @@ def _refuse(error: Any, words: list[str]) -> None:
 def _in_style(error: Any, command: str) -> UnitcadError:
     """Return an error of Typer's as one of unitcad's: option, value, limit, nearest accepted value or next step."""
     text = " ".join(error.message.partition("\n")[0].split()).rstrip(".") if error.message else "is required"
+    text = re.sub(r"Got unexpected extra argument.*\((.*)\)", r"unexpected argument: \1", text)
     parameter, option, more = getattr(error, "param", None), getattr(error, "option_name", ""), f"see {command} --help"
     if parameter is None:
         if getattr(error, "possibilities", None) is None:
