@@ -20,7 +20,6 @@ import stat
 import time
 from collections.abc import Callable, Iterator, Mapping
 from difflib import get_close_matches
-from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -68,15 +67,10 @@ def _similar(path: Path) -> Path | None:
     """Return the existing path whose parts are most like those of a missing one; None if there is none."""
     folder = path.parent if path.parent.is_dir() else _similar(path.parent)
     try:
-        names = sorted(entry.name for entry in islice(os.scandir(folder), _LOOKED_AT)) if folder else []
+        near = get_close_matches(path.name, os.listdir(folder)[:_LOOKED_AT], n=1, cutoff=0.81) if folder else []
     except OSError:
         return None
-    same_kind = [name for name in names if Path(name).suffix.lower() == path.suffix.lower()]
-    for some in (same_kind, names):
-        stems = {Path(name).stem.lower(): name for name in some}
-        if folder and (near := get_close_matches(path.stem.lower(), stems, n=1, cutoff=0.65)):
-            return folder / stems[near[0]]
-    return None
+    return folder / near[0] if folder and near else None
 
 
 def read(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> bytes:
@@ -155,7 +149,8 @@ def regular(links: bool = True) -> Callable[[str, int], int]:
 
 def in_the_way(folder: Path) -> UnitcadError:
     """Return the error for a folder that can't be made since it, or one above it, is a file."""
-    file = next(path for path in (*reversed(folder.parents), folder) if os.path.lexists(path) and not path.is_dir())
+    above = (path for path in (*reversed(folder.parents), folder) if os.path.lexists(path) and not path.is_dir())
+    file = next(above, folder)
     kind = "a file, not a folder" if file.exists() else "a link to a folder that is missing"
     return UnitcadError(f"{file}: is {kind}; choose another with -o")
 

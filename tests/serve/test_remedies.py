@@ -11,7 +11,7 @@ from unitcad.arrays.array_file import array_templates
 from unitcad.serve.answers import answered
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Ask, Edit, Trusted
-from unitcad.serve.server import _trusted
+from unitcad.serve.server import _trusted_source
 from unitcad.spec import read_toml
 from unitcad.validation import custom_templates, templates
 
@@ -151,7 +151,7 @@ def test_a_bed_that_is_too_small_is_refused_at_the_count_that_was_changed():
 
 def test_no_option_of_the_command_line_is_told_on_the_page():
     path = custom_templates()["custom/dome"]
-    known = Trusted([_trusted(read_toml(path), path, code=True)])
+    known = Trusted([_trusted_source(read_toml(path), path, code=True)])
     told = answered(Ask(text=path.read_text("utf-8"), what="moulds"), known).faults
     assert [fault.field for fault in told] == ["design"]
     assert "can't be cast" in told[0].message

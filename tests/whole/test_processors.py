@@ -64,7 +64,7 @@ def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], dict[str,
 
 
 @pytest.mark.parametrize(
-    "core", ["Haswell", *(pytest.param(core, marks=LONG) for core in ("Zen", "SkylakeX", "Prescott"))]
+    "core", ["Haswell", *(pytest.param(core, marks=pytest.mark.long) for core in ("Zen", "SkylakeX", "Prescott"))]
 )
 def test_another_core_of_openblas_writes_the_same_bytes(
     core: str, usual: tuple[set[str], dict[str, str]], tmp_path: Path

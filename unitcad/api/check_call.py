@@ -155,8 +155,8 @@ def check(
     check_number("timeout", timeout, 0.001, _MOST)
     default = Limits()
     options = Options(
-        select=check_prefixes("select", _listed("select", select)),
-        ignore=check_prefixes("ignore", _listed("ignore", ignore)),
+        select=check_prefixes("select", _split_codes("select", select)),
+        ignore=check_prefixes("ignore", _split_codes("ignore", ignore)),
         unit=unit_named("unit", unit),
         printer=printer,
         shells=shells,
@@ -173,7 +173,7 @@ def check(
     return CheckResult((*missing, *check_files(work, jobs=jobs)))
 
 
-def _listed(name: str, codes: Sequence[str]) -> list[str]:
+def _split_codes(name: str, codes: Sequence[str]) -> list[str]:
     """Return prefixes given as a list or as one text with commas."""
     parts = codes.split(",") if isinstance(codes, str) else texts(name, codes)
     return [part for part in parts if part.strip()]

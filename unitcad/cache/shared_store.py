@@ -53,12 +53,12 @@ class SharedStore:
     def claim(self) -> None:
         """Make the place a store. Raises UnitcadError if it can't be reached, or has other contents."""
         try:
-            if _tried(lambda: self.objects.size(MARK), 2) is None:
+            if _retry(lambda: self.objects.size(MARK), 2) is None:
                 if isinstance(self.objects, FolderObjects) and self.objects.root.is_dir():
                     others = {path.name for path in self.objects.root.iterdir()} - {"tmp"}
                     if others and self.objects.size(MARK) is None:
                         raise UnitcadError(f"{self.address}: is not a store of unitcad, and not empty; choose another")
-                _tried(lambda: self.objects.create(MARK, _MARKED), 2)
+                _retry(lambda: self.objects.create(MARK, _MARKED), 2)
             if isinstance(self.objects, FolderObjects) and (closed := self.objects.closed()):
                 raise UnitcadError(f"--store {self.address}: {closed} can't be read and written here")
         except (FileExistsError, NotADirectoryError):
@@ -71,7 +71,7 @@ class SharedStore:
     def expect(self) -> None:
         """Raise UnitcadError if there is no store at the address, or it can't be reached."""
         try:
-            if _tried(lambda: self.objects.size(MARK), 2) is None:
+            if _retry(lambda: self.objects.size(MARK), 2) is None:
                 raise UnitcadError(f"{self.address}: there is no store of unitcad")
         except OSError as error:
             raise UnitcadError(f"{self.address}: can't be reached ({_line(error)})") from None
@@ -81,16 +81,16 @@ class SharedStore:
         sha256 = digest(content)
         name = _name(kind, sha256)
         if anew:
-            _tried(lambda: self.objects.put(name, content))
+            _retry(lambda: self.objects.put(name, content))
             self._damaged.discard((name, 0))
         elif name not in self._there:
-            _tried(lambda: self.objects.create(name, content))
+            _retry(lambda: self.objects.create(name, content))
         self._there.add(name)
         return sha256
 
     def size(self, sha256: str, kind: str = "content") -> int | None:
         """Return the stored bytes of a kind; None if there is nothing."""
-        return _tried(lambda: self.objects.size(_name(kind, sha256)))
+        return _retry(lambda: self.objects.size(_name(kind, sha256)))
 
     def noted(self, sha256: str) -> bool:
         """Tell whether this process knows that content is there, without asking."""
@@ -118,32 +118,32 @@ class SharedStore:
     def entry(self, key: str) -> Any:
         """Return the data under a key; None if there are none, or damaged ones."""
         try:
-            found = self._whole(_name("entries", key), lambda found: _unpacked(key, found) is not None)
+            found = self._whole(_name("entries", key), lambda found: _unpack(key, found) is not None)
         except MissingContent:
             return None
-        return _unpacked(key, found)
+        return _unpack(key, found)
 
     def enter(self, key: str, data: Any, *, anew: bool = False) -> bool:
         """Write data under a key, if there are none: False if another writer was first. `anew` replaces them."""
         payload = json.dumps(data, ensure_ascii=False, allow_nan=False).encode()
         packed = digest(f"{key}\n".encode() + payload).encode() + b"\n" + payload
         name = _name("entries", key)
-        if not anew and _tried(lambda: self.objects.create(name, packed)):
+        if not anew and _retry(lambda: self.objects.create(name, packed)):
             return True
         if anew or self.entry(key) is None:  # the stored entry is damaged
-            _tried(lambda: self.objects.put(name, packed))
+            _retry(lambda: self.objects.put(name, packed))
             return True
         return False
 
     def sizes(self, kind: str) -> dict[str, int]:
         """Return the bytes of all that there is of a kind ("content", "packs") by SHA-256."""
-        return {name.rpartition("/")[2]: size for name, size in _tried(lambda: self.objects.sizes(kind)).items()}
+        return {name.rpartition("/")[2]: size for name, size in _retry(lambda: self.objects.sizes(kind)).items()}
 
     def _whole(self, name: str, whole: Callable[[bytes], bool], start: int = 0, end: int | None = None) -> bytes:
         # Content that stayed damaged is read once from then on: many variants share a content.
         for left in reversed(range(1 if (name, start) in self._damaged else TRIES)):
             try:
-                found = _tried(lambda: self.objects.get(name, start, end))
+                found = _retry(lambda: self.objects.get(name, start, end))
             except FileNotFoundError:
                 break
             if whole(found):
@@ -156,7 +156,7 @@ class SharedStore:
         raise MissingContent(f"{name} is not in {self.address}, or damaged there")
 
 
-def _tried(work: Callable[[], T], tries: int = TRIES) -> T:
+def _retry(work: Callable[[], T], tries: int = TRIES) -> T:
     """Return what `work` returns, tried again after an OSError; MissingContent and a full store are not tried again."""
     for left in reversed(range(tries)):
         try:
@@ -174,7 +174,7 @@ def _name(kind: str, key: str) -> str:
     return f"{kind}/{key[:2]}/{key}"
 
 
-def _unpacked(key: str, packed: bytes) -> Any:
+def _unpack(key: str, packed: bytes) -> Any:
     checksum, _, payload = packed.partition(b"\n")
     return json.loads(payload) if digest(f"{key}\n".encode() + payload).encode() == checksum else None
 

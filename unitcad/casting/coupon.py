@@ -22,7 +22,6 @@ from pathlib import Path
 from unitcad import files
 from unitcad.catalogue import Printer
 from unitcad.designs.rib_leaves import LEAF_WIDTH, farthest_push, leaf_mm, least_skirt
-from unitcad.errors import UnitcadError
 from unitcad.export import printing, threemf
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
@@ -222,20 +221,17 @@ class Coupon:
 
 
 def write(printer: Printer, out: Path) -> Path:
-    """Write `out`/coupon-<printer>; return that folder. Raises UnitcadError if it can't be written."""
+    """Write `out`/coupon-<printer>; return that folder. Raises OSError if it can't be written."""
     folder, coupon, parts = out / f"coupon-{printer.name}", Coupon(printer), []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for body in coupon.bodies():
-            if body.made == "printed":
-                ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
-                files.write(folder / f"{body.name}.stl", printing.stl(*ready, body.name))
-                parts.append(threemf.MeshPart(body.name, body.colour, *ready))
-        bed = float(printer.bed_x_mm), float(printer.bed_y_mm)
-        files.write(folder / "coupon.3mf", threemf.content(parts, bed))
-        files.write(folder / "coupon.md", coupon.markdown().encode())
-    except OSError as error:
-        raise UnitcadError(f"{folder}: {error.strerror}") from None
+    folder.mkdir(parents=True, exist_ok=True)
+    for body in coupon.bodies():
+        if body.made == "printed":
+            ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
+            files.write(folder / f"{body.name}.stl", printing.stl(*ready, body.name))
+            parts.append(threemf.MeshPart(body.name, body.colour, *ready))
+    bed = float(printer.bed_x_mm), float(printer.bed_y_mm)
+    files.write(folder / "coupon.3mf", threemf.content(parts, bed))
+    files.write(folder / "coupon.md", coupon.markdown().encode())
     return folder
 
 

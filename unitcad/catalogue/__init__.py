@@ -180,11 +180,11 @@ def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] |
     >>> [layer.name for layer in unitcad.tissue()]
     ['skin', 'hypodermis', 'muscle', 'bone']
     """
-    return _tissue(name, own) if own else _shipped_tissue(name)
+    return _tissue(name, own) if own else _read_tissue(name)
 
 
 @cache
-def _shipped_tissue(name: str) -> tuple[Tissue, ...]:
+def _read_tissue(name: str) -> tuple[Tissue, ...]:
     return _tissue(name, {})
 
 
@@ -244,7 +244,7 @@ def choose(kind: str, name: str, known: Mapping[str, _Entry]) -> _Entry:
 
 def _entries(kind: type[_Entry], own: Mapping[str, Struct] | None) -> dict[str, _Entry]:
     file, field = _KINDS[kind]
-    entries = dict(_shipped(kind))
+    entries = dict(_read_shipped(kind))
     for name, table in (own or {}).items():
         given = _plain(table)
         base = given.get("like")
@@ -257,11 +257,11 @@ def _entries(kind: type[_Entry], own: Mapping[str, Struct] | None) -> dict[str, 
 def _after(kind: type[_Entry], table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of a table, those of the shipped entry that it is `like`, if any, before its own."""
     base = table.get("like")
-    return {**(_after(kind, _raw(_KINDS[kind][0])[base]) if base else {}), **_sourced(kind, table)}
+    return {**(_after(kind, _raw(_KINDS[kind][0])[base]) if base else {}), **_with_sources(kind, table)}
 
 
 @cache
-def _shipped(kind: type[_Entry]) -> dict[str, _Entry]:
+def _read_shipped(kind: type[_Entry]) -> dict[str, _Entry]:
     file, field = _KINDS[kind]
     return {name: _entry(kind, name, _after(kind, table), f"{field}.{name}") for name, table in _raw(file).items()}
 
@@ -275,7 +275,7 @@ def _plain(table: Any) -> dict[str, Any]:
     return msgspec.to_builtins(table)
 
 
-def _sourced(kind: type[Struct], table: Mapping[str, Any]) -> dict[str, Any]:
+def _with_sources(kind: type[Struct], table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of a table, each with status and source."""
     default = {key: table[key] for key in ("status", "source") if key in table}
     return {
@@ -292,7 +292,7 @@ def _entry(kind: type[Struct], name: str, table: Mapping[str, Any], path: str) -
         others = f" with {', '.join(missing[1:])}" if missing[1:] else ""
         like = "" if kind is Tissue else ", or like with the name of a shipped entry"
         raise Refusal(f"{path}.{missing[0]}", None, f"is required{others}{like}")
-    entry = msgspec.convert({"name": name, **_sourced(kind, table)}, kind)
+    entry = msgspec.convert({"name": name, **_with_sources(kind, table)}, kind)
     for key, _ in kinds_of(kind):
         value = getattr(entry, key)
         if value is not None:

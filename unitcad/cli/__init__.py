@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 from typing import NoReturn
 
 from unitcad.cli import command_line
 from unitcad.cli.command_line import app
 from unitcad.cli.output import form_of, say_error, speak_anywhere, warn
 from unitcad.errors import UnitcadError
+from unitcad.files import in_the_way
 
 __all__ = ["app", "main"]
 
@@ -52,6 +54,9 @@ def main() -> NoReturn:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except (NotADirectoryError, FileExistsError) as error:
+        say_error(in_the_way(Path(error.filename or "")), form)
+        sys.exit(2)
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
         say_error(UnitcadError(f"{place}{error.strerror or error}"), form)

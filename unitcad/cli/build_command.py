@@ -73,7 +73,7 @@ def build(
     """Make a unit and its casting moulds, or an array of units. The last line printed is the folder."""
     expect_commas("SPEC", specs)
     specs = [confirm_known(spec) for spec in specs]
-    once = partial(_built, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
+    once = partial(_build_all, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
     if not watch:
         if not once():
             sys.exit(1)
@@ -91,7 +91,7 @@ def build(
             warn("waiting for a save; Ctrl-C ends")
 
 
-def _built(
+def _build_all(
     specs: list[str],
     out: Path,
     fit: Path | None,
@@ -114,7 +114,7 @@ def _built(
     allow_code(code)
     # Every spec is validated before the first one is built.
     wanted = [load_subject(spec, changes, chosen) for spec in specs]
-    given = [_given(spec, changes) for spec in specs]
+    given = [_given_paths(spec, changes) for spec in specs]
     for spec in wanted if slicing else ():
         check_slicing(spec.unit, chosen)
     results: list[Built] = []
@@ -143,7 +143,7 @@ def _built(
     return all(result.ok for result in results)
 
 
-def _given(source: str, changes: list[str]) -> frozenset[str]:
+def _given_paths(source: str, changes: list[str]) -> frozenset[str]:
     """Return the paths of the numbers that a person gave, by --set or in a file that is no template and no result's."""
     shipped = source in every_template() or (Path(source).parent / "manifest.json").exists()
     own = {} if shipped else read_toml(Path(source))
@@ -151,7 +151,7 @@ def _given(source: str, changes: list[str]) -> frozenset[str]:
 
 
 def _summary(of: Subject, built: Built, given: frozenset[str]) -> Iterator[str]:
-    """Return the lines of a result; `given`: see `_given`."""
+    """Return the lines of a result; `given`: see `_given_paths`."""
     if isinstance(of, Compound):
         return of.summary(built.folder, built.manifest, given)
     return summary(of.unit, built, given)

@@ -1,12 +1,33 @@
-"""The command line of `unitcad check`; `check_run` does the work."""
+"""unitcad check."""
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from unitcad.cli.check_run import CheckArguments, run
+from unitcad import catalogue, files
+from unitcad.catalogue import Printer, printers
+from unitcad.cli import check_settings
+from unitcad.errors import Refusal, UnitcadError, unknown_name
+from unitcad.export import finding_pictures
+from unitcad.files import no_such_file
+from unitcad.meshcheck import Limits, Options, file_checks, output
+from unitcad.meshcheck import baseline as baselines
+from unitcad.meshcheck import manifest as listing
+from unitcad.meshcheck.findings import MOST, SHOWN
+from unitcad.meshcheck.output import FORMATS, render
+from unitcad.meshcheck.rules.registry import check_prefixes, rules
+from unitcad.meshcheck.rules.registry import explain as explanation
+from unitcad.meshcheck.rules.s_scale import unit_named
+from unitcad.rooms import expect_none_but
+from unitcad.spec.toml import read_toml
 
 
 def check(
@@ -15,7 +36,7 @@ def check(
     ] = None,
     output_format: Annotated[
         str, typer.Option(metavar="FORMAT", help="Report: text, json, github, sarif, junit or markdown.")
-    ] = CheckArguments.output_format,
+    ] = "text",
     as_json: Annotated[bool, typer.Option("--json", help="Short for --output-format json.")] = False,
     report: Annotated[
         list[str] | None,
@@ -71,9 +92,7 @@ def check(
         str | None,
         typer.Option(metavar="FILE", help="manifest.json of a build, or its folder (M rules). Default: none."),
     ] = None,
-    jobs: Annotated[
-        int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Worker processes.")
-    ] = CheckArguments.jobs,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Worker processes.")] = 1,
     max_faces: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Most faces in a file. Default: 10,000,000.")
     ] = None,
@@ -92,11 +111,9 @@ def check(
     write_baseline: Annotated[
         bool, typer.Option("--write-baseline", help="Write the findings to the file of --baseline.")
     ] = False,
-    show: Annotated[
+    pictures: Annotated[
         str | None,
-        typer.Option(
-            "--pictures", metavar="DIR", help="Folder for pictures of findings and coloured 3MF files. Default: none."
-        ),
+        typer.Option(metavar="DIR", help="Folder for pictures of findings and coloured 3MF files. Default: none."),
     ] = None,
     diff: Annotated[
         tuple[str, str] | None,
@@ -124,4 +141,151 @@ def check(
 
     Reads STL, 3MF, OBJ, PLY, OFF and GLB, and STEP if an extra with a B-rep kernel is installed.
     """
-    raise typer.Exit(run(CheckArguments(**locals())))
+
+    if list_rules:
+        sys.stdout.write("".join(f"{rule.code} {rule.severity}: {rule.title}\n" for rule in rules().values()))
+        return
+    if explain is not None:
+        sys.stdout.write(explanation(",".join(explain)) + "\n")
+        return
+    if as_json and output_format not in ("text", "json"):
+        why = "--json asks for another one: leave one of them out, or have both with --report json=FILE"
+        raise Refusal("--output-format", output_format, why)
+    output_format = "json" if as_json else output_format
+    if output_format not in FORMATS:
+        raise unknown_name("--output-format", output_format, FORMATS)
+    if pictures is not None and Path(pictures).exists() and not Path(pictures).is_dir():
+        raise Refusal("--pictures", pictures, "must name a folder; this is a file")
+    copies = [_copy(given, FORMATS) for given in report or []]
+    configuration = check_settings.find(config, wanted=not no_config)
+    level = fail_on or configuration.value("fail_on") or "error"
+    if level not in ("error", "warning"):
+        raise unknown_name("--fail-on", level, ("error", "warning"))
+    base = Path(baseline) if baseline is not None else configuration.baseline
+    if write_baseline and base is None:
+        raise UnitcadError("--write-baseline needs a file: --baseline FILE, or the key baseline of the settings")
+    if base is not None:
+        known = baselines.read(base) if base.exists() or not write_baseline else baselines.EMPTY
+    selected = check_prefixes(*configuration.chosen("select", _split(select)))
+    extra = check_prefixes("--extend-select", _split(extend_select) or [])
+    options = Options(
+        select=selected + extra if selected else (),
+        ignore=check_prefixes(*configuration.chosen("ignore", _split(ignore))),
+        unit=unit_named(*configuration.chosen("unit", unit)),
+        printer=_printer(*configuration.chosen("printer", printer)),
+        shells=shells,
+        strict=bool(configuration.value("strict") if strict is None else strict),
+        strict_3mf=bool(configuration.value("strict_3mf") if strict_3mf is None else strict_3mf),
+        limits=_limits(max_faces or configuration.value("max_faces"), *configuration.chosen("timeout", timeout)),
+        locations=MOST if all_locations or base is not None or pictures is not None else SHOWN,
+        draw=pictures is not None,
+    )
+    for name in files or ():
+        if name.endswith(".toml") and Path(name).is_file():
+            expect_none_but("", read_toml(Path(name)), name, "FILE")
+    if diff is not None:
+        if files or manifest is not None or base is not None:
+            raise UnitcadError("--diff compares its two names alone: leave out other files, --manifest and --baseline")
+        from unitcad.cli import check_diff  # with trimesh and SciPy, which no other check needs
+
+        said, code = check_diff.run(*diff, options, level, output_format, pictures)
+        _write(said, plain=output_format == "text")
+        raise typer.Exit(code)
+    if not files and manifest is None:
+        raise UnitcadError("check needs files, folders or globs, or --manifest")
+    for pattern, codes in (configuration.value("per_file_ignores") or {}).items():
+        check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
+    draw = None
+    if pictures is not None:
+        draw = partial(finding_pictures.write, Path(pictures))
+    memory = memory or configuration.value("memory") or 8000
+    check_all = partial(file_checks.check_files, jobs=jobs, memory_mb=memory, then=draw)
+    left_out = configuration.left_out(exclude or [])
+    paths, unread = file_checks.expand(files or [], left_out)
+    faults = [
+        Refusal("FILE", report.path, report.findings[0].message) for report in unread if report.verdict == "error"
+    ]
+    faults += [Refusal("FILE", name, no_such_file(name)) for name in paths if not os.path.lexists(name)]
+    if faults and manifest is None and len(faults) == len({*paths, *(report.path for report in unread)}):
+        faults[0].others = tuple(faults[1:])
+        raise faults[0]
+
+    def of_path(path: str) -> Options:
+        """Return the options without the codes that the settings ignore for a file."""
+        return replace(options, unwanted=tuple(code.strip().upper() for code in configuration.ignored(path)))
+
+    if manifest is None:
+        reports = unread + list(check_all([(path, of_path(path)) for path in paths]))
+    else:
+        listed = listing.read(manifest)
+        work = listing.work(listed, paths, of_path, None if options.printer is not None else printers())
+        compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
+        reports = unread + compared + listing.unchecked(listed, [path for path, _ in work], of_path)
+    shown = MOST if all_locations else SHOWN
+    if base is not None:
+        known = baselines.write(base, known, reports) if write_baseline else known
+        reports = [baselines.apply(known, base, report) for report in reports]
+    reports = [report.shortened(shown) for report in reports]
+    table = output.statistics(reports) if statistics else ""
+    used = None if base is None else base.as_posix()
+    for format_, path in copies:
+        _save(path, render(reports, format_, level, configuration.shown, used))
+    if statistics and output_format == "text":
+        sys.stdout.write(table)
+    else:
+        written = render(reports, output_format, level, configuration.shown, used)
+        _write(written, plain=output_format == "text")
+        sys.stderr.write(table)
+    raise typer.Exit(2 if faults else file_checks.worst(reports, level))
+
+
+def _copy(given: str, formats: Sequence[str]) -> tuple[str, Path]:
+    """Return format and path of `--report FORMAT=FILE`."""
+    name, equals, path = given.partition("=")
+    if not equals or not path:
+        raise Refusal("--report", given, "must be FORMAT=FILE", "sarif=report.sarif")
+    if name not in formats:
+        raise unknown_name("--report", name, formats)
+    if Path(path).is_dir():
+        raise Refusal("--report", given, "must name a file; this is a folder", f"{name}={path.rstrip('/')}/report")
+    return name, Path(path)
+
+
+def _save(path: Path, text: str) -> None:
+    """Write a report to a file, whole or not at all; its folder is made."""
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        files.write(path, text.encode("utf-8"))
+    except OSError as error:
+        raise UnitcadError(f"--report: {path}: {error.strerror}") from None
+
+
+def _write(text: str, *, plain: bool) -> None:
+    """Write a report. What programs read is UTF-8 with LF line ends, whatever the terminal's encoding is."""
+    raw = None if plain else getattr(sys.stdout, "buffer", None)  # which a stream in memory has not
+    if raw is None:
+        sys.stdout.write(text)
+        return
+    sys.stdout.flush()
+    raw.write(text.encode("utf-8"))
+    raw.flush()
+
+
+def _printer(field: str, name: str | None) -> Printer | None:
+    if not name:
+        return None
+
+    return catalogue.choose(field, name, catalogue.printers())
+
+
+def _limits(max_faces: int | None, field: str, seconds: float | None) -> Limits:
+
+    default = Limits()
+    if seconds is not None and not seconds < 1e7:
+        raise Refusal(field, seconds, "must be a number of seconds below 1e7", default.seconds)
+    return replace(default, max_faces=max_faces or default.max_faces, seconds=seconds or default.seconds)
+
+
+def _split(values: list[str] | None) -> list[str] | None:
+    return values and [part for value in values for part in value.split(",") if part.strip()]

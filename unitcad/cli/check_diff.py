@@ -74,7 +74,7 @@ def run(old: str, new: str, options: Options, fail_on: str, form: str, pictures:
     if form not in FORMATS:
         raise unknown_name("--output-format with --diff", form, FORMATS)
     options = replace(options, locations=MOST, draw=True)
-    found = [_compared(name, one, other, options, pictures) for name, one, other in _pairs(old, new)]
+    found = [_compare(name, one, other, options, pictures) for name, one, other in _pairs(old, new)]
     code = file_checks.worst([item.new for item in found if item.new], fail_on)
     if form == "json":
         return msgspec.json.format(
@@ -121,7 +121,7 @@ def _pairs(old: str, new: str) -> Iterator[tuple[str, str | None, str | None]]:
         yield Path(name).as_posix(), inside[0].get(name), inside[1].get(name)
 
 
-def _compared(name: str, old: str | None, new: str | None, options: Options, pictures: str | None) -> Difference:
+def _compare(name: str, old: str | None, new: str | None, options: Options, pictures: str | None) -> Difference:
     one, other = (None if path is None else file_checks.guarded(path, options) for path in (old, new))
     if one is None or other is None:
         return Difference(name, one, other)

@@ -46,7 +46,7 @@ class _Commands(TyperGroup):
             lines = [f"  {line}" for line in known[cmd_name].examples if one is made or one.name in line.split()]
             one.epilog = "\n".join(["\b", "Examples:", *lines])
             for parameter in one.params:
-                parameter.get_help_record = partial(_described, parameter)
+                parameter.get_help_record = partial(_help_record, parameter)
         return made
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -58,7 +58,7 @@ class _Commands(TyperGroup):
                 formatter.write_dl(rows)
 
 
-def _described(parameter: Any, ctx: Any) -> tuple[str, str]:
+def _help_record(parameter: Any, ctx: Any) -> tuple[str, str]:
     """Return Typer's line of a parameter for a help, with default and range as sentences."""
     names, text = type(parameter).get_help_record(parameter, ctx)
     text = re.sub(r"  \[default: ([^];]*?)\.?(?:; (.*))?\]$", r" Default: \1.  [\2]", text)
@@ -118,6 +118,7 @@ def _refuse(error: Any, words: list[str]) -> None:
 def _in_style(error: Any, command: str) -> UnitcadError:
     """Return an error of Typer's as one of unitcad's: option, value, limit, nearest accepted value or next step."""
     text = " ".join(error.message.partition("\n")[0].split()).rstrip(".") if error.message else "is required"
+    text = re.sub(r"Got unexpected extra argument.*\((.*)\)", r"unexpected argument: \1", text)
     parameter, option, more = getattr(error, "param", None), getattr(error, "option_name", ""), f"see {command} --help"
     if parameter is None:
         if getattr(error, "possibilities", None) is None:

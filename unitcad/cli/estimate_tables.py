@@ -286,7 +286,7 @@ def _coefficients(interfaces: list[str], found: dict[str, dict[str, Any]]) -> Ta
     table = Table("from a layer to the next", *heads, title="transmission and reflection, equation 4")
     for i, name in enumerate(interfaces):
         ends = [{end: values[i] for end, values in block.items()} for block in found.values()]
-        table.add_row(name, *(_ranged(one, key) for one in ends for key in ("k_t", "k_r")))
+        table.add_row(name, *(_format_range(one, key) for one in ends for key in ("k_t", "k_r")))
     return table
 
 
@@ -294,7 +294,7 @@ def _constraints(rows: list[dict[str, Any]]) -> Table:
     table = Table("", "says", "left", "", "right", "margin", "unit", title="the paper's inequalities 5 and 6")
     table.add_column("holds")
     for row in rows:
-        numbers = [_ranged(row, key) for key in ("left", "right", "margin")]
+        numbers = [_format_range(row, key) for key in ("left", "right", "margin")]
         holds = {True: "yes", False: "no", None: row.get("reason", "not known")}[row["holds"]]
         what = row["text"].replace("control", row["control"] or "")
         table.add_row(row["equation"], what, numbers[0], row["relation"], *numbers[1:], row["unit"], holds)
@@ -314,13 +314,13 @@ def _readings(rows: list[dict[str, Any]]) -> Table:
     for row in rows:
         key = "exponents_s_wave"
         ends = zip(row[key], row.get(f"{key}_low", row[key]), row.get(f"{key}_high", row[key]), strict=True)
-        exponents = [_ranged({"e": value, "e_low": low, "e_high": high}, "e") for value, low, high in ends]
-        ratios = [_ranged(one, "s", 100) for one in row["hierarchical_over_control"]]
+        exponents = [_format_range({"e": value, "e_low": low, "e_high": high}, "e") for value, low, high in ends]
+        ratios = [_format_range(one, "s", 100) for one in row["hierarchical_over_control"]]
         table.add_row(row["eta"].replace("_", " "), ", ".join(exponents), row["unit_of_exponent"], *ratios)
     return table
 
 
-def _ranged(row: dict[str, Any], key: str, factor: float = 1.0) -> str:
+def _format_range(row: dict[str, Any], key: str, factor: float = 1.0) -> str:
     """Format a value to three digits, or its range where it has no nominal one."""
     low, high = row.get(f"{key}_low"), row.get(f"{key}_high")
     if row[key] is not None:
@@ -348,7 +348,7 @@ def level(quantity: dict[str, Any] | None, factor: float = 1.0, digits: int = 3)
     if not quantity:
         return "-"
     value, low, high = (
-        None if quantity.get(k) is None else _shown(quantity[k] * factor, factor, digits) for k in _PARTS
+        None if quantity.get(k) is None else _format_number(quantity[k] * factor, factor, digits) for k in _PARTS
     )
     spread = f"{low} to {high}" if low and high and low != high else ""
     if value:
@@ -356,7 +356,7 @@ def level(quantity: dict[str, Any] | None, factor: float = 1.0, digits: int = 3)
     return spread or "not known"
 
 
-def _shown(value: float, factor: float, digits: int) -> str:
+def _format_number(value: float, factor: float, digits: int) -> str:
     """Format a number; a level next to nothing as below 0.01 %."""
     return "below 0.01" if factor == 100 and value < 0.01 else f"{value:.{digits}g}"
 

@@ -34,7 +34,7 @@ def wait_for_saves(specs: Iterable[Path]) -> Iterator[None]:
 def _states(specs: list[Path]) -> dict[Path, tuple[int, int, int] | None]:
     """Return what tells a save of each file: time, size and inode; None for a file that is not there."""
     found = {}
-    for path in [*specs, *(named for spec in specs for named in _named(spec))]:
+    for path in [*specs, *(named for spec in specs for named in _files_of(spec))]:
         try:
             state = path.stat()
             found[path] = state.st_mtime_ns, state.st_size, state.st_ino
@@ -43,7 +43,7 @@ def _states(specs: list[Path]) -> dict[Path, tuple[int, int, int] | None]:
     return found
 
 
-def _named(spec: Path) -> Iterator[Path]:
+def _files_of(spec: Path) -> Iterator[Path]:
     """Yield the files that a spec or an array names; none for a text that can't be read."""
     try:
         data = tomllib.loads(spec.read_text("utf-8"))

@@ -43,7 +43,7 @@ def custom(name: str, source: str) -> Design:
 @lru_cache(maxsize=16)
 def _design(name: str, source: str) -> Design:
     """Return the text's value of this name, each of its functions with errors that name the line."""
-    held = _held(name, source)
+    held = _run(name, source)
     if isinstance(held, Design):
         design = replace(held, name=name)
     elif callable(held):
@@ -57,16 +57,16 @@ def _design(name: str, source: str) -> Design:
         raise UnitcadError(f"design {name}: is a {type(held).__name__}, not a function or a Design")
     _check_values(design)
     functions = {field: getattr(design, field) for field in _EXPECTED if callable(getattr(design, field))}
-    return replace(design, **{field: _checked(name, field, function) for field, function in functions.items()})
+    return replace(design, **{field: _with_checks(name, field, function) for field, function in functions.items()})
 
 
-def _held(name: str, source: str) -> Any:
+def _run(name: str, source: str) -> Any:
     """Run the text and return its value of this name."""
     module = types.ModuleType("unitcad_custom_design")
     try:
         exec(compile(source, name.rpartition(":")[0], "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
-        raise _failed(name, error) from None
+        raise _error_at_line(name, error) from None
     known, wanted = vars(module), name_in_file(name)
     if wanted in known:
         return known[wanted]
@@ -100,7 +100,7 @@ def _check_values(design: Design) -> None:
         raise UnitcadError(f"design {design.name}: opens is {design.opens!r}, not 'above' or 'below'")
 
 
-def _checked(name: str, field: str, function: Callable[..., Any]) -> Callable[..., Any]:
+def _with_checks(name: str, field: str, function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a design's function with its errors as one sentence and its result looked at.
 
     A Refusal is the design's own word on a value of the spec and passes as it is.
@@ -113,7 +113,7 @@ def _checked(name: str, field: str, function: Callable[..., Any]) -> Callable[..
         except Refusal:
             raise
         except (Exception, SystemExit) as error:
-            raise _failed(name, error) from None
+            raise _error_at_line(name, error) from None
         if field == "dimensions" and not fault:
             fault = _wrong_count(made, given[0])
         if fault:
@@ -176,7 +176,7 @@ _EXPECTED: dict[str, Callable[[Any], str]] = {
 """For each function of a Design, a check of its result: the fault as text, "" for none."""
 
 
-def _failed(design: str, error: BaseException) -> UnitcadError:
+def _error_at_line(design: str, error: BaseException) -> UnitcadError:
     """Return the error with its line in the design's file."""
     file, line, trace = design.rpartition(":")[0], getattr(error, "lineno", None), error.__traceback__
     while trace is not None:

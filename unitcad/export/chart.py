@@ -81,8 +81,8 @@ def chart(
         spots = [(across.at(float(a)), up.at(float(b))) for a, b in zip(xs, ys, strict=True)]
         for (x, _), (low, high) in zip(spots, one.bars, strict=False):
             parts.append(line(x, up.at(float(low)), x, up.at(float(high)), colour))
-        parts += _drawn(one, spots, colour)
-        parts += _drawn(one, [(right + 10.0, y - 4.0), (right + 24.0, y - 4.0)], colour)
+        parts += _draw_curves(one, spots, colour)
+        parts += _draw_curves(one, [(right + 10.0, y - 4.0), (right + 24.0, y - 4.0)], colour)
         words = legend(right + 30, y, one.name)
         parts += words
         y += 15 * len(words) + 4
@@ -194,7 +194,7 @@ def _kept(one: Series, log_x: bool, log_y: bool) -> tuple[np.ndarray, np.ndarray
     return x[::step], y[::step]
 
 
-def _drawn(one: Series, spots: list[tuple[float, float]], colour: str) -> list[str]:
+def _draw_curves(one: Series, spots: list[tuple[float, float]], colour: str) -> list[str]:
     if one.points:
         return [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.5" fill="{colour}"/>' for x, y in spots]
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in spots)

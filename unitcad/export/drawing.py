@@ -64,7 +64,7 @@ def content(sheets: Sequence[Sheet]) -> bytes:
     canvas.setCreator("unitcad")
     canvas.setLineJoin(1)
     for i, sheet in enumerate(sheets):
-        scale, drawn = _fitted(sheet.views)
+        scale, drawn = _fit_views(sheet.views)
         left = (SHEET_MM[0] - sum(_size(root)[0] + GAP_MM for root in drawn) + GAP_MM) / 2
         for root in drawn:
             width, height = _size(root)
@@ -80,7 +80,7 @@ def content(sheets: Sequence[Sheet]) -> bytes:
     return file.getvalue()
 
 
-def _fitted(views: Sequence[Callable[[float], str]]) -> tuple[float, list[ElementTree.Element]]:
+def _fit_views(views: Sequence[Callable[[float], str]]) -> tuple[float, list[ElementTree.Element]]:
     """Return the largest scale at which the views have room side by side, and the views at it."""
     for scale in SCALES:
         drawn = [ElementTree.fromstring(view(scale * MM / PT_PER_PX)) for view in views]

@@ -319,7 +319,7 @@ _STYLE = (
 
 def _page(title: str, finding: Finding, views: Sequence[_View], place: Location | None) -> str:
     """Draw title and message, the views side by side, and below them their captions."""
-    lines = [*_wrapped(finding.message), *_wrapped(f"Fix: {rules()[finding.code].fix}")]
+    lines = [*_wrap(finding.message), *_wrap(f"Fix: {rules()[finding.code].fix}")]
     top = 2 * _MARGIN + 20 + 17 * len(lines)
     width = _MARGIN + len(views) * (SIZE[0] + _MARGIN)
     height = top + SIZE[1] + 46
@@ -350,7 +350,7 @@ def _caption(view: _View, finding: Finding, place: Location | None) -> str:
     return printable(f"near{cut}: {place}")[:100]
 
 
-def _wrapped(content: str) -> list[str]:
+def _wrap(content: str) -> list[str]:
     return textwrap.wrap(printable(content), _LINE, break_on_hyphens=False)
 
 

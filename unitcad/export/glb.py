@@ -90,7 +90,7 @@ def content(parts: Sequence[GlbPart]) -> bytes:
         meshes.append({"name": part.name, "primitives": [primitive]})
         materials.append(_material(part))
         node = {"name": part.name, "mesh": len(meshes) - 1, "extras": dict(sorted(part.extras.items()))}
-        nodes += [{**node, "name": place.name, **_moved(place)} for place in part.places] or [node]
+        nodes += [{**node, "name": place.name, **_placement(place)} for place in part.places] or [node]
     root = {
         "name": "assembly",
         "children": list(range(1, len(nodes) + 1)),
@@ -109,7 +109,7 @@ def content(parts: Sequence[GlbPart]) -> bytes:
         "buffers": [{"byteLength": len(buffer)}],
     }
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
-    return _packed((b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", bytes(buffer)))
+    return _pack((b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", bytes(buffer)))
 
 
 @lru_cache(maxsize=32)
@@ -156,7 +156,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.where(length > 0, length, 1.0)
 
 
-def _moved(place: Standing) -> dict[str, Any]:
+def _placement(place: Standing) -> dict[str, Any]:
     """Return a node's translation (mm) and rotation (a quaternion, the real part last)."""
     half = math.radians(place.angle_deg) / 2
     turn = {"rotation": [0.0, 0.0, math.sin(half), math.cos(half)]} if place.angle_deg else {}
@@ -176,6 +176,6 @@ def _material(part: GlbPart) -> dict[str, Any]:
     }
 
 
-def _packed(*chunks: tuple[bytes, bytes]) -> bytes:
+def _pack(*chunks: tuple[bytes, bytes]) -> bytes:
     body = b"".join(len(data).to_bytes(4, "little") + kind + data for kind, data in chunks)
     return b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(4, "little") + body

@@ -53,14 +53,14 @@ def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
     step = resolution(vertices)
     for power in range(1, ROUNDS + 1):
         mesh = solid.simplify(step * 4**power).to_mesh64()
-        rounded = _rounded(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.int64))
-        if len(rounded[1]) and _closed(rounded[1]) and _thinnest(*rounded) > step:
+        rounded = _to_float32(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.int64))
+        if len(rounded[1]) and _is_closed(rounded[1]) and _thinnest(*rounded) > step:
             return rounded
     where = f"parts of it touch along an edge only, or two faces are nearer than {step:.2g} mm"
     raise TooThin(f"the mesh can't be rounded to single precision: {where}")
 
 
-def _rounded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _to_float32(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the mesh in float32: equal vertices merged, collapsed faces dropped, in canonical order."""
     # Adding zero turns -0.0 into 0.0, which would otherwise be another vertex in the bytes.
     merged, index = unique_rows(vertices.astype(np.float32) + np.float32(0))
@@ -72,7 +72,7 @@ def _rounded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nd
     return merged, faces[np.lexsort(faces.T[::-1])]
 
 
-def _closed(faces: np.ndarray) -> bool:
+def _is_closed(faces: np.ndarray) -> bool:
     """Tell whether every edge is used once in each direction, so that the mesh is closed, oriented, manifold."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = int(faces.max()) + 1

@@ -241,7 +241,7 @@ def _fragments(
         which = np.flatnonzero((np.abs(area) > 1e-12) & (high >= low))
         rows = (high - low + 1)[which]
         for some in _blocks(rows):
-            face, row = np.repeat(which[some], rows[some]), _counted(low[which[some]], rows[some])
+            face, row = np.repeat(which[some], rows[some]), _count_from(low[which[some]], rows[some])
             left, right = _span(corners, face, row + 0.5)
             left = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
             right = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int)
@@ -250,7 +250,7 @@ def _fragments(
             level = one[face, 2] + down[face] * (row + 0.5 - one[face, 1]) + lean * (left + 0.5 - one[face, 0])
             for block in _blocks(number):
                 times = number[block]
-                step = _counted(np.zeros_like(times), times)
+                step = _count_from(np.zeros_like(times), times)
                 depth = np.repeat(level[block], times) + step * np.repeat(lean[block], times)
                 pixel = np.repeat((row * width + left)[block], times) + step
                 yield np.repeat((face[block] + begin).astype(np.int32), times), pixel, depth
@@ -263,7 +263,7 @@ def _blocks(count: np.ndarray) -> list[np.ndarray]:
     return np.split(np.arange(len(count)), np.searchsorted(ends, marks))
 
 
-def _counted(start: np.ndarray, count: np.ndarray) -> np.ndarray:
+def _count_from(start: np.ndarray, count: np.ndarray) -> np.ndarray:
     """Return, for each pair, the whole numbers from `start` on, `count` of them, one list behind the other."""
     return np.arange(count.sum()) + np.repeat(start - (np.cumsum(count) - count), count)
 

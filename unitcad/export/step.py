@@ -75,7 +75,7 @@ def content(bodies: Sequence[Body], name: str) -> bytes:
         done = writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs)
         if not done or writer.WriteStream(stream) != IFSelect_ReturnStatus.IFSelect_RetDone:
             raise UnitcadError(f"OCCT could not write {name} as STEP")
-    text = _settled(_with_header(stream.getvalue().decode("ascii"), name), [body.name for body in bodies])
+    text = _canonical(_with_header(stream.getvalue().decode("ascii"), name), [body.name for body in bodies])
     counts = [len(occt.solids_in(solids[part[0]])) for part in parts]
     return _with_styles(text, [bodies[part[0]].colour for part in parts], counts).encode("ascii")
 
@@ -127,7 +127,7 @@ def _name(label: TDF_Label, name: str) -> None:
 def _with_header(text: str, name: str) -> str:
     """Return the file with a header of ours: OCCT's has the time of writing."""
     when = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", "315532800")), UTC)
-    file = f"'{_escaped(name)}.step','{when:%Y-%m-%dT%H:%M:%S}'"
+    file = f"'{_escape(name)}.step','{when:%Y-%m-%dT%H:%M:%S}'"
     header = f"FILE_NAME({file},('unitcad'),(''),'Open CASCADE','unitcad','');"
     text, count = re.subn(r"FILE_NAME\(.*?\);", lambda _: header, text, count=1, flags=re.DOTALL)
     if count != 1:
@@ -135,11 +135,11 @@ def _with_header(text: str, name: str) -> str:
     return text
 
 
-def _escaped(name: str) -> str:
+def _escape(name: str) -> str:
     return name.replace("\\", "\\\\").replace("'", "''").encode("ascii", "replace").decode()
 
 
-def _settled(text: str, names: Sequence[str]) -> str:
+def _canonical(text: str, names: Sequence[str]) -> str:
     """Return the file with one record a line, reals to 1e-11, and its assembly's occurrences counted and named.
 
     OCCT merges vertices in the order of their addresses, which leaves 1e-17 in some coordinates, and wraps lines by
@@ -152,7 +152,7 @@ def _settled(text: str, names: Sequence[str]) -> str:
     parts = re.split(r"(?<=NEXT_ASSEMBLY_USAGE_OCCURRENCE\()'\d+','[^']*'", text)
     if len(parts) != len(names) + 1:
         raise UnitcadError(f"OCCT wrote {len(parts) - 1} of {len(names)} bodies as STEP")
-    labels = [f"'{i}','{_escaped(name)}'" for i, name in enumerate(names, 1)]
+    labels = [f"'{i}','{_escape(name)}'" for i, name in enumerate(names, 1)]
     return "".join(part + label for part, label in zip(parts, [*labels, ""], strict=True))
 
 

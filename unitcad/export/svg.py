@@ -146,7 +146,7 @@ def unit_section(
     `px_per_mm` as in `section`.
     """
     if not concentric:
-        measures = _measured(bodies, dims, segments)
+        measures = _measure(bodies, dims, segments)
         reach = max(
             (abs(x) for m in measures if m.side == "below" for x in (m.start, m.end)), default=dims.outer_radius
         )
@@ -161,7 +161,7 @@ def unit_section(
     return section(regions, _unit_measures(dims), notes, ground=ground, px_per_mm=px_per_mm)
 
 
-def _measured(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[Measure]:
+def _measure(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[Measure]:
     """Return width and height of the cast layers together, and the motor's diameter if the plane contains its axis."""
     names = {body.name for body in bodies if body.made == "cast"}
     # A polygon's corners on the circle: a round body is then as wide as it is drawn.

@@ -258,7 +258,7 @@ def material(
     """
 
     if not curves and dma is None:
-        raise Refusal("FILES", None, "name one tensile curve or more, or --dma with a file")
+        raise Refusal("FILES", None, "is required: a tensile curve or more, or --dma with a file")
     if deformation and dma is None:
         raise Refusal("--deformation", deformation, "says how --dma was measured, which is not given")
     if cell_n is not None and not curves:

@@ -82,17 +82,17 @@ def write(path: Path, old: Baseline, reports: Sequence[FileReport]) -> Baseline:
 
 def apply(baseline: Baseline, path: Path, report: FileReport) -> FileReport:
     """Return the report with the findings of the baseline at `path` marked as known."""
-    return _marked(report, baseline.files.get(_key(path, report.path), []))
+    return _mark_known(report, baseline.files.get(_key(path, report.path), []))
 
 
 def compare(new: FileReport, old: FileReport) -> FileReport:
     """Return the new report with the findings that the old one has, too, marked as known."""
-    return _marked(new, [_entry(item) for item in old.findings if _may_be(item)])
+    return _mark_known(new, [_entry(item) for item in old.findings if _may_be(item)])
 
 
-def _marked(report: FileReport, entries: Sequence[Entry]) -> FileReport:
+def _mark_known(report: FileReport, entries: Sequence[Entry]) -> FileReport:
     known = {entry.code: entry for entry in entries}
-    findings = tuple(_compared(item, known.get(item.code), report.facts) for item in report.findings)
+    findings = tuple(_compare(item, known.get(item.code), report.facts) for item in report.findings)
     return replace(report, findings=findings)
 
 
@@ -116,7 +116,7 @@ def _name(place: Location) -> str:
     return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
-def _compared(finding: Finding, entry: Entry | None, facts: Facts) -> Finding:
+def _compare(finding: Finding, entry: Entry | None, facts: Facts) -> Finding:
     """Return the finding as known, or with the places that are new in front."""
     if entry is None or not _may_be(finding):
         return finding

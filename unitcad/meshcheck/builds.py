@@ -47,10 +47,10 @@ def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[l
             findings, facts = _geometry(build, options, deadline, package.findings)
     except Unreadable as stop:  # its facts are one object's
         findings, facts = list(stop.findings), Facts()
-    return [_named(package, item) for item in findings], facts
+    return [_with_part_names(package, item) for item in findings], facts
 
 
-def _named(package: Package, item: Finding) -> Finding:
+def _with_part_names(package: Package, item: Finding) -> Finding:
     """Return the finding with its places' parts as the package writes them."""
     return replace(
         item,
@@ -69,7 +69,7 @@ class _Turned:
     scale: float
 
 
-def _turned(instance: Instance) -> _Turned:
+def _measure_turned(instance: Instance) -> _Turned:
     """Measure once for all instances that differ by a shift: adding it to the box rounds as it does every vertex."""
     linear = instance.matrix[:3]
     with np.errstate(all="ignore"):
@@ -96,7 +96,7 @@ def _geometry(
             checked[instance.key] = _check_object(instance, options, deadline)
             findings += checked[instance.key].findings
         if instance.linear not in turned:
-            turned[instance.linear] = _turned(instance)
+            turned[instance.linear] = _measure_turned(instance)
         deadline.tick()
     each = [(checked[instance.key].facts, turned[instance.linear]) for instance in instances]
     boxes = np.stack([one.box for _, one in each])

@@ -55,22 +55,22 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
             raise P011.unreadable("a face names a vertex that is not there")
         return _check_surface(Mesh(points, np.ascontiguousarray(triangles, dtype=np.int32)), options, deadline)
 
-    return _guarded("", options, work)
+    return _check_with("", options, work)
 
 
 def check_file(path: str | Path, options: Options | None = None) -> FileReport:
     """Check one file. Missing, unreadable and hostile files are findings of the report."""
     options = options or Options()
-    return _guarded(str(path), options, partial(_check, None, Path(path), options))
+    return _check_with(str(path), options, partial(_check, None, Path(path), options))
 
 
 def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileReport:
     """Check a file's content without the file; `name` gives the format by its suffix. Not for STEP."""
     options = options or Options()
-    return _guarded(name, options, partial(_check, data, Path(name), options))
+    return _check_with(name, options, partial(_check, data, Path(name), options))
 
 
-def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[Sequence[Finding], Facts]]) -> FileReport:
+def _check_with(path: str, options: Options, work: Callable[[Deadline], tuple[Sequence[Finding], Facts]]) -> FileReport:
     meshes: list[Mesh] | None = [] if options.draw else None
     with detailed(options.locations, meshes):
         try:
@@ -161,7 +161,7 @@ def expand(
     for name in names:
         path = Path(name)
         if path.is_dir():
-            inside = _inside(file for file in _walked(path) if not left_out(file))
+            inside = _inside(file for file in _walk(path) if not left_out(file))
             if not inside:
                 empty.append(FileReport(name, (F012.finding("no mesh file in this folder"),)))
             for file in inside:
@@ -180,7 +180,7 @@ def expand(
     return _once(files), empty
 
 
-def _walked(folder: Path) -> Iterator[str]:
+def _walk(folder: Path) -> Iterator[str]:
     """Return the files below a folder that are named as mesh files, without hidden folders and those behind links.
 
     Links to nothing and FIFOs are among them, and are findings.
@@ -232,16 +232,18 @@ def guarded(path: str, options: Options, then: Then | None = None) -> FileReport
     except Unreadable as stop:
         report = FileReport(path, stop.findings)
     except MemoryError:
-        report = _stopped(path, "out of memory (--memory)")
+        report = _report_stop(path, "out of memory (--memory)")
     except Exception as error:
         if os.environ.get("UNITCAD_TRACEBACK"):
             raise
-        report = _stopped(path, f"the check itself failed ({type(error).__name__}: {error}); please report the file")
+        report = _report_stop(
+            path, f"the check itself failed ({type(error).__name__}: {error}); please report the file"
+        )
     report = replace(report, seconds=time.perf_counter() - begin)
     return then(report) if then else report
 
 
-def _stopped(path: str, why: str) -> FileReport:
+def _report_stop(path: str, why: str) -> FileReport:
     return FileReport(path, (F011.finding(why),))
 
 
@@ -254,7 +256,7 @@ def _in_processes(
             try:
                 yield call.result()
             except WorkerEnded as end:
-                yield _stopped(path, f"{end} (memory, or a fault in native code)")
+                yield _report_stop(path, f"{end} (memory, or a fault in native code)")
 
 
 @contextlib.contextmanager

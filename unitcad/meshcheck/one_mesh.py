@@ -131,12 +131,12 @@ def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
     if meshes is not None and not any(known is mesh for known in meshes):
         meshes.append(mesh)
     return tuple(
-        replace(item, locations=tuple(_located(_drawn(place, mesh), mesh) for place in item.locations))
+        replace(item, locations=tuple(_with_file_places(_with_middle(place, mesh), mesh) for place in item.locations))
         for item in findings
     )
 
 
-def _drawn(place: Location, mesh: Mesh) -> Location:
+def _with_middle(place: Location, mesh: Mesh) -> Location:
     """Return the location with the middle of its triangles and, where findings are drawn, the number of their mesh."""
     if place.mesh is not None or (place.centre is not None and place.region is None):
         return place
@@ -152,7 +152,7 @@ def _drawn(place: Location, mesh: Mesh) -> Location:
     return replace(place, region=region, mesh=number, centre=centre)
 
 
-def _located(place: Location, mesh: Mesh) -> Location:
+def _with_file_places(place: Location, mesh: Mesh) -> Location:
     """Return the location with its triangles' faces, line, part and object as the file has them."""
     place, source = replace(place, object=place.object or mesh.name), mesh.source
     if source is None:

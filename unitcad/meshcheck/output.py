@@ -322,14 +322,14 @@ def render(
         written = _dump(sarif_log(reports))
     else:
         written = _WRITERS[format_](reports, fail_on)
-    return _SURROGATE.sub(partial(_escaped, format_ in ("json", "sarif")), written)
+    return _SURROGATE.sub(partial(_escape, format_ in ("json", "sarif")), written)
 
 
 _WRITERS = {"text": write_text, "github": write_github, "junit": write_junit, "markdown": write_markdown}
 _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
-def _escaped(quoted: bool, match: re.Match[str]) -> str:
+def _escape(quoted: bool, match: re.Match[str]) -> str:
     """Write characters that UTF-8 cannot encode, such as a byte of a file name, as \\xe4; `quoted`: in JSON."""
     code = ord(match.group())
     text = f"\\x{code - 0xDC00:02x}" if 0xDC80 <= code <= 0xDCFF else f"\\u{code:04x}"

@@ -192,11 +192,11 @@ def geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, p
     key = build_key(moulds.spec, only, check)
     with store.entry(key, intact=lambda there: all(map(store.has, there["files"].values()))) as entry:
         if entry.data is None:
-            entry.data = _made(moulds.blank, [name for name in only if name in GEOMETRIC], check, store, progress)
+            entry.data = _geometry(moulds.blank, [name for name in only if name in GEOMETRIC], check, store, progress)
     return entry.data
 
 
-def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Geometry:
+def _geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, progress: Progress) -> Geometry:
     progress("plan")
     forms = [form for form in moulds.spec.output.formats if form != "png"]
     table = [begun(planned) for planned in plan(moulds, only, forms)]

@@ -105,11 +105,11 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
         yield Planned(f"{together}.glb", make, key, form="glb", bodies=names)
         yield step_file(f"{together}.step", moulds, solids, group.name)
     if "unit" in only:
-        yield _drawn(moulds, "section.svg", partial(unit_section, moulds), "section")
+        yield _plan(moulds, "section.svg", partial(unit_section, moulds), "section")
     if "casting" in only:
         for step in moulds.plan.steps:
             section = partial(step_section, moulds, step)
-            yield _drawn(moulds, f"step{step.index}-section.svg", section, f"section of pour {step.index}")
+            yield _plan(moulds, f"step{step.index}-section.svg", section, f"section of pour {step.index}")
         bench = moulds.once("bench pictures", lambda: BenchPictures(moulds))
         for name in bench.names:
             path = picture_path(name)
@@ -119,7 +119,7 @@ def _files(moulds: MouldSet, only: Sequence[str]) -> Iterator[Planned]:
             yield Planned(path, draw, partial(geometry_key, moulds, path), "pictures", "png")
 
 
-def _drawn(moulds: MouldSet, path: str, draw: Callable[[], str], reads: str) -> Planned:
+def _plan(moulds: MouldSet, path: str, draw: Callable[[], str], reads: str) -> Planned:
     return Planned(path, lambda: draw().encode(), partial(geometry_key, moulds, reads), "drawing")
 
 
@@ -221,10 +221,10 @@ def ready(moulds: MouldSet, body: Body) -> tuple[np.ndarray, np.ndarray]:
     try:
         return _ready(body.shape, moulds.segments, body.upside_down)
     except TooThin as error:
-        raise _refused(moulds.spec, f"{body.name}: {error}") from None
+        raise _refusal(moulds.spec, f"{body.name}: {error}") from None
 
 
-def _refused(spec: Spec, why: str) -> Refusal:
+def _refusal(spec: Spec, why: str) -> Refusal:
     """Return the refusal of a spec for a mesh that single precision can't represent."""
     if is_custom(spec.design):
         do = "export the file again" if is_body_file(spec.design) else "draw them"
@@ -271,7 +271,7 @@ def joint_glb(moulds: MouldSet, parts: Sequence[glb.GlbPart]) -> bytes:
     try:
         return glb.content(parts)
     except TooThin as error:
-        raise _refused(moulds.spec, str(error)) from None
+        raise _refusal(moulds.spec, str(error)) from None
 
 
 def glb_part(moulds: MouldSet, body: Body) -> glb.GlbPart:

@@ -148,7 +148,7 @@ def write_bench(folder: Path) -> Path | None:
         "hash": spec_hash(spec)[:HASH_DIGITS] if spec else _hash(folder),
         "room_c": spec.casting.room_c if spec else None,
         "scale_g": spec.casting.scale_resolution_g if spec else None,
-        "asked": _asked(casting, spec),
+        "asked": _expected_measures(casting, spec),
         "record": {"format": FORMAT, "version": 1, "ending": ENDING},
         "measured_mm": MEASURED_MM,
         "pictures": step_pictures(folder, _paths(casting)),
@@ -160,7 +160,7 @@ def write_bench(folder: Path) -> Path | None:
     return target
 
 
-def _asked(casting: CastingFile, spec: Spec | None) -> dict[str, Any]:
+def _expected_measures(casting: CastingFile, spec: Spec | None) -> dict[str, Any]:
     """Return the expected measures of a unit, mm and g: the page refuses values far from them. {} if unknown."""
     if spec is None:
         return {}

@@ -26,7 +26,7 @@ class Pool:
         """Return `data` (of JSON's types) with every larger part replaced by a reference."""
         if not isinstance(data, dict | list | tuple | str):
             return data
-        text = _encoded(data)
+        text = _encode(data)
         if len(text) < LEAST:
             return data
         if text not in self._index:
@@ -39,7 +39,7 @@ class Pool:
         return {REFERENCE: self._index[text]}
 
 
-def _encoded(data: Any) -> bytes:
+def _encode(data: Any) -> bytes:
     """Return data as JSON, by the encoder that is ten times as fast as Python's if it can write all of it."""
     try:
         return _ENCODER.encode(data)

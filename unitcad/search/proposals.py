@@ -63,7 +63,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
     found = candidates(target, say)
     rows, measured = within(found), measured_rows(found)
     check_possible(found, measured)
-    chosen, out = _chosen(found, _ranked(found, rows, measured), check, say)
+    chosen, out = _choose(found, _rank(found, rows, measured), check, say)
     if not chosen:
         limit = f"none of the best can be cast: {out[0]['candidate']}: {out[0]['failed'][0]}"
         raise Refusal("at_hand.printer", target.asked.at_hand.printer, limit)
@@ -99,7 +99,7 @@ def leads_block(target: Target) -> dict[str, Any]:
     return {"model": model, "by": by, "ranks": RANKS, "does_not_rank": NOT_RANKED}
 
 
-def _chosen(
+def _choose(
     found: Candidates, ranked: Sequence[Kind], check: bool, say: Say
 ) -> tuple[list[tuple[Spec, dict[str, Any]]], list[dict[str, Any]]]:
     """Return the best of each kind that can be cast, at most `SHOWN`, and the candidates that can't be cast."""
@@ -139,7 +139,7 @@ def _is_other(found: Candidates, probability: float, measured: Mapping[str, Any]
     return not measured["meets"] if measured else probability < found.target.goals.probability_min
 
 
-def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[str, Any]]) -> list[Kind]:
+def _rank(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[str, Any]]) -> list[Kind]:
     """Return the kinds in their order, those measured within the target first, the nearest others last.
 
     A measured unit within the target represents its kind if the kind's best is less probable than required.

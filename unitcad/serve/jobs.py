@@ -136,14 +136,14 @@ class Jobs:
 @contextmanager
 def build_folder(out: Path) -> Iterator[Path]:
     """Make a folder for a build's files, which goes with the block; of a killed server the next start removes it."""
-    with _made(out), scratch(out) as folder:
+    with _temporary_folder(out), scratch(out) as folder:
         yield folder
 
 
 @contextmanager
 def sweep_folder(out: Path) -> Iterator[Path]:
     """Make the first of sweep-1, sweep-2, ... that is not there; it goes with the block unless `results` are in it."""
-    with _made(out):
+    with _temporary_folder(out):
         folder = next(path for i in count(1) if _is_new(path := out / f"sweep-{i}"))
         try:
             yield folder
@@ -153,7 +153,7 @@ def sweep_folder(out: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _made(out: Path) -> Iterator[None]:
+def _temporary_folder(out: Path) -> Iterator[None]:
     """Make a folder, and remove it with the block if it was not there and has nothing in it."""
     before = out.is_dir()
     out.mkdir(parents=True, exist_ok=True)

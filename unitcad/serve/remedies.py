@@ -31,17 +31,17 @@ def remedied(
     changed = {edit.path for edit in since}
     blamed = None
     if any(fault.field not in changed for fault in faults):
-        blamed = next((edit for edit in since if _accepted(_after(data, edit), judge)), None)
+        blamed = next((edit for edit in since if _is_accepted(_after(data, edit), judge)), None)
     own = {edit.path: edit for edit in since}
     alone = len(faults) == 1
     told = [
-        _remedied(one, data, None if one.field in own else blamed, own.get(one.field), alone, judge, whole)
+        _with_remedy(one, data, None if one.field in own else blamed, own.get(one.field), alone, judge, whole)
         for one in faults
     ]
-    return _left_out(told, data, judge)
+    return _mark_removable(told, data, judge)
 
 
-def _remedied(
+def _with_remedy(
     fault: Fault,
     data: Mapping[str, Any],
     blamed: Edit | None,
@@ -52,22 +52,22 @@ def _remedied(
 ) -> Fault:
     """Return a fault with its remedy; `own` takes back the change of its field, `blamed` that of another one."""
     if fault.rename is not None:
-        if _accepted(_renamed(data, fault.field, fault.rename[0]), judge):
+        if _is_accepted(_rename(data, fault.field, fault.rename[0]), judge):
             return fault
         fault = replace(fault, rename=None)
     if fault.nearest is not None:
-        fault = _offering(fault, _tried(fault, data, own, alone, judge, whole))
+        fault = _with_offer(fault, _offer(fault, data, own, alone, judge, whole))
     elif own and (nearest := _nearest(data, own, judge, whole)) is not None:
-        fault = _offering(fault, nearest)
+        fault = _with_offer(fault, nearest)
     if fault.field == "diameter_mm" and own is None and isinstance(fault.nearest, float):
-        fault = _offering(fault, _with_ring(data, blamed, fault.nearest, judge, whole))
+        fault = _with_offer(fault, _with_ring(data, blamed, fault.nearest, judge, whole))
     if blamed is not None:
         back = blamed.value if isinstance(blamed.value, str) and not blamed.toml else None
         back = _nearest(data, blamed, judge, whole) if back is None else back
         return replace(fault, at=blamed.path, at_nearest=back)
     if fault.nearest is None and at(data, fault.field) is not ABSENT:
         without = copy.deepcopy(dict(data))
-        if drop(without, fault.field) and _accepted(without, judge):
+        if drop(without, fault.field) and _is_accepted(without, judge):
             return replace(fault, leave_out=True)
     return fault
 
@@ -81,7 +81,7 @@ def _with_ring(data: Mapping[str, Any], blamed: Edit | None, least: float, judge
         kept = round(least + 2 * (before - _ring(judge(_after(data, Edit(path="diameter_mm", value=least))))), 3)
     except (UnitcadError, KeyError, TypeError):
         return least
-    return kept if kept > least and _accepted(_after(data, Edit(path="diameter_mm", value=kept)), whole) else least
+    return kept if kept > least and _is_accepted(_after(data, Edit(path="diameter_mm", value=kept)), whole) else least
 
 
 def _ring(settled: Mapping[str, Any]) -> float:
@@ -90,7 +90,7 @@ def _ring(settled: Mapping[str, Any]) -> float:
     return settled["diameter_mm"] / 2 - settled["motor"]["diameter_mm"] / 2 - walls
 
 
-def _offering(fault: Fault, nearest: Any) -> Fault:
+def _with_offer(fault: Fault, nearest: Any) -> Fault:
     """Return a fault that offers a value, in its sentence too."""
     if nearest == fault.nearest:
         return fault
@@ -98,7 +98,7 @@ def _offering(fault: Fault, nearest: Any) -> Fault:
     return replace(fault, nearest=nearest, message=message if nearest is None else message + NEAREST + shown(nearest))
 
 
-def _tried(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool, judge: Judge, whole: Judge) -> Any:
+def _offer(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool, judge: Judge, whole: Judge) -> Any:
     """Return the value to offer for a fault, whose nearest value meets only its own limit; None for nothing."""
     whole_too = _onwards(data, fault.field, fault.nearest, whole)
     if whole_too is not None:
@@ -106,7 +106,7 @@ def _tried(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool,
     if own and (nearest := _nearest(data, own, judge, whole)) is not None:
         return nearest
     # If no change makes all of it acceptable, or the former data is unknown, it cures its own fault.
-    cures = not alone or not own or _accepted(_after(data, Edit(path=fault.field, value=fault.nearest)), judge)
+    cures = not alone or not own or _is_accepted(_after(data, Edit(path=fault.field, value=fault.nearest)), judge)
     return fault.nearest if cures else None
 
 
@@ -116,7 +116,7 @@ def _onwards(data: Mapping[str, Any], path: str, value: Any, judge: Judge) -> An
     return changes[path] if set(changes) == {path} else None
 
 
-def _renamed(data: Mapping[str, Any], path: str, right: str) -> dict[str, Any]:
+def _rename(data: Mapping[str, Any], path: str, right: str) -> dict[str, Any]:
     """Return plain data whose key at a path has the name at another path."""
     changed = copy.deepcopy(dict(data))
     value = at(changed, path)
@@ -125,11 +125,11 @@ def _renamed(data: Mapping[str, Any], path: str, right: str) -> dict[str, Any]:
     return changed
 
 
-def _left_out(faults: Sequence[Fault], data: Mapping[str, Any], judge: Judge) -> list[Fault]:
+def _mark_removable(faults: Sequence[Fault], data: Mapping[str, Any], judge: Judge) -> list[Fault]:
     """Return the faults, marked to remove their keys together if the text is accepted without all of them."""
     fields = [fault.field for fault in faults]
     without = copy.deepcopy(dict(data))
-    if len(fields) < 2 or not all([drop(without, field) for field in fields]) or not _accepted(without, judge):
+    if len(fields) < 2 or not all([drop(without, field) for field in fields]) or not _is_accepted(without, judge):
         return list(faults)
     return [replace(one, leave_out=True, together=[field for field in fields if field != one.field]) for one in faults]
 
@@ -163,5 +163,5 @@ def _after(data: Mapping[str, Any], edit: Edit) -> dict[str, Any]:
     return changed
 
 
-def _accepted(data: Mapping[str, Any], judge: Judge) -> bool:
+def _is_accepted(data: Mapping[str, Any], judge: Judge) -> bool:
     return refused(data, {}, judge) is None

@@ -67,16 +67,16 @@ def serve(
     if not kind and not compound_kind(data):
         expect_none_but("spec", data, str(path), "spec", WrongArgument)
     campaign = (path.resolve(), kind.page) if kind else None
-    trusted = [_trusted(data, path, code)]
+    trusted = [_trusted_source(data, path, code)]
     plain = {name: each for name, each in every_template().items() if name not in custom_templates()}
     starts: dict[str, str | None] = {name: read_text(each) for name, each in plain.items()}
     for name, each in custom_templates().items():
         try:
-            trusted.append(_trusted(read_toml(each), each, code))
+            trusted.append(_trusted_source(read_toml(each), each, code))
             starts[name] = read_text(each)
         except Refusal:
             starts[name] = None
-    with _listening(host, port) as listening:
+    with _listen(host, port) as listening:
         bound = listening.getsockname()[1]
         setting = Setting(
             text, path.name if is_own(source) else f"{path.stem}.toml", folder, out,
@@ -151,7 +151,7 @@ def is_own(source: str | None) -> bool:
     return source is not None and is_path(source) and source not in custom_templates()
 
 
-def _listening(host: str, port: int) -> socket.socket:
+def _listen(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -164,7 +164,7 @@ def _listening(host: str, port: int) -> socket.socket:
     return listening
 
 
-def _trusted(data: Mapping[str, Any], path: Path, code: bool) -> Source:
+def _trusted_source(data: Mapping[str, Any], path: Path, code: bool) -> Source:
     """Return a spec's files, which a page's texts may name. Raises Refusal for a design that is code, unless `code`."""
     answers = answers_about(data)
     named = answers.named_files(data)

@@ -144,7 +144,7 @@ class _Nodes:
 
     def of(self, shape: Shape, turn: Turn = UNTURNED, move: Point = _ORIGIN) -> _Node:
         while isinstance(shape, Place):
-            move = _carried(turn, shape.move, move)
+            move = _transform(turn, shape.move, move)
             if shape.turn != UNTURNED:
                 turn = _both(turn, shape.turn)
             shape = shape.shape
@@ -215,7 +215,7 @@ def _placed_box(extent: Extent, turn: Turn, move: Point) -> Extent:
     return x0, y0, z0, x1, y1, z1
 
 
-def _carried(turn: Turn, point: Point, move: Point) -> Point:
+def _transform(turn: Turn, point: Point, move: Point) -> Point:
     """Return a point turned, then moved."""
     x, y, z = (sum(row[k] * point[k] for k in range(3)) + by for row, by in zip(turn, move, strict=True))
     return x, y, z

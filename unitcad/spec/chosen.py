@@ -17,11 +17,11 @@ MOTOR_SIZES = ("diameter_mm", "thickness_mm")
 
 def printer_of(spec: Spec) -> catalogue.Printer:
     """Return the catalogue's printer with the lengths that the spec's moulds override."""
-    return _overridden(catalogue.printers(spec.printers)[spec.moulds.printer], spec.moulds)
+    return _override(catalogue.printers(spec.printers)[spec.moulds.printer], spec.moulds)
 
 
 @lru_cache(maxsize=16)
-def _overridden(printer: catalogue.Printer, moulds: Moulds) -> catalogue.Printer:
+def _override(printer: catalogue.Printer, moulds: Moulds) -> catalogue.Printer:
     overridden = {
         name: catalogue.Value(value, "spec", "moulds")
         for name, value in structs.asdict(moulds).items()

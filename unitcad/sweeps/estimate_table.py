@@ -202,7 +202,7 @@ def _block(
             passes=np.array([entry.passes for entry in there]),
             whole=np.array([whole_ratio(entry.moduli) for entry in there]),
         )
-        alike = list(_merged(units, materials[:, 1:] == materials[:, :-1]))
+        alike = list(_merge(units, materials[:, 1:] == materials[:, :-1]))
         unknown = np.isnan(silicones).any(axis=(1, 2))
         for model in dict.fromkeys(model for entry in there for model in entry.models):
             column = levels.setdefault(model, np.full(len(known), np.nan))
@@ -216,7 +216,7 @@ def _block(
     return EstimateBlock(start, levels, known)
 
 
-def _merged(units: Units, same: np.ndarray) -> Iterator[tuple[np.ndarray, Units]]:
+def _merge(units: Units, same: np.ndarray) -> Iterator[tuple[np.ndarray, Units]]:
     """Yield rows of units and these units, neighbouring layers of one silicone as one: `variant_units.merged`.
 
     `same` (rows, N - 1) tells if a layer is of the silicone of the one inside it.

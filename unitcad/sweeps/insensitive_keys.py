@@ -147,7 +147,7 @@ def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[
     for own, value in values.items():
         put(data, own, value)
     for value in _values(sweep, path):
-        variant = _changed(data, path, value)
+        variant = _change(data, path, value)
         for model in models if variant else ():
             assert variant is not None
             level = float(edge_levels(nominal(variant), model, stored(variant.moduli)[model])[0])
@@ -156,7 +156,7 @@ def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[
     return levels
 
 
-def _changed(data: dict[str, Any], path: str, value: Any) -> EstimateInput | None:
+def _change(data: dict[str, Any], path: str, value: Any) -> EstimateInput | None:
     changed = copy.deepcopy(data)
     try:
         put(changed, path, value)

@@ -62,7 +62,7 @@ class Journal:
     def add(self, entry: JournalEntry) -> None:
         """Write the result of one variant. Raises OSError."""
         start = self._file.seek(0, os.SEEK_END)
-        self._file.write(_packed(to_builtins(entry), self._seed))
+        self._file.write(_pack(to_builtins(entry), self._seed))
         self._file.flush()
         self._note(entry.index, start)
 
@@ -118,7 +118,7 @@ class Journal:
         continued = path.exists() and self._continues(path)
         if not continued or self.damaged or not _ended(path):
             with files.writing(path, sync=True) as file:
-                file.write(_packed(self.head, 0))
+                file.write(_pack(self.head, 0))
                 if continued:
                     file.writelines(line for line, _ in self._entries(path))
         file = open(path, "ab+")  # noqa: SIM115
@@ -140,9 +140,9 @@ class Journal:
             first = file.readline(LONGEST)
             whole = sum(1 for _ in self._entries(path))
             there = _head(first)
-            torn = _packed(self.head, 0) != first
+            torn = _pack(self.head, 0) != first
             if there is None and whole == 0:
-                if first.strip(b"\0 \n") and not _packed(self.head, 0).startswith(first):
+                if first.strip(b"\0 \n") and not _pack(self.head, 0).startswith(first):
                     raise UnitcadError(
                         f"{path}: is no journal of a batch, or damaged in whole; choose another folder with -o, or "
                         "delete the journal to have finished variants checked again"
@@ -191,13 +191,13 @@ def _text(data: dict[str, Any]) -> bytes:
     return json.dumps(data, ensure_ascii=False, allow_nan=False).encode()
 
 
-def _packed(data: dict[str, Any], seed: int) -> bytes:
+def _pack(data: dict[str, Any], seed: int) -> bytes:
     """Return a line: JSON whose last key is the checksum of the keys before it."""
     text = _text(data)[:-1]
     return text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed)
 
 
-def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
+def _unpack(line: bytes, seed: int) -> dict[str, Any] | None:
     """Return the data of a line; None if it is damaged or of another batch."""
     text, _, _ = line.rpartition(b', "crc": "')
     if line != text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed):
@@ -207,7 +207,7 @@ def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
 
 def _entry(line: bytes, seed: int) -> JournalEntry | None:
     """Return the entry in a line; None if it is damaged, or something else."""
-    data = _unpacked(line, seed)
+    data = _unpack(line, seed)
     try:
         return None if data is None else convert(data, JournalEntry)
     except ValidationError:
@@ -216,7 +216,7 @@ def _entry(line: bytes, seed: int) -> JournalEntry | None:
 
 def _head(line: bytes) -> dict[str, Any] | None:
     """Return a journal's head; None if the line is none. Version 1 has no checksum."""
-    head = _unpacked(line, 0)
+    head = _unpack(line, 0)
     if head is None:
         try:
             head = json.loads(line)

@@ -49,7 +49,7 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     fresh: list[Path] = []
     try:
         for folder, record in shards:
-            with _opened(folder, record) as part:
+            with _open(folder, record) as part:
                 for index in record.indices:
                     entry = part.own(index)
                     if entry is not None and journal.own(index) != entry:
@@ -84,7 +84,7 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     return summary
 
 
-def _opened(folder: Path, record: ShardRecord) -> Journal:
+def _open(folder: Path, record: ShardRecord) -> Journal:
     return Journal(folder, record.shard_head, record.code, first=record.indices.start)
 
 
@@ -102,7 +102,7 @@ def _expect_finished(shards: Sequence[tuple[Path, ShardRecord]], stores: Mapping
         store = stores[folder]
         missing = list[int]()
         needed: dict[str, tuple[JournalEntry, int]] = {}  # of each pack: its first variant, and the end of its last one
-        with _opened(folder, record) as part:
+        with _open(folder, record) as part:
             for index in record.indices:
                 entry = part.own(index)
                 if entry is None:

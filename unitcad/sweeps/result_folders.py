@@ -40,7 +40,7 @@ def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskS
         store = InStore(SharedStore(address), options.verify, None, apart=remote)
         note_store(out, address)
         return store
-    kept = lru_cache(partial(_kept, out))
+    kept = lru_cache(partial(_earlier_store, out))
     if remote:
         return Receiver(out, cache, options.verify, kept)
     if folders_wanted(options, variants):
@@ -48,7 +48,7 @@ def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskS
     return InStore(SharedStore(str((out / STORE).absolute())), options.verify, cache)
 
 
-def _kept(out: Path) -> SharedStore | None:
+def _earlier_store(out: Path) -> SharedStore | None:
     """Return the store of a batch's earlier run; None if there is none, or it can't be reached."""
     with contextlib.suppress(UnitcadError):
         return _store_of(out)
@@ -106,7 +106,7 @@ def export_variants(
     Raises WrongArgument for a hash that no variant has, or several; UnitcadError for a batch without a store, and for
     lost contents; OSError.
     """
-    wanted = [_stored(batch, each) for each in hashes]
+    wanted = [_find_record(batch, each) for each in hashes]
     store = _store_of(batch, address)
     for entry, place in wanted:
         try:
@@ -125,13 +125,13 @@ def stored_spec(batch: Path, folder: str) -> str:
     """
     if not (batch / JOURNAL).is_file():
         raise WrongArgument("folder", folder, f"{batch} is not the folder of a batch")
-    entry, place = _stored(batch, folder.rpartition("-")[2])
+    entry, place = _find_record(batch, folder.rpartition("-")[2])
     if entry.folder != folder:
         raise WrongArgument("folder", folder, "no variant of the batch has it", entry.folder)
     return read_record(_store_of(batch), place)[0].own["spec.toml"].decode()
 
 
-def _stored(batch: Path, wanted: str) -> tuple[JournalEntry, RecordPlace]:
+def _find_record(batch: Path, wanted: str) -> tuple[JournalEntry, RecordPlace]:
     """Return a variant's line of the journal, and the place of its record in the store."""
     entry = _entry_of(batch, wanted)
     if entry.record is None:

@@ -83,7 +83,7 @@ def flat(entry: JournalEntry) -> Values:
 
 
 def _write_csv(path: Path, columns: list[str], entries: Iterable[JournalEntry]) -> None:
-    with _written(path) as file:
+    with _write(path) as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(columns)
         for entry in entries:
@@ -92,7 +92,7 @@ def _write_csv(path: Path, columns: list[str], entries: Iterable[JournalEntry]) 
 
 
 def _write_json(path: Path, head: dict[str, Any], entries: Iterable[JournalEntry]) -> None:
-    with _written(path) as file:
+    with _write(path) as file:
         text = json.dumps(head, indent=1, ensure_ascii=False, allow_nan=False)
         file.write(text.removesuffix("\n}") + ',\n "variants": [')
         for i, entry in enumerate(entries):
@@ -101,7 +101,7 @@ def _write_json(path: Path, head: dict[str, Any], entries: Iterable[JournalEntry
 
 
 @contextlib.contextmanager
-def _written(path: Path) -> Iterator[IO[str]]:
+def _write(path: Path) -> Iterator[IO[str]]:
     """Open a text file in UTF-8, line ends as written, that replaces `path` when the block ends without an error."""
     with files.writing(path) as file:
         text = io.TextIOWrapper(file, "utf-8", newline="")

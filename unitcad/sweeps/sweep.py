@@ -193,7 +193,7 @@ class Sweep:
         """Return the faults of a refused variant in one line; `first` is its refusal."""
         kind = compound_kind(self._data(index))
         if isinstance(first, Refusal) and kind:
-            told = load(kind.subject).offered(first, self._data(index)) if index < EXPLAINED else _unoffered(first)
+            told = load(kind.subject).offered(first, self._data(index)) if index < EXPLAINED else _without_offer(first)
             return str(told)
         if index >= EXPLAINED or not isinstance(first, Refusal):
             return str(first)
@@ -238,7 +238,7 @@ class Sweep:
         return {name: json.dumps(data) for name, data in self.bases}
 
 
-def _unoffered(refusal: Refusal) -> Refusal:
+def _without_offer(refusal: Refusal) -> Refusal:
     """Return a refusal without its value to offer, which nobody tried."""
     return Refusal(refusal.field, refusal.value, refusal.limit)
 
@@ -254,8 +254,8 @@ def load_sweep(source: str | os.PathLike[str]) -> Sweep:
 def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
     """Return a validated sweep of a sweep file's data; its relative paths start at `folder`."""
     file = convert(data, SweepFile)
-    table, values = _parted(file.sweep, SweepTable, "sweep")
-    typed = [_parted(case, CaseKeys, f"sweep.cases.{i}") for i, case in enumerate(table.cases)]
+    table, values = _split(file.sweep, SweepTable, "sweep")
+    typed = [_split(case, CaseKeys, f"sweep.cases.{i}") for i, case in enumerate(table.cases)]
     named = [file.base] if isinstance(file.base, str) else list(file.base)
     named += [case.base for case, _ in typed if case.base is not None]
     bases: dict[str, dict[str, Any]] = {}
@@ -276,7 +276,7 @@ def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
     return Sweep(file.name or name, tuple(bases.items()), table.mode, axes, cases, written, tuple(file.fixed))
 
 
-def _parted(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[str, Any]]:
+def _split(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[str, Any]]:
     """Split a table into the keys that `kind` has and the other ones, which are paths of a spec."""
     own = fields_of(kind)
     return (

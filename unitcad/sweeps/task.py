@@ -136,7 +136,7 @@ def _into_store(task: Task, store: SharedStore) -> list[VariantOutcome]:
     except Exception as error:
         return [failure(job.index, error) for job in task.jobs]
     jobs = [replace(job, spec=spec) for job, spec in zip(task.jobs, specs, strict=True)]
-    done = _each(jobs, task, lambda job, known: _delivered(job, task, known, store, anew), known)
+    done = _each(jobs, task, lambda job, known: _deliver(job, task, known, store, anew), known)
     try:
         places = record_packs.pack(store, [outcome.product for outcome in done if outcome.product])
     except Exception as error:
@@ -148,7 +148,7 @@ def _into_store(task: Task, store: SharedStore) -> list[VariantOutcome]:
     ]
 
 
-def _delivered(job: Job, task: Task, known: Bundle | None, store: SharedStore, anew: bool) -> VariantOutcome:
+def _deliver(job: Job, task: Task, known: Bundle | None, store: SharedStore, anew: bool) -> VariantOutcome:
     """Make a variant in memory, and put the contents that it shares into the store; its own files are still here."""
     spec = subject_of_text(job.spec)
     maker = _store(task.cache) if task.cache else MemoryStore(known)
@@ -196,7 +196,7 @@ def _locally(job: Job, task: Task, out: Path, scratch: Path) -> VariantOutcome:
     assert task.cache is not None
     spec = subject_of_text(job.spec)
     folder = out / spec.folder_name
-    manifest = _finished(folder, spec, task, job.damaged)
+    manifest = _finished_manifest(folder, spec, task, job.damaged)
     if manifest is not None:
         return _outcome(job, spec, folder.name, manifest, _manifest_sha256(folder), Counter({"file reused": 1}))
     store = _store(task.cache)
@@ -247,7 +247,7 @@ def _manifest_sha256(folder: Path) -> str:
     return digest(files.read(folder / "manifest.json", links=False))
 
 
-def _finished(folder: Path, spec: Subject, task: Task, damaged: str) -> Manifest | None:
+def _finished_manifest(folder: Path, spec: Subject, task: Task, damaged: str) -> Manifest | None:
     """Return the manifest of a result that an interrupted run completed, if it is the requested one.
 
     Raises UnitcadError for a folder with something else.

@@ -147,7 +147,7 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
         return settled(whole)
     except Refusal as first:
         every = every_fault(first, whole, lambda data: to_data(settled(data)), _sound(whole))
-        raise _located(every, data, source) from None
+        raise _locate(every, data, source) from None
 
 
 def changed(data: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]) -> dict[str, Any]:
@@ -193,7 +193,7 @@ def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any
     result: dict[str, Any] = copy.deepcopy(dict(data))
     for text in overrides:
         path, _, raw = confirm_form(text).partition("=")
-        put(result, path.strip(), _parsed(raw.strip()))
+        put(result, path.strip(), _parse(raw.strip()))
     return result
 
 
@@ -228,7 +228,7 @@ def _template_data(name: str) -> dict[str, Any]:
     return judge(read_toml(templates()[name]))
 
 
-def _located(every: list[Refusal], data: dict[str, Any], source: Source) -> Refusal:
+def _locate(every: list[Refusal], data: dict[str, Any], source: Source) -> Refusal:
     """Return the first of a spec's faults with the others, each with its file and line if it is in one."""
     path = _file(source)
     if path is not None:
@@ -265,7 +265,7 @@ def _file(source: Source) -> Path | None:
     return Path(text) if is_path(text) and text not in known else None
 
 
-def _parsed(raw: str) -> Any:
+def _parse(raw: str) -> Any:
     try:
         return tomllib.loads(f"value = {raw}")["value"]
     except (ValueError, RecursionError):

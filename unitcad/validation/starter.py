@@ -38,17 +38,17 @@ def _further_keys(section: str, there: dict[str, Any], model: type[Struct]) -> s
     """Return the keys that a table of the template leaves out, commented out."""
     if not section.startswith("["):
         tables = {name for name, field in fields_of(model).items() if not is_value(field.type)}
-        return "".join(f"{line}\n" for line in _keys(model, {*there, *tables, *_told(section)}))
+        return "".join(f"{line}\n" for line in _keys(model, {*there, *tables, *_describe(section)}))
     header = re.match(r"\[(\w+)\]", section)
     field = fields_of(model).get(header[1]) if header else None
     table = table_in(field.type) if field else None
     if not field or not table:
         return ""
-    told = {*there[field.name], *_told(section)}
+    told = {*there[field.name], *_describe(section)}
     return "".join(f"{line}\n" for line in _keys(table, told))
 
 
-def _told(section: str) -> list[str]:
+def _describe(section: str) -> list[str]:
     return re.findall(r"^# (\w+) =", section, re.MULTILINE)
 
 

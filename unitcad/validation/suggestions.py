@@ -111,7 +111,7 @@ def every_fault(first: Refusal, data: Mapping[str, Any], judge: Judge, sound: Ma
         return [first]
     if any(one.field == first.field for one in every):
         return every
-    return [_suggested(first, data, judge, sound), *every]
+    return [_suggest(first, data, judge, sound), *every]
 
 
 def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> list[Refusal]:
@@ -120,7 +120,7 @@ def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> l
     """
     typed: list[tuple[Refusal, Changes]] = []
     renamed = False
-    for refusal, passed in _met(data, judge, sound):
+    for refusal, passed in _refusals(data, judge, sound):
         derived = refusal.value is None and refusal.nearest is not None  # a key that another word makes necessary
         if not typed or (_is_wrong_by_itself(refusal, data, judge, sound) and not (renamed and derived)):
             typed.append((refusal, passed))
@@ -134,11 +134,11 @@ def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> l
     for refusal, _ in typed:
         others = {path: value for other, passed in typed if other is not refusal for path, value in passed.items()}
         rest = with_changes(data, others)
-        every.append(_suggested(refusal, rest, judge, sound))
-    return every if len(every) < 2 else _agreeing(every, typed, data, judge)
+        every.append(_suggest(refusal, rest, judge, sound))
+    return every if len(every) < 2 else _accepted_together(every, typed, data, judge)
 
 
-def _agreeing(
+def _accepted_together(
     every: list[Refusal], typed: Sequence[tuple[Refusal, Changes]], data: Mapping[str, Any], judge: Judge
 ) -> list[Refusal]:
     """Return faults whose suggestions are accepted together, if there are any such."""
@@ -173,7 +173,7 @@ def _does(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> bool:
     return refusal.nearest is not None and refused(data, {refusal.field: refusal.nearest}, judge) is None
 
 
-def _suggested(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Refusal:
+def _suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Refusal:
     """Return the only fault of data with a suggestion: another value, another key, or several together."""
     if isinstance(refusal, UnknownKey) or _does(refusal, data, judge):
         return refusal
@@ -264,7 +264,7 @@ def _is_wrong_by_itself(refusal: Refusal, data: Mapping[str, Any], judge: Judge,
     return refused(sound, {refusal.field: None if given is ABSENT else given}, judge) is not None
 
 
-def _met(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Iterator[tuple[Refusal, Changes]]:
+def _refusals(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Iterator[tuple[Refusal, Changes]]:
     """Yield one refusal after the other, each with the change that passes it over; stops at one that can't be."""
     changes: dict[str, object] = {}
     seen = set[str]()
@@ -273,14 +273,14 @@ def _met(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Ite
         if refusal is None or not refusal.field or refusal.field in seen:
             return
         seen.add(refusal.field)
-        passed = _passed(refusal, data, judge, sound, changes)
+        passed = _pass_over(refusal, data, judge, sound, changes)
         yield refusal, passed
         if not passed:
             return
         changes |= passed
 
 
-def _passed(
+def _pass_over(
     refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any], changes: Changes
 ) -> Changes:
     """Return a change that passes a refusal over: one with which data are accepted, or the first one; {} for none."""

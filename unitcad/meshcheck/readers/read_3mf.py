@@ -192,12 +192,12 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
         related = package.relations(part)
         _singletons(package, related, part, (opc.TICKET,))
         _paths(package, model, related, is_root=len(models) == 1)
-        reached = {path for path in _reached(model) if path in package.parts}
+        reached = {path for path in _linked_parts(model) if path in package.parts}
         wanted += sorted(reached)
     return models
 
 
-def _reached(model: Model) -> dict[str, str]:
+def _linked_parts(model: Model) -> dict[str, str]:
     """Return the parts that a model names by path, each as it is written there."""
     uses = [*model.items, *(use for resource in model.objects().values() for use in resource.components)]
     paths = {use.path for use in uses if use.path}
@@ -264,7 +264,7 @@ def _paths(package: Package, model: Model, related: list[Relation], *, is_root: 
             add(P002, f"{path} of {resource.kind} {resource.id} has no relationship", model.part)
         else:
             _image(package, part, P019 if resource.kind == "texture2d" else P020)
-    for part, written in sorted(_reached(model).items()):
+    for part, written in sorted(_linked_parts(model).items()):
         if part not in package.parts:
             package.add(P012, f"{written} is not in the package", model.part)
         elif part not in by_kind[opc.START]:

@@ -220,7 +220,7 @@ def _polygons(
     document: _Document, binary: memoryview, parts: list[_Part], unit_mm: float, limits: Limits, deadline: Deadline
 ) -> Polygons:
     """Return all triangles of the scene in mm; promised numbers are counted before anything is made."""
-    sizes = [_promised(document, part.primitive) for part in parts]
+    sizes = [_declared_counts(document, part.primitive) for part in parts]
     faces, points = sum(size[0] for size in sizes), sum(size[1] for size in sizes)
     if faces > limits.max_faces or points > 3 * limits.max_faces:
         raise F011.unreadable(f"{counted(faces, 'face')} in the scene, more than --max-faces {limits.max_faces}")
@@ -232,7 +232,7 @@ def _polygons(
         if id(part.primitive) not in read:
             read[id(part.primitive)] = _primitive(document, binary, part)
         points, faces = read[id(part.primitive)]
-        vertices.append(_placed(points, part.matrix, unit_mm))
+        vertices.append(_transform(points, part.matrix, unit_mm))
         with np.errstate(all="ignore"):
             mirrored = np.linalg.det(part.matrix[:3, :3]) < 0
         corners.append((faces[:, ::-1] if mirrored else faces) + before)
@@ -243,14 +243,14 @@ def _polygons(
     return Polygons(np.concatenate(vertices), np.concatenate(corners).reshape(-1), np.full(done, 3), source)
 
 
-def _placed(points: Floats, matrix: Floats, unit_mm: float) -> Floats:
+def _transform(points: Floats, matrix: Floats, unit_mm: float) -> Floats:
     """Return points under a matrix, mm, as float32 numbers. Column by column, so that equal points stay equal."""
     with np.errstate(all="ignore"):
         rows = [sum(points[:, k] * row[k] for k in range(3)) + row[3] for row in matrix[:3]]
         return (np.stack(rows, axis=1) * unit_mm).astype(np.float32).astype(np.float64)
 
 
-def _promised(document: _Document, primitive: _Primitive) -> tuple[int, int]:
+def _declared_counts(document: _Document, primitive: _Primitive) -> tuple[int, int]:
     """Return triangles (at most) and vertices of a primitive."""
     if "POSITION" not in primitive.attributes:
         raise F003.unreadable("a primitive of triangles has no POSITION")

@@ -184,7 +184,7 @@ def _binary(
     tables: Tables = {}
     for element in elements:
         if element.lists and not _alike(raw, at, element, order):
-            tables[element.name], at = _walked(raw, at, element, order, deadline)
+            tables[element.name], at = _walk_rows(raw, at, element, order, deadline)
         else:
             tables[element.name], at = _records(raw, at, element, order)
     if extra := len(raw) - at:
@@ -242,7 +242,7 @@ def _records(raw: bytes, at: int, element: _Element, order: str) -> tuple[dict[s
     return columns, at + size * element.count
 
 
-def _walked(raw: bytes, at: int, element: _Element, order: str, deadline: Deadline) -> tuple[dict[str, Column], int]:
+def _walk_rows(raw: bytes, at: int, element: _Element, order: str, deadline: Deadline) -> tuple[dict[str, Column], int]:
     """Return the columns of an element whose lists differ in length, record after record, and their end."""
     steps = [(struct.Struct(order + (length or kind)), struct.calcsize(order + kind) if length else 0,
               name in _WANTED.get(element.name, ())) for name, length, kind in element.properties]  # fmt: skip

@@ -119,7 +119,7 @@ class _Text:
 
 def _read_text(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
     state = _Text(findings)
-    _walk(_decoded(data.obj if isinstance(data.obj, bytes) else bytes(data), findings), state, limits, deadline)
+    _walk(_decode(data.obj if isinstance(data.obj, bytes) else bytes(data), findings), state, limits, deadline)
     if state.nested:  # one finding for all of them: a file may have a hundred thousand
         places = [Location(line=line) for line in state.nested_at]
         findings.append(F003.finding("solid begins before the last one ended", state.nested, places))
@@ -132,7 +132,7 @@ def _read_text(data: memoryview, limits: Limits, deadline: Deadline, findings: l
     return _mesh(np.concatenate(state.corners), np.concatenate(state.normals), findings)
 
 
-def _decoded(raw: bytes, findings: list[Finding]) -> bytes:
+def _decode(raw: bytes, findings: list[Finding]) -> bytes:
     """Return the text as bytes with LF line ends, whatever it was stored as; oddities become findings."""
     if not raw.isascii() and not raw.startswith(rows.UTF16):
         try:

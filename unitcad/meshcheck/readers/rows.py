@@ -120,7 +120,7 @@ def rows_of(block: Ints, line: int, *, integers: bool = False, which: Ints | Non
     Raises `Unreadable` (F004) for a word that is no number.
     """
     starts, ends = words(block)
-    values = _parsed(block, len(starts), integers)
+    values = _parse(block, len(starts), integers)
     if values is None:
         values = _slowly(block, line, integers)
     used = np.flatnonzero(np.diff(ends, prepend=0)) if which is None else which
@@ -201,7 +201,7 @@ def joined(parts: list[Rows]) -> Rows:
     )
 
 
-def _parsed(block: Ints, count: int, integers: bool) -> Floats | None:
+def _parse(block: Ints, count: int, integers: bool) -> Floats | None:
     """Return the numbers where all words of the block are some; None where one may be none."""
     if not (_IN_INTEGERS if integers else _IN_NUMBERS)[block].all():
         return None

@@ -61,7 +61,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
         if area < _LEAST:
             continue
         own = owner == label
-        if _bridged(topology, faces, segments[own], supported[own], printer):
+        if _is_bridge(topology, faces, segments[own], supported[own], printer):
             continue
         centre = mesh.vertices[mesh.faces[faces[0]]].mean(axis=0)
         bad.append((area, at_region(topology.kept[faces], centre)))
@@ -88,7 +88,7 @@ def _border(topology: Topology, beyond: Ints, bed: float) -> tuple[Floats, Float
     return np.stack([a[:, :2], b[:, :2]], axis=1), supported
 
 
-def _bridged(topology: Topology, faces: Ints, segments: Floats, supported: Floats, printer: Printer) -> bool:
+def _is_bridge(topology: Topology, faces: Ints, segments: Floats, supported: Floats, printer: Printer) -> bool:
     if not len(segments) or len(segments) > _BORDER or not supported.any():
         return False
     corners = topology.mesh.vertices[topology.mesh.faces[faces]][:, :, :2]
