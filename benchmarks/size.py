@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (546_000, 402, 68_100),
-    "core": (272_400, 221, 35_000),
-    "tests": (409_500, 0, 0),
+    "total": (547_100, 402, 68_200),
+    "core": (273_600, 221, 35_100),
+    "tests": (410_000, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900
