@@ -7,19 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from faulty_sets import broken, of_spec, set_of
+from faulty_sets import broken, mesh_findings, of_spec, set_of
 
 from unitcad.casting.procedure import procedure
+from unitcad.casting.written import to_markdown
 from unitcad.checks import check_moulds, mould_checks, opening
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.kernels.mesh import realise
+from unitcad.export import printing
+from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.complement import complement
 from unitcad.moulds.cup import cup_blank
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import cast_layers
 from unitcad.pipeline.write import Built, build
-from unitcad.shape import Revolve, Shape, polygon, union
+from unitcad.shape import Revolve, Shape, cut, polygon, union
 from unitcad.validation import custom_templates, load, templates
 
 SPEC = """
@@ -179,7 +181,7 @@ def _with_cavity(moulds: MouldSet, cavity: Cavity) -> MouldSet:
         (
             "cut(cylinder(7, 0, 4), [cylinder(5, 1, 5)])",
             1,
-            "pour 1 .* would hang in the silicone.*open above: draw the unit turned over",
+            "pour 1 .* on all sides but above, for a lid; nearest accepted: 'injected'",
         ),
         ("cut(cylinder(7, 0, 4), [cylinder(5, 1, 3)])", 1, "pour 1 .* closed in by silicone below and above"),
         ("cut(cylinder(7, 0, 4), [ring(6, 8, 1, 3)])", 1, "closed in by silicone below and above"),
@@ -194,9 +196,47 @@ def test_what_has_no_mould_is_refused_with_pour_and_place(tmp_path: Path, drawn:
         moulds_of(tmp_path, f"def unit(spec):\n    return {drawn}\n", layers=layers)
 
 
-def test_a_lid_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(Refusal, match="poured open"):
-        moulds_of(tmp_path, "def unit(spec):\n    return ring(4, 7, 0, 2)\n", "moulds.pour=injected")
+def test_the_core_of_a_gel_hangs_from_the_lid(tmp_path: Path) -> None:
+    """A fingertip gel: a ball's cap with a flange, hollow from above. The core's volume is the hollow's."""
+    arc = [(math.sin(math.radians(a)), 1 - math.cos(math.radians(a))) for a in range(0, 61, 5)]
+
+    def cap(radius: float, tip: float, *above: tuple[float, float]) -> Shape:
+        return Revolve(polygon(*((radius * x, tip + radius * z) for x, z in arc), *above))
+
+    hollow = cap(9.5, 2.5, (9.5 * arc[-1][0], 10), (0, 10))
+    gel = cut(cap(12, 0, (13, 6), (13, 9), (0, 9)), [hollow])
+    (tmp_path / "gel.stl").write_bytes(printing.stl(*arrays(realise(gel, 96)), "gel"))
+    spec = tmp_path / "spec.toml"
+    keys = 'name = "gel"\ndesign = "gel.stl"\ndiameter_mm = 26.0\nmotor = false\n'
+    spec.write_text(f'{keys}{LAYER}[moulds]\npour = "injected"\n')
+    moulds = MouldSet(load(spec))
+    assert [finding for finding in check_moulds(moulds) if not finding.ok] == []
+    assert mesh_findings(moulds) == []
+    (step,) = moulds.plan.steps
+    assert moulds.hung(step) == pytest.approx(6.5, abs=1e-3)
+    below = moulds.solids["lid1"].trim_by_plane((0, 0, -1), -9 + 1e-6)
+    room = realise(hollow, 96).trim_by_plane((0, 0, -1), -9)
+    assert max(piece.volume() for piece in below.decompose() if piece.genus() == 0) == pytest.approx(
+        room.volume(), rel=1e-3
+    )
+    text = to_markdown(procedure(moulds, (1900.0,), 30000.0))
+    assert "Hang the core: lower it with lid 1 straight into the cavity" in text
+    assert "Peel off silicone that came up on the core." in text
+
+
+@pytest.mark.parametrize("drawn", ["ring(4, 7, 0, 2)", "cut(cylinder(7, 0, 4), [cylinder(5, 1, 5)])"])
+def test_a_lid_keeps_every_check(tmp_path: Path, drawn: str) -> None:
+    """Also a gang's, whose lid carries two cores."""
+    for cavities in ("[1,1]", "[2,1]"):
+        moulds = moulds_of(
+            tmp_path,
+            f"def unit(spec):\n    return {drawn}\n",
+            "moulds.pour=injected",
+            f"moulds.cavities={cavities}",
+            "motor=false",
+        )
+        assert [finding for finding in check_moulds(moulds) if not finding.ok] == []
+        assert moulds.hung(moulds.plan.steps[0]) == (3.0 if "cut" in drawn else 0.0)
 
 
 def test_a_ring_gets_the_tools_of_an_embedded_control(tmp_path: Path) -> None:

@@ -72,7 +72,7 @@ def bond_faces(moulds: MouldSet) -> tuple[BondFace, ...]:
     for step in plan.steps:
         if step is not last:
             found.append((step.cup, "bore", f"layer {step.index + 1}"))
-        if step.lid:
+        if step.lid and not (step is last and moulds.spec.motor.absent):
             found.append((step.lid, "underside", "circuit" if step is last else f"layer {step.index + 1}"))
     if not plan.concentric and not plan.pins and len(plan.steps) > 1:
         # Its bore may meet a layer that is cured already, to which the last one has to bond; a back sheet's, whose cups
@@ -181,12 +181,14 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             required_tools=("petroleum jelly",),
         )
         yield _tongue_home(moulds, n, the_tongue, picture("tongue-home"))
+    core = moulds.hung(step)
     if step.lid:
         outside = f", outside {groove}" if step.groove else ""
         yield BenchStep(
             f"Lid {n} on",
-            f"Draw a thin line of petroleum jelly round the rim of cup {n}, near its outer edge{outside}. Put lid {n} "
-            "on, cut corner over cut corner, and press it down.",
+            f"Draw a thin line of petroleum jelly round the rim of cup {n}, near its outer edge{outside}. "
+            f"{f'Hang the core: lower it with lid {n} straight into the cavity' if core else f'Put lid {n} on'}, "
+            "cut corner over cut corner, and press it down.",
             picture("lid-on"),
             minutes=LIFT_MIN,
             required_tools=("petroleum jelly",),
@@ -242,7 +244,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             "Lid off",
             "Take off what held the lid down. Push the lid's edge up from below on two opposite sides, with thumbs or "
             f"a blunt spatula, a little at a time, cup {n} held down. Lift it straight up: sprue and vents tear off. "
-            "Trim them flush with a knife.",
+            f"Trim them flush with a knife.{' Peel off silicone that came up on the core.' if core else ''}",
             picture("lid-off"),
             minutes=LIFT_MIN,
             required_tools=("sharp knife", "blunt spatula"),

@@ -110,7 +110,8 @@ def to_markdown(procedure: Procedure) -> str:
         more = procedure.time_line[-1].end_min - procedure.earliest_finish_min
         lines[-1:-1] = [f"{procedure.last}: {duration(more)} more."]
     lines += [*_stretches(procedure.time_line), ""]
-    section("0. Measure first", _measuring(procedure))
+    if printing.sizes:
+        section("0. Measure first", _measuring(procedure))
     section("Print", (f"- {markdown(text)}" for text in printing.how))
     for group, items in grouped(procedure.bill).items():
         if group == "print":

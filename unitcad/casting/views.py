@@ -264,7 +264,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
         yield "tongue-home", View((*cured, opened, *placed(tongues)), (*on, *marks), names=names)
     closed = *cured, Placed(step.cup), *placed(tongues)
     lift, poured, colour = step.top - step.rim + 2 * CLEAR, placed([step]), layer_colour(step.index - 1)
-    off = Placed(step.lid or "", (0.0, 0.0, lift))
+    off = Placed(step.lid or "", (0.0, 0.0, lift + moulds.hung(step)))
     if step.lid:
         grease = Name("grease", (0.4 * cup_x, 0.8 - cup_y, step.rim))
         yield "lid-on", View((*closed, off), (*on, grease_on_rim(moulds, step)), names=(grease,))

@@ -1,6 +1,6 @@
 """Moulds for any cast shape, by complement: the rest of a block round the layers cast so far.
 
-        lug    .---------------------.   rim: the top of the silicone so far
+        lug    .---------------------.   rim: the top of the silicone so far, or under a lid with the cores that hang
      ----------'                     |
      | support |   .-------------.   |   cup      not under silicone, and joined to the block's outside
      |         |   |    core     |   |   base     under silicone (core, support), or alone in a hole (post)
@@ -28,10 +28,11 @@ from unitcad.designs.tooling import Tooling
 from unitcad.errors import UNIT_ALONE, Refusal
 from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_count, thick_pieces
 from unitcad.kernels.sections import gap, thick_parts, widest
+from unitcad.moulds import lid
 from unitcad.moulds.base import stand
 from unitcad.moulds.cup import cup_blank, groove, grooves, recess, skirt_end
 from unitcad.moulds.layout import layout
-from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece
+from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece, lid_piece
 from unitcad.shape import Below, Common, Component, Cut, Shape, box, cut, moved, union
 from unitcad.shape.profile import GRID_PER_MM
 from unitcad.spec import Spec
@@ -58,8 +59,6 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     If inserts of the design lead out of the silicone, the base carries them, and the cup has a slot for them, open
     downwards. Raises Refusal, with the pour and the place, for layers that leave a loose piece of mould.
     """
-    if spec.moulds.pour == "injected":
-        raise Refusal("moulds.pour", "injected", "moulds by complement have no lids; they are poured open", "open")
     if spec.moulds.shrinkage_percent:
         value, limit = (
             spec.moulds.shrinkage_percent,
@@ -76,7 +75,8 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     def there(layer: int) -> Sequence[Shape]:
         return laid if layer + 1 >= laid_in else ()
 
-    standing, tops = _standing(spec, cast, there, solids, rims, max(radii), segments)
+    injected = spec.moulds.pour == "injected"
+    standing, hung, tops = _carried(spec, cast, there, solids, rims, max(radii), segments)
     for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)):
         _check_opening(spec, i, solid, rim)
     if laid:
@@ -114,18 +114,20 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         parted = _pieces(realise(cup, segments))
         if len(parted) > 1:
             cup = Component(cup, (lay.cup[0] - spec.moulds.skirt_wall_mm / 2, 0.0, skirt_end(spec) + LEVEL))
-            for lost in _pieces(Manifold.compose(parted) - realise(cup, segments) - realise(base, segments)):
+            elsewhere = [realise(shape, segments) for shape in (cup, base, *in_cells(hung[i]))]
+            for lost in _pieces(Manifold.batch_boolean([Manifold.compose(parted), *elsewhere], OpType.Subtract)):
                 raise _refused(spec, i, f"the base goes all round a piece of the cup, {_place(lost)}")
         cups.append(cup)
         # Down into the plinth too: faces that only touch could leave a passage of no width.
         rest = Cut(blank, tuple(bores))
         sealed.append((Cut(Common((union(holes), rest)), tuple(in_cells([*standing, *there(i)]))),) if holes else ())
-    tools = (
-        base_piece(base),
-        *(cup_piece(i + 1, cup) for i, cup in enumerate(cups)),
-        blade_piece(blade(lay, dims.heights[-1])),
-    )
-    return Tooling(dims, lay, tools, seals=tuple(sealed), grooves=tuple(grooved))
+    tools, channels = [base_piece(base), *(cup_piece(i + 1, cup) for i, cup in enumerate(cups))], []
+    for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)) if injected else ():
+        drilled, poured = (lid.channels_over(spec, dims, lay, i, solid.slice(rim - _UNDER), by) for by in (BEYOND, 0.0))
+        tools.append(lid_piece(i + 1, lid.lid(spec, dims, lay, i, drilled, in_cells(hung[i]))))
+        channels.append(tuple(poured))
+    tools += [] if injected else [blade_piece(blade(lay, dims.heights[-1]))]
+    return Tooling(dims, lay, tuple(tools), tuple(sealed), tuple(channels), tuple(grooved))
 
 
 def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -159,7 +161,7 @@ def _check_opening(spec: Spec, layer: int, solid: Manifold, rim: float) -> None:
     raise _refused(spec, layer, f"{why}give it a flat top, such as a disc of {FLAT:g} mm, or turn it over")
 
 
-def _standing(
+def _carried(
     spec: Spec,
     cast: Sequence[Shape],
     there: Callable[[int], Sequence[Shape]],
@@ -167,8 +169,8 @@ def _standing(
     rims: Sequence[float],
     radius: float,
     segments: int,
-) -> tuple[list[Shape], float]:
-    """Return the pieces on the base in every pour, sunk into it, and the height of the tallest.
+) -> tuple[list[Shape], list[list[Shape]], float]:
+    """Return the pieces on the base in every pour, sunk into it, those under the lid of each pour, and the highest top.
 
     Raises Refusal for a piece that would hang in the air, and for one in the place of a later layer.
     """
@@ -179,6 +181,7 @@ def _standing(
         if not _stands(piece):
             raise _refused(spec, len(cast) - 1, f"a hollow of {_place(piece)} is closed in by silicone below and above")
     standing: list[Shape] = [Component(under, _inside(piece)) for piece in held]
+    hung: list[list[Shape]] = [[] for _ in cast]
     edge = radius + BEYOND
     for i, rim in reversed(list(enumerate(rims))):
         if any(bounds(realise(shape, segments))[5] > rim + LEVEL for shape in there(i)):
@@ -189,10 +192,13 @@ def _standing(
             if bounds(piece)[3] > edge - LEVEL:
                 continue
             if not _stands(piece):
-                why = f"a piece of {_place(piece)} would hang in the silicone: it touches neither base nor cup"
-                if bounds(piece)[5] > rim - LEVEL:
-                    why += "; it is open above: draw the unit turned over, and it is a core on the base"
-                raise _refused(spec, i, why)
+                if spec.moulds.pour == "open":
+                    why = f"pour {i + 1} has a core of {_place(piece)} with silicone on all sides but above, for a lid"
+                    raise Refusal("moulds.pour", "open", why, "injected")
+                # Of the silicone's own faces: columns leave films between them.
+                free = Cut(box(-edge, edge, -edge, edge, -BEYOND, rim), tuple(cast[: i + 1]))
+                hung[i].append(Cut(Component(free, _inside(piece)), (beneath,)))
+                continue
             above = piece.trim_by_plane((0, 0, 1), 0.0)
             if i == len(rims) - 1:
                 held.append(above)
@@ -206,7 +212,7 @@ def _standing(
             if thick_pieces(lost):
                 why = f"layer {j + 1} is under layer {i + 1} in a space of {_place(lost)}, in the place of its core"
                 raise _refused(spec, i, why)
-    return standing, max([bounds(piece)[5] for piece in held], default=LEVEL)
+    return standing, hung, max([bounds(piece)[5] for piece in held], default=LEVEL)
 
 
 def _pieces(solid: Manifold) -> list[Manifold]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from unitcad.designs import design_of
 from unitcad.designs.dimensions import poured
+from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Tooling
 from unitcad.moulds import filament, lid, trapped_air
 from unitcad.moulds.base import base, plate_bottom
@@ -44,7 +45,8 @@ def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         file = cup(spec, dims, lay, i, wider) if wider else None
         tools.append(cup_piece(i + 1, cup(spec, dims, lay, i), file))
         if injected:
-            tools.append(lid_piece(i + 1, lid.lid(spec, dims, lay, i)))
+            drilled = lid.channels(spec, dims, lay, i, beyond=BEYOND)
+            tools.append(lid_piece(i + 1, lid.lid(spec, dims, lay, i, drilled)))
     brittle = printer_of(spec).technology.value == "sla"
     tools += tongue_pieces(tongues(dims, lay, cut=brittle), brittle)
     if design.suction:

@@ -11,16 +11,21 @@ Over a ring, whose width no syringe's tip fits, the sprue narrows to a gate and 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
+from manifold3d import CrossSection
 
 from unitcad.designs import Dimensions
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Layout
 from unitcad.errors import Refusal
+from unitcad.kernels.sections import thick_parts, widest
 from unitcad.moulds.base import outline
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.layout import MARK
 from unitcad.moulds.trapped_air import MESH_ROOM, TILT_DEG, deepest
-from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, moved, polygon
+from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, mm, moved, polygon, union
 from unitcad.spec import Spec
 
 THICKNESS, SKIRT, SKIRT_WALL, SKIRT_OFF_WINDOW = 3.0, 1.5, 1.6, 0.2
@@ -34,12 +39,18 @@ GATE = 0.8
 """Diameter of an opening into a ring, over the ring's width."""
 
 
-def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
-    """Draw the lid of a layer's pour (from 0), lying on the cup's rim."""
+def lid(
+    spec: Spec, dims: Dimensions, lay: Layout, layer: int, drilled: Sequence[Shape], cores: Sequence[Shape] = ()
+) -> Shape:
+    """Draw the lid of a layer's pour (from 0), on the cup's rim: with channels `drilled`, and `cores` under it."""
     rim, top, play = dims.heights[layer], lid_top(dims, layer), spec.moulds.plinth_clearance_mm
     low = skirt_end(spec, dims, layer)
-    tools = [Extrude(outline(lay.cup, MARK, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
-    return cut(Extrude(outline(lay.cup, MARK, play + SKIRT_WALL), low, top), tools)
+    room = Extrude(outline(lay.cup, MARK, play), low - BEYOND, rim)
+    plate = Extrude(outline(lay.cup, MARK, play + SKIRT_WALL), low, top)
+    if cores:
+        # A core has nothing over it, so a copy of it that is higher only joins it to the plate.
+        return cut(union((cut(plate, [room]), *cores, *(moved(core, z=BEYOND) for core in cores))), drilled)
+    return cut(plate, [room, *drilled])
 
 
 def skirt_end(spec: Spec, dims: Dimensions, layer: int) -> float:
@@ -68,14 +79,60 @@ def channels(spec: Spec, dims: Dimensions, lay: Layout, layer: int, beyond: floa
         for a in turns
     ]
     if inner:
-        gate, middle = min(sprue, GATE * (outer - inner) / 2), (inner + outer) / 2
-        below = [(0, rim - beyond), (gate, rim - beyond)] if beyond else [(0, rim)]
-        above = [(sprue, top + beyond), (0, top + beyond)] if beyond else [(0, top)]
-        cone = Revolve(polygon(*below, (gate, rim), (sprue, top), *above))
+        middle = (inner + outer) / 2
+        cone = _cone(min(sprue, GATE * (outer - inner) / 2), sprue, rim, top, beyond)
         drawn[0] = moved(cone, middle * math.cos(turns[0]), middle * math.sin(turns[0]))
     else:
         drawn.insert(0, cylinder(sprue, rim - beyond, top + beyond))
     return [moved(shape, c.x, c.y) for c in lay.cells for shape in drawn]
+
+
+def _cone(gate: float, sprue: float, rim: float, top: float, beyond: float) -> Shape:
+    """Draw a sprue that narrows to a gate at the rim."""
+    below = [(0, rim - beyond), (gate, rim - beyond)] if beyond else [(0, rim)]
+    above = [(sprue, top + beyond), (0, top + beyond)] if beyond else [(0, top)]
+    return Revolve(polygon(*below, (gate, rim), (sprue, top), *above))
+
+
+def channels_over(
+    spec: Spec, dims: Dimensions, lay: Layout, layer: int, ceiling: CrossSection, beyond: float = 0.0
+) -> list[Shape]:
+    """Draw sprue and vents as `channels` does, over a flat top of any outline: the sprue in its widest place.
+
+    Each part of the top has vents along its edge, as many as clear the air of a tilted mould.
+    """
+    rim, top, sprue = dims.heights[layer], lid_top(dims, layer), spec.moulds.sprue_mm / 2
+    parts = [(*widest(part), part) for part in thick_parts(ceiling, LEAST_VENT)]
+    width, (x, y), _ = max(parts, key=lambda each: each[0], default=(0.0, (0.0, 0.0), ceiling))
+    drawn = [moved(_cone(min(sprue, GATE * width / 2), sprue, rim, top, beyond), x, y)]
+    for width, _, part in parts:
+        vent, places = min(VENT, GATE * width) / 2, []
+        for count in VENT_COUNTS if spec.moulds.vents is None else (spec.moulds.vents,):
+            places = [
+                at for at in _along(part.offset(-vent), count) if math.dist(at, (x, y)) > sprue + vent + SPRUE_OFF_VENT
+            ]
+            if _deepest_pocket(part, np.array([*places, (x, y)]), vent) <= MESH_ROOM * deepest(spec, layer):
+                break
+        drawn += [moved(cylinder(vent, rim - beyond, top + beyond), *at) for at in places]
+    return [moved(shape, c.x, c.y) for c in lay.cells for shape in drawn]
+
+
+def _along(section: CrossSection, count: int) -> list[tuple[float, float]]:
+    """Return points along a section's longest outline, evenly spaced: air under a tilted top goes to its edge."""
+    loops = [np.vstack([loop, loop[:1]]) for loop in section.to_polygons()]
+    runs = [np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(loop, axis=0).T))]) for loop in loops]
+    run, loop = max(zip(runs, loops, strict=True), key=lambda each: each[0][-1])
+    at = (np.arange(count) + 0.5) * run[-1] / count
+    return [(mm(x), mm(y)) for x, y in zip(*(np.interp(at, run, axis) for axis in loop.T), strict=True)]
+
+
+def _deepest_pocket(part: CrossSection, vents: np.ndarray, vent: float) -> float:
+    """Return the depth of the air under the highest corner of a flat top, tilted in any direction, mm."""
+    turns = np.linspace(0, math.tau, 180, endpoint=False)
+    ways = np.stack([np.cos(turns), np.sin(turns)])
+    corners = np.concatenate(part.to_polygons())
+    high = (corners @ ways).max(axis=0) - (vents @ ways).max(axis=0) - vent
+    return float(high.max()) * math.sin(math.radians(TILT_DEG))
 
 
 def _check_sprue(spec: Spec, dims: Dimensions, layer: int, count: int) -> None:

@@ -15,6 +15,7 @@ from unitcad.designs import Design, Dimensions, design_of, unit_bodies
 from unitcad.designs.design import Fitting
 from unitcad.kernels import mesh
 from unitcad.kernels.mesh import realise, segment_count
+from unitcad.kernels.sections import thick_parts
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.cavities import Cavity, cavities, united
 from unitcad.moulds.layout import groove_depth_of
@@ -218,6 +219,12 @@ class MouldSet:
             f"the upright faces of the parts on the base, only inside the slots of cup {step.index} for them, "
             "outside the cavity"
         )
+
+    def hung(self, step: Step) -> float:
+        """Return how far a core under a pour's lid hangs into the cavity, mm; 0 without one."""
+        lid = self.mesh(self.plan.tool(step.lid)) if step.lid else Manifold()
+        cores = len(thick_parts(lid.slice(step.rim - FACETS))) > 1  # besides its skirt
+        return step.rim - lid.bounding_box()[2] if cores else 0.0
 
     def pieces(self, name: str) -> int:
         """Return the number of solids that a body of that name is drawn of."""

@@ -190,6 +190,7 @@
   // Step 0: the lengths of bought parts, and the command that builds with those that were measured.
   function first() {
     const { sizes, source } = data.casting.printing;
+    if (!sizes.length) return null;
     const command = el("code", {}), now = (size) => value(size.keys[0], "mm") || size.value_mm;
     const draw = () => {
       const off = sizes.filter((size) => Math.abs(now(size) - size.value_mm) > data.measured_mm);
