@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (540_700, 384, 67_300),
-    "core": (267_500, 203, 34_300),
-    "tests": (407_000, 0, 0),
+    "total": (539_800, 385, 67_200),
+    "core": (264_900, 203, 34_100),
+    "tests": (402_800, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900
