@@ -10,6 +10,7 @@ from functools import cache, partial
 import numpy as np
 from msgspec.structs import replace
 
+from benchmarks.accuracy.elements import amplitude, pressed_skin
 from benchmarks.accuracy.fem_search import unit_spec
 from benchmarks.accuracy.level_scores import score_tables
 from benchmarks.accuracy.machine import machine
@@ -28,7 +29,7 @@ from unitcad.attenuation.edge.models import (
     in_order,
     stored,
 )
-from unitcad.attenuation.fem.unit import Setting, amplitude, motion, pressed_skin
+from unitcad.attenuation.fem.unit import Setting, motion
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements

@@ -14,8 +14,9 @@ from typing import Any, get_args
 
 import numpy as np
 
+from benchmarks.accuracy.elements import amplitude
 from unitcad.attenuation.edge.measured import CONTROL, measured_table
-from unitcad.attenuation.fem.unit import Draw, Drive, Reading, Setting, amplitude, drawn, motion
+from unitcad.attenuation.fem.unit import Draw, Drive, Reading, Setting, drawn, motion
 from unitcad.catalogue import measurements
 from unitcad.designs import shipped
 from unitcad.estimate_inputs import estimate_input

@@ -65,7 +65,7 @@ class Case:
 
 
 def cases() -> list[Case]:
-    """Return the frozen references, made by tests/attenuation/references/make_compliance.py."""
+    """Return the frozen references, made by references/make_compliance.py."""
     return [_case(data) for data in json.loads(COMPLIANCE.read_text("utf-8"))]
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.accuracy.level_scores import simulated
+from benchmarks.accuracy.level_scores import RANGE_HOLDS, simulated
 from benchmarks.accuracy.unexplained import NineLevels, unexplained
 from unitcad.attenuation.edge.measured import measured_table
-from unitcad.attenuation.edge.models import RANGE_HOLDS, assessments
+from unitcad.attenuation.edge.models import assessments
 
 NAMES = measured_table().names
 

@@ -42,7 +42,7 @@ def _off(found: Response, truth: Response) -> float:
     return float(max(np.max(np.abs(found.u_z - truth.u_z)), np.max(np.abs(found.u_r - truth.u_r))))
 
 
-@pytest.mark.parametrize("block", range(5))
+@pytest.mark.parametrize("block", [0, 1, 2, *(pytest.param(i, marks=pytest.mark.long) for i in (3, 4))])
 def test_error_bounds_the_true_error_of_random_cases(block):
     for seed in range(40 * block, 40 * block + 40):
         medium, load, omega, r, z, rtol = _random_case(seed)
@@ -59,13 +59,6 @@ def test_error_at_depth_under_a_disc_at_low_frequency():
     r = [4.2379e-4, 1.20883e-3, 1.29139e-3, 1.68537e-3, 7.2161e-3, 0.01934345]
     found, truth = (medium.response(UniformDisc(1.0114377e-3), 10.0, r, z=5e-3, rtol=rtol) for rtol in (1e-3, 1e-10))
     assert _off(found, truth) <= found.error
-
-
-@pytest.mark.parametrize("moduli", [(1e160, 1e4), (1e4, 1e300), (1e307, 1e307)])
-def test_moduli_that_would_overflow_are_refused_before_any_work(moduli):
-    top, below = moduli
-    with pytest.raises(Refusal, match="its magnitude must be from 1e-60 to 1e\\+60"):
-        LayeredMedium([Layer(1e-3, 1000, top, 0.3)], HalfSpace(1000, below, 0.3))
 
 
 @pytest.mark.parametrize("rows", [np.nan, np.inf])

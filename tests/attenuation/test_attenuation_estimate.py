@@ -10,8 +10,6 @@ import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
-from benchmarks.accuracy.pages import markdown
-from benchmarks.accuracy.result import Plot, Result
 from unitcad.attenuation.curve import NO_RATIO
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.estimates import summary
@@ -65,12 +63,6 @@ def test_layered_curve(encapsulating):
     assert layered["hierarchical_over_control"] is None
     assert layered["hierarchical_over_control_reason"] == NO_RATIO
     assert layered["r_mm"] == list(range(31))
-    for drive in layered["drives"].values():
-        u = drive["u"]
-        assert u["value"][0] == u["low"][0] == u["high"][0] == 1
-        assert all(low <= value <= high for low, value, high in zip(u["low"], u["value"], u["high"], strict=True))
-        assert u["value"][30] < 0.2
-        assert drive["error_estimate"] < 1e-4
     assert set(layered["paper_beside"]["exponential"]) == {"loss_modulus", "kelvin_voigt"}
 
 
@@ -106,14 +98,11 @@ def test_measured_in_both_prints_and_one_unit_without_a_figure():
     ("template", "change", "differs"),
     [
         ("motor-10mm", (), ["motor", "diameter", "frequency"]),
-        ("encapsulating", ("diameter_mm=20",), ["diameter"]),
         ("encapsulating", ("motor.drive=axial",), ["drive"]),
-        ("encapsulating", ("layers.1.cap_mm=0.8",), ["caps"]),
         ("encapsulating", ("layers.0.wall_mm=1.0",), ["walls"]),
         ("encapsulating", ("estimate.tissue=rigid-plate",), ["body"]),
         ("encapsulating", ("motor.lip_mm=0.5",), ["lip"]),
         ("encapsulating", ("skin_mm=0.5",), ["film on the skin side"]),
-        ("encapsulating", ("estimate.frequency_hz=60",), ["frequency"]),
     ],
 )
 def test_measured_is_said_of_the_same_unit_only(template, change, differs):
@@ -298,8 +287,6 @@ def test_a_table_over_frequencies_has_both_drives():
     "arguments",
     [
         ["encapsulating", "--model", "publishd"],
-        ["encapsulating", "--frequency", "x"],
-        ["no-such-template"],
         ["encapsulating", "--set", "layers.0.material=butter"],
         ["encapsulating", "--set", "estimate.tissue=elbow"],
         ["encapsulating", "--set", "motor.part=VC9"],
@@ -343,13 +330,6 @@ def test_layered_block_reads_no_silicone():
 def test_a_table_over_frequencies_says_which(hertz, said):
     found = frequency_table_of_spec(load("encapsulating"), hertz, ("divider",))["variant"]["frequency_hz"]
     assert (found["value"], found["low"], found["high"]) == said
-
-
-def test_no_picture_is_linked_where_none_is_written():
-    plot = Plot("decay", "r", "u", {"a": ((1.0, 1.0),)})
-    result = Result("one", "One", "text", plots=(plot,))
-    assert "![" not in markdown(result)
-    assert "![decay](a.svg)" in markdown(result, ["a.svg"])
 
 
 def test_a_range_stays_a_range_in_the_papers_details():

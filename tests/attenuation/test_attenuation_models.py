@@ -11,7 +11,6 @@ from unitcad.attenuation.edge.measured import CLASSES, measured_slopes, measured
 from unitcad.attenuation.edge.models import (
     COMPARED,
     MODELS,
-    assess,
     assessments,
     choice,
     classes_out,
@@ -86,12 +85,6 @@ def test_exact_attenuation_is_the_decay_of_the_wave():
     mu = E10 / (2 * 1.4999) * (1 + 0.4j)
     field = np.exp(-1j * 2 * np.pi * 125 * np.sqrt(1070 / mu) * 1.25e-3)
     assert cf.corrected_path(one) == pytest.approx(2 * abs(field), rel=1e-12)
-
-
-def test_layers_of_one_material_are_one_layer():
-    for path in (cf.published_path, cf.corrected_path):
-        three, one = units(D10, D10, D10, wall=1e-3), units(D10, wall=3e-3)
-        assert path(three) == pytest.approx(path(one), rel=1e-12)
 
 
 def test_constraints_of_equations_5_and_6():
@@ -277,14 +270,6 @@ def test_what_leads_is_the_rule_unless_a_model_is_told_apart_from_it_and_the_bas
     assert leader({name: e[:5] for name, e in errors.items()}) == "rule"  # five units can't tell
     assert leader({name: e[:6] for name, e in errors.items()}) == "published"
     assert leader({**errors, "crossings": 0.0 * n}) == "published"  # gives no estimate
-
-
-def test_judge_of_a_perfect_model_is_one():
-    table = measured_table()
-    found = assess(lambda _, masks: np.broadcast_to(table.levels, masks.shape), False, table)
-    assert found.levels.geometric_mean == 1
-    assert found.ratios.worst == pytest.approx(1, abs=1e-15)
-    assert found.directions == 12
 
 
 def test_a_spec_may_ask_for_every_model():

@@ -18,7 +18,7 @@ from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import from_data
 
 MATERIALS = ("ecoflex-00-10", "ecoflex-00-30", "dragon-skin-10-medium", "dragon-skin-30")
-SPECS = 200
+SPECS = 100
 
 
 def drawn(rng: Random, layers: int) -> dict[str, Any]:

@@ -8,10 +8,11 @@ from msgspec.structs import replace
 
 pytest.importorskip("skfem")
 
+from benchmarks.accuracy.elements import disc_response, pressed_skin
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.fem import elements as hm
-from unitcad.attenuation.fem.elements import disc_response, element_matrices, motor_response
-from unitcad.attenuation.fem.unit import Setting, motion, pressed_skin, unit_fields
+from unitcad.attenuation.fem.elements import element_matrices, motor_response
+from unitcad.attenuation.fem.unit import Setting, motion, unit_fields
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.estimate_inputs import estimate_input

@@ -103,6 +103,7 @@ def test_draws_are_spread_evenly():
     assert draws[3].position("frequency") != Draw(5, 3, DRAWS).position("frequency")
 
 
+@pytest.mark.long  # quick: draws are spread evenly, and the range is repeatable
 def test_the_default_draws_agree_with_256():
     data = json.loads((Path(__file__).parents[2] / "docs/fem.json").read_text("utf-8"))
     known = np.array(data["draws"])[:, data["units"].index("encapsulating E10/D30")]

@@ -87,7 +87,7 @@ def test_masses_take_no_power() -> None:
     assert given > 0
 
 
-@pytest.mark.parametrize(("hertz", "change"), [(100, 1.02), (125, 0.64), (150, 0.53), (300, 0.69)])
+@pytest.mark.parametrize(("hertz", "change"), [(100, 1.02), (150, 0.53)])
 def test_transfer_to_a_neighbour_as_once_measured(hertz: float, change: float) -> None:
     """A hundred units of 1.2 g, 14 mm wide, 16 mm apart; along the normal only, read at the others' middles."""
     at = np.arange(10) * 0.016

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from benchmarks.accuracy.level_scores import permutation_p, simulated, with_levels
+from benchmarks.accuracy.level_scores import forms, left_out_errors, permutation_p, simulated, with_levels
 from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.models import (
     COMPARED,
@@ -16,10 +16,7 @@ from unitcad.attenuation.edge.models import (
     bootstrap_range,
     choice,
     choose_without,
-    forms,
     in_order,
-    left_out_errors,
-    one_constant,
     pairwise,
     rules,
     sign_flip_p,
@@ -63,9 +60,7 @@ def test_ranges_that_were_measured_before() -> None:
     assert p[frozenset(("divider", "published"))] == pytest.approx(0.055, abs=0.0005)
 
 
-@pytest.mark.parametrize(
-    ("a", "b"), [*itertools.combinations(("rule", "divider", "crossings", "published", "baseline"), 2)]
-)
+@pytest.mark.parametrize(("a", "b"), [("rule", "divider"), ("crossings", "published"), ("published", "baseline")])
 def test_sign_flips_are_scipy_s_exact_permutation_test(a: str, b: str) -> None:
     errors, others = (assessments()[name].left_out_errors for name in (a, b))
     reference = stats.permutation_test(
@@ -139,10 +134,3 @@ def test_simulated_tables_know_the_truth_and_shuffled_ones_nothing() -> None:
     assert permutation_p("rule", 99, TABLE) <= 0.05
     shuffled = with_levels(TABLE, np.roll(TABLE.levels, 4))
     assert permutation_p("rule", 99, shuffled) > 0.05  # what the promise would break on
-
-
-def test_without_noise_a_simulated_score_is_certain() -> None:
-    fit = one_constant(lambda u: u.passes).levels
-    true = with_levels(TABLE, fit(TABLE, np.ones((1, 9), dtype=bool))[0])
-    assert left_out_errors(fit, true) == pytest.approx(np.zeros(9), abs=1e-12)
-    assert bootstrap_range(np.zeros(9)) == (1.0, 1.0)

@@ -10,7 +10,8 @@ from scipy import stats
 
 from unitcad.attenuation.edge.measured import MeasuredTable, measured_table
 from unitcad.attenuation.edge.models import COMPARED, Model, assess_all, stored
-from unitcad.attenuation.edge.ranges import Campaigns, gradients, judge, paired, quantiles, shrunk
+from unitcad.attenuation.edge.ranges import quantiles
+from unitcad.lab.shrunk_fit import Campaigns, gradients, judge, paired, shrunk
 
 TABLE = measured_table()
 MODELS = COMPARED

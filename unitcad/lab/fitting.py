@@ -16,26 +16,13 @@ from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable, Moduli, coordinates_of, measured_table, nominal
 from unitcad.attenuation.edge.models import BASELINE, COMPARED, KAPPA, RULE, SEED, Model, leader
-from unitcad.attenuation.edge.ranges import (
-    BETWEEN_LABS,
-    Campaigns,
-    InputFile,
-    Judged,
-    LabFit,
-    ModelFit,
-    OwnLevel,
-    Shrunk,
-    gradients,
-    judge,
-    paired,
-    shrunk,
-    unit_key,
-)
+from unitcad.attenuation.edge.ranges import InputFile, LabFit, ModelFit, OwnLevel, unit_key
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import materials
 from unitcad.catalogue.entries import Frequency, MaterialEntry
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import estimate_input
+from unitcad.lab.shrunk_fit import BETWEEN_LABS, Campaigns, Judged, Shrunk, gradients, judge, paired, shrunk
 from unitcad.lab.unit_files import Cavity, file_of, measured_walls, source_file, specs_of
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.raw import Table

@@ -6,7 +6,6 @@ through the walls of the layers, inside out, at the skin, and ends at the outer 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
@@ -114,16 +113,8 @@ def published_path(units: Units, wave: Wave = "s", reading: Reading = "loss_modu
 
     f1, f2 and the skin's part cancel.
     """
-    return published_paths(units, wave, (reading,))[reading]
-
-
-def published_paths(
-    units: Units, wave: Wave = "s", readings: Iterable[Reading] = tuple(READINGS)
-) -> dict[Reading, Any]:
-    """Return `published_path` by several readings, which share the transmissions."""
     with _quiet():
-        passed = np.prod(transmissions(units, wave), axis=-1)
-        return {one: passed * np.exp(-np.sum(exponents(units, wave, one), axis=-1)) for one in readings}
+        return np.prod(transmissions(units, wave), axis=-1) * np.exp(-np.sum(exponents(units, wave, reading), axis=-1))
 
 
 def corrected_path(units: Units, wave: Wave = "s") -> Any:

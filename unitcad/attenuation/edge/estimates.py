@@ -424,13 +424,7 @@ def estimate(
     levels = {name: edge_level(variant, name, fit) for name in MODELS}
     lead = answer(variant, data, levels, fit)
     whole = {"variant": data.pop("variant"), "answer": lead, **data}
-    # The solver's block and every table_error are rounded already.
-    models_rounded = {
-        model: {key: part if key == "table_error" else rounded(part) for key, part in block.items()}
-        for model, block in blocks.items()
-    }
-    done = {"models": models_rounded, "layered": data["layered"], "table_error": data["table_error"]}
-    return {name: done[name] if name in done else rounded(block) for name, block in whole.items()}
+    return rounded(whole)
 
 
 def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:

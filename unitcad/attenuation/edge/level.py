@@ -9,8 +9,7 @@ Each model's account of one variant: edge level, ratio to the controls, margins,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache, lru_cache, partial
-from types import MappingProxyType
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -65,14 +64,12 @@ def sensitivities(variant: EstimateInput, levels: Levels, step: float = STEP) ->
     }
 
 
-@lru_cache(maxsize=4)
 def ends(variant: EstimateInput, step: float) -> tuple[EstimateInput, ...]:
-    """Return the variant with each input of `changed` lower, then higher, by `step`: every model reads the same."""
+    """Return the variant with each input of `changed` lower, then higher, by `step`."""
     return tuple(change(variant, factor) for change in changed(variant).values() for factor in np.exp([-step, step]))
 
 
-@lru_cache(maxsize=4)
-def changed(variant: EstimateInput) -> Mapping[str, Scaled]:
+def changed(variant: EstimateInput) -> dict[str, Scaled]:
     """Return every input of a variant by its name: a function from the variant and a factor to the changed variant."""
     by_name: dict[str, Scaled] = {}
     geometry = variant.geometry
@@ -93,7 +90,7 @@ def changed(variant: EstimateInput) -> Mapping[str, Scaled]:
     by_name["estimate.frequency_hz"] = lambda v, f: replace(v, frequency=_times(v.frequency, f))
     for field in _TISSUE:
         by_name[f"tissue {field.replace('_', ' ')}"] = partial(_tissue, field)
-    return MappingProxyType(by_name)
+    return by_name
 
 
 def _times(quantity: Any, factor: float) -> Any:
@@ -286,12 +283,6 @@ def _units(variant: EstimateInput, rows: np.ndarray) -> Units:
 
 
 @lru_cache(maxsize=4)
-def _control_corners(variant: EstimateInput, layer: int) -> Units:
-    """Return the corners of the control of a layer, which every model's ratio reads."""
-    return corners(variant).control(layer)
-
-
-@lru_cache(maxsize=4)
 def unknown(variant: EstimateInput) -> str:
     """Return why there can be no number: the first input that is not known; empty if all are."""
     for (name, field), quantity in _inputs(variant):
@@ -310,38 +301,17 @@ def ranged(variant: EstimateInput) -> tuple[str, ...]:
     )
 
 
-def _level_at_corners(
-    variant: EstimateInput, model: str, constants: Mapping[str, float]
-) -> Callable[[cf.Wave, int | None], Any]:
-    """Return a function that gives a model's level at the corners of the variant, or of the control of a layer.
-
-    It caches its results: level, amplitude and ratios read the same. The wave is for models that have waves.
-    """
-
-    @cache
-    def level(wave: cf.Wave, control: int | None) -> Any:
-        units = corners(variant) if control is None else _control_corners(variant, control)
-        if wave == "s":
-            return edge_levels(units, model, constants)
-        return constants["s"] * _OF_WAVES[model](units, wave)
-
-    return level
-
-
-def spread(variant: EstimateInput, predict: Callable[[], Any]) -> dict[str, Any]:
-    """Return {value, low, high} of `predict`, a number for each corner, and a `reason` for nulls.
+def spread(variant: EstimateInput, values: Any) -> dict[str, Any]:
+    """Return {value, low, high} of a number for each corner, the middle's first, and a `reason` for nulls.
 
     The value is null if an input has only a range; all three if an input is not known.
     """
     reason = unknown(variant)
     if reason:
         return {"value": None, "low": None, "high": None, "reason": reason}
-    with np.errstate(all="ignore"):  # a legal extreme may under- or overflow, which the check below finds
-        values = np.atleast_1d(predict())
+    values = np.atleast_1d(values)
     if not np.all(np.isfinite(values)):
-        reason = _NOT_FINITE
-        middle = float(values[0]) if np.isfinite(values[0]) else None
-        return {"value": middle, "low": None, "high": None, "reason": reason}
+        return {"value": _number(values[0]), "low": None, "high": None, "reason": _NOT_FINITE}
     value = None if ranged(variant) else float(values[0])
     level: dict[str, Any] = {"value": value, "low": float(values.min()), "high": float(values.max())}
     if ranged(variant):
@@ -351,18 +321,27 @@ def spread(variant: EstimateInput, predict: Callable[[], Any]) -> dict[str, Any]
 
 def edge_level(variant: EstimateInput, model: str, fit: LabFit | None = None) -> dict[str, Any]:
     """Return a model's edge level as {value, low, high}."""
-    constants = fit.constants(model) if fit else stored(variant.moduli)[model]
-    return spread(variant, lambda: edge_levels(corners(variant), model, constants))
+    return spread(variant, edge_levels(corners(variant), model, _constants(variant, model, fit)))
 
 
+def _constants(variant: EstimateInput, model: str, fit: LabFit | None) -> dict[str, float]:
+    return fit.constants(model) if fit else stored(variant.moduli)[model]
+
+
+@np.errstate(all="ignore")  # a legal extreme may under- or overflow, which `spread` finds
 def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -> dict[str, Any]:
     """Return one entry of the estimate's `models`, without its error against the table.
 
     With a lab's `fit` the constants are its own, and the level has a predictive range.
     """
-    constants = fit.constants(model) if fit else stored(variant.moduli)[model]
-    level = _level_at_corners(variant, model, constants)
-    edge = spread(variant, lambda: level("s", None))
+    constants = _constants(variant, model, fit)
+
+    def level(units: Units, wave: cf.Wave) -> Any:
+        return constants["s"] * _OF_WAVES[model](units, wave) if wave == "p" else edge_levels(units, model, constants)
+
+    units = corners(variant)
+    own: dict[cf.Wave, Any] = {wave: level(units, wave) for wave in (_WAVES if model in _OF_WAVES else _WAVES[:1])}
+    edge = spread(variant, own["s"])
     block: dict[str, Any] = {"kind": KINDS[model], "edge_level": {**edge, "unit": "of the motor's amplitude"}}
     most = float(measured_table().levels.max())
     if max(edge["value"] or 0.0, edge["high"] or 0.0) > most:
@@ -370,12 +349,15 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
     if fit:
         block["predictive"] = predictive_block(fit, model, variant, unknown(variant))
     if variant.amplitude is not None:
-        amplitude = variant.amplitude * 1e6
-        block["edge_amplitude_um"] = spread(variant, lambda: amplitude * level("s", None))
+        block["edge_amplitude_um"] = spread(variant, variant.amplitude * 1e6 * own["s"])
     by_fit = fit and f"{fit.name}: {fit.units} units of the lab's own, shrunk towards the stored constants"
     block["constants"] = {**constants, "made_by": by_fit or "least squares of the log of nine measured levels"}
     controls = _controls(variant)
-    block["hierarchical_over_control"] = [_ratio(variant, model, level, index) for index in controls] or None
+    block["hierarchical_over_control"] = [
+        {"control": variant.layers[index].material, **ratios.pop("s"), **({"wave": "s"} if ratios else {}), **ratios}
+        for index in controls
+        for ratios in [{wave: spread(variant, one / level(units.control(index), wave)) for wave, one in own.items()}]
+    ] or None
     if not controls:
         block["hierarchical_over_control_reason"] = "a single layer is its own control"
     if model == "published":
@@ -383,7 +365,7 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
     if model == "corrected":
         block["wave_of_the_level"] = "s"
     block["sensitivities"] = tested(
-        variant, sensitivities(variant, lambda _: edge_levels(_changed(variant), model, constants))
+        variant, sensitivities(variant, lambda changed: edge_levels(stacked(changed), model, constants))
     )
     block["assumptions"] = ASSUMPTIONS[model]
     return block
@@ -408,12 +390,6 @@ def tested(variant: EstimateInput, seen: dict[str, Any]) -> dict[str, Any]:
     return {**seen, "tested": rows}
 
 
-@lru_cache(maxsize=4)
-def _changed(variant: EstimateInput) -> Units:
-    """Return the variants that `sensitivities` compares, which every model reads."""
-    return stacked(ends(variant, STEP))
-
-
 def _controls(variant: EstimateInput) -> list[int]:
     """Return a layer's index for each distinct material, if the unit has more than one layer."""
     if len(variant.layers) == 1:
@@ -422,27 +398,11 @@ def _controls(variant: EstimateInput) -> list[int]:
     return [names.index(name) for name in dict.fromkeys(names)]
 
 
-def _ratio(
-    variant: EstimateInput, model: str, level: Callable[[cf.Wave, int | None], Any], index: int
-) -> dict[str, Any]:
-    """Return the level over that of the control of layer `index`, by wave if the model has waves."""
-
-    def of(wave: cf.Wave) -> dict[str, Any]:
-        return spread(variant, lambda: level(wave, None) / level(wave, index))
-
-    name = variant.layers[index].material
-    if model not in _OF_WAVES:
-        return {"control": name, **of("s")}
-    return {"control": name, **of("s"), "wave": "s", "p": of("p")}
-
-
 def _published_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any]:
     if unknown(variant):
         return {"wave_of_the_level": "s", "reading_of_eta": "loss_modulus", "constraints": None, "readings": None}
     units = corners(variant) if ranged(variant) else nominal(variant)
-    paths = _paths(units)
     alone = {i: units.control(i) for i in controls}
-    own = {i: _paths(control) for i, control in alone.items()}
     coefficients = {}
     for wave in _WAVES:
         z = cf.with_air(cf.impedances(units, wave), wave)
@@ -456,7 +416,7 @@ def _published_details(variant: EstimateInput, controls: list[int]) -> dict[str,
         "poisson_ratio_used": [layer.poisson_ratio.middle for layer in variant.layers],
         "interfaces": [f"Layer {i + 1} to {i + 2}" for i in range(len(variant.layers) - 1)] + ["last layer to air"],
         "coefficients": coefficients,
-        "readings": [_reading(variant, units, reading, paths, own) for reading in cf.READINGS],
+        "readings": [_reading(variant, units, reading, alone) for reading in cf.READINGS],
         "constraints": _constraints(variant, units, alone),
     }
 
@@ -475,21 +435,14 @@ def _constraints(variant: EstimateInput, units: Units, controls: Mapping[int, Un
     ]
 
 
-_Paths = dict[cf.Wave, dict[cf.Reading, Any]]
-
-
-def _paths(units: Units) -> _Paths:
-    return {wave: cf.published_paths(units, wave) for wave in _WAVES}
-
-
 def _reading(
-    variant: EstimateInput, units: Units, reading: cf.Reading, paths: _Paths, controls: dict[int, _Paths]
+    variant: EstimateInput, units: Units, reading: cf.Reading, controls: Mapping[int, Units]
 ) -> dict[str, Any]:
-    """Return the result of one reading of eta, from the paths of the unit and of its controls."""
+    """Return the result of one reading of eta for the unit and over its controls."""
 
     def ratio(index: int, wave: cf.Wave) -> dict[str, Any]:
-        with np.errstate(all="ignore"):
-            return _by_corner(wave, paths[wave][reading] / controls[index][wave][reading], variant)
+        own, control = (cf.published_path(one, wave, reading) for one in (units, controls[index]))
+        return _by_corner(wave, own / control, variant)
 
     exponents = cf.exponents(units, "s", reading)
     return {

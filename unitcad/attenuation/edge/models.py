@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, partial
-from typing import Any, get_args
+from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -28,8 +28,6 @@ Fit = Callable[[MeasuredTable, np.ndarray], np.ndarray]
 """From a table and masks (M, units) of the units to fit to, the levels of all units by each fit, (M, units)."""
 RANGE_PERCENT = (5.0, 95.0)
 """Ends of a bootstrap range."""
-RANGE_HOLDS = 0.75
-"""In this share of simulated tables of nine units, at least, such a range holds the true score."""
 _DRAWS, SEED = 10_000, 1954
 _MOST_EXACT = 12
 """Up to this many units every pattern of signs is tried."""
@@ -88,11 +86,6 @@ def assess(fit: Fit, fitted_ratios: bool, table: MeasuredTable) -> Assessment:
 def left_out_levels(fit: Fit, table: MeasuredTable) -> np.ndarray:
     """Return the level of each unit, predicted by constants fitted without it."""
     return np.diagonal(fit(table, all_but_one(table)))
-
-
-def left_out_errors(fit: Fit, table: MeasuredTable) -> np.ndarray:
-    """Return |ln(predicted/measured)| of each unit, predicted by constants fitted without it."""
-    return np.abs(np.log(left_out_levels(fit, table) / table.levels))
 
 
 def all_but_one(table: MeasuredTable) -> np.ndarray:
@@ -363,17 +356,6 @@ def rules() -> dict[str, Fit]:
         "three groups: soft inside by passes, others": _classes((0, 0, 1, 2)).levels,
         "four class means": COMPARED[BASELINE].levels,
     }
-
-
-def forms() -> dict[str, Fit]:
-    """Return every form that is scored: the models in each of their readings, and the rule's."""
-    tried: dict[str, Fit] = {}
-    for wave in get_args(cf.Wave):
-        for reading in get_args(cf.Reading):
-            path = partial(cf.published_path, wave=wave, reading=reading)
-            tried[f"published, {wave.upper()} wave, {reading}"] = one_constant(path).levels
-        tried[f"corrected, {wave.upper()} wave"] = one_constant(partial(cf.corrected_path, wave=wave)).levels
-    return {**tried, "divider": COMPARED["divider"].levels, "crossings": COMPARED["crossings"].levels, **rules()}
 
 
 @cache

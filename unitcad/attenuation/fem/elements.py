@@ -277,29 +277,11 @@ def motor_response(
     if contact == "resting":
         rigid[:-1, ~mesh.above] = False
     prescribed = np.where(rigid[..., None], np.moveaxis(np.array(motions), 0, -1), 0.0)
-    return _respond(mesh, blocks, omega, harmonic, contact, prescribed, rigid, np.zeros_like(prescribed))
-
-
-def disc_response(mesh: HarmonicMesh, blocks: Sequence[Block], omega: float, harmonic: int, disc: float) -> Fields:
-    """Solve bare skin under 1 Pa on a disc (m): pushing down (m = 0), or sideways towards theta = 0 (m = 1)."""
-    nodes = mesh.on_skin(False)
-    nodes = nodes[mesh.r[nodes] < disc + TINY]
-    weights = np.zeros(nodes.size)
-    for i in range(0, nodes.size - 2, 2):  # the sides of the elements on the surface, each with three nodes
-        low, high = mesh.r[nodes[i]], mesh.r[nodes[i + 2]]
-        t, w = np.polynomial.legendre.leggauss(3)
-        n = np.array([t * (t - 1) / 2, 1 - t * t, t * (t + 1) / 2])
-        weights[i : i + 3] += n @ (w * ((low + high) / 2 + (high - low) / 2 * t)) * (high - low) / 2
-    load = np.zeros((len(FIELDS[harmonic]), mesh.r.size, 1))
-    if harmonic == 0:
-        load[1, nodes, 0] = -2 * np.pi * weights
-    else:
-        load[0, nodes, 0] = 2 * np.pi * weights
-    return _respond(mesh, blocks, omega, harmonic, "bonded", np.zeros_like(load), np.zeros(load.shape[:2], bool), load)
+    return respond(mesh, blocks, omega, harmonic, contact, prescribed, rigid, np.zeros_like(prescribed))
 
 
 @one_thread
-def _respond(
+def respond(
     mesh: HarmonicMesh,
     blocks: Sequence[Block],
     omega: float,

@@ -36,8 +36,8 @@ from scipy.stats import binom
 
 from unitcad.attenuation.edge.level import sensitivities, unknown
 from unitcad.attenuation.edge.measured import merged
-from unitcad.attenuation.fem.elements import Block, Contact, Fields, Solid, disc_response, harmonic_mesh, motor_response
-from unitcad.attenuation.inputs import EstimateInput, Geometry, Quantity, body
+from unitcad.attenuation.fem.elements import Block, Contact, Fields, Solid, harmonic_mesh, motor_response
+from unitcad.attenuation.inputs import Drive, EstimateInput, Geometry, Quantity, body
 from unitcad.attenuation.layered import LayeredMedium
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LossFactor, complex_shear_modulus
 from unitcad.errors import UnitcadError, unknown_name
@@ -251,15 +251,8 @@ def _solid(material: Layer | HalfSpace, omega: float) -> Solid:
     return Solid(complex_shear_modulus(material.youngs_modulus, nu, material.damping, omega), nu, material.density)
 
 
-Drive = Literal["flat", "axial"]
 Reading = Literal["skin", "edge"]
 """Place of the reading: the skin at r = D/2, or the unit's own outer edge at its top."""
-Component = Literal["along", "normal", "radial", "total"]
-"""Component of the reading.
-
-Along the drive (axial: u_z; flat: u_r in the drive's direction), |u_z|, |u_r|, or the root of the sum of the squares of
-u_r, u_theta and u_z (of a force that turns: over half a turn, the mean of the largest squares).
-"""
 RADIUS = 0.16
 """Outer, fixed border of the elements, m: one farther out changes a level by less than the mesh does."""
 
@@ -282,9 +275,8 @@ def level(
     reading: Reading,
     draw: Draw | None = None,
     fineness: float = 1.0,
-    component: Component = "along",
 ) -> float:
-    """Return the amplitude of a reading over the motor's, both along the drive unless `component` says otherwise.
+    """Return the amplitude of a reading over the motor's, both along the drive.
 
     variant_input   `estimate_inputs.estimate_input(spec)`
     frequency_hz    overrides the input's, also that of a draw
@@ -298,25 +290,17 @@ def level(
     results: a process pool can call it. Raises Refusal for an unknown drive or reading, UnitcadError for a material
     without a modulus, Missing without scikit-fem.
     """
-    for field, value, names in (
-        ("drive", drive, Drive),
-        ("reading", reading, Reading),
-        ("component", component, Component),
-    ):
+    for field, value, names in (("drive", drive, Drive), ("reading", reading, Reading)):
         if value not in get_args(names):
             raise unknown_name(field, str(value), get_args(names))
     made, setting = drawn(variant_input, draw) if draw else (variant_input, Setting())
     moved = motion(replace(made, frequency=Quantity(frequency_hz)), drive, setting, fineness)
-    return amplitude(moved.skin if reading == "skin" else moved.edge, drive, component) / abs(moved.motor)
+    return amplitude(moved.skin if reading == "skin" else moved.edge, drive) / abs(moved.motor)
 
 
-def amplitude(displacement: tuple[complex, complex, complex], drive: Drive, component: Component) -> float:
-    """Return one amplitude of (u_r, u_theta, u_z)."""
-    u_r, _, u_z = displacement
-    if component == "total":
-        return float(np.linalg.norm(displacement)) / (math.sqrt(2.0) if drive == "flat" else 1.0)
-    along = "normal" if drive == "axial" else "radial"
-    return abs(u_z) if (along if component == "along" else component) == "normal" else abs(u_r)
+def amplitude(displacement: tuple[complex, complex, complex], drive: Drive) -> float:
+    """Return the amplitude of (u_r, u_theta, u_z) along the drive: |u_z| of an axial one, |u_r| of a flat one."""
+    return abs(displacement[2 if drive == "axial" else 0])
 
 
 @lru_cache(maxsize=64)
@@ -352,13 +336,6 @@ def unit_fields(
     ]
     mesh = harmonic_mesh(blocks, fineness, radius)
     return motor_response(mesh, blocks, omega, 0 if drive == "axial" else 1, setting.contact)
-
-
-def pressed_skin(medium: LayeredMedium, omega: float, drive: Drive, disc: float, fineness: float) -> Fields:
-    """Solve bare skin under 1 Pa on a disc of that radius (m), pushing down or, flat, sideways."""
-    blocks = medium_blocks(medium, omega, RADIUS)
-    mesh = harmonic_mesh(blocks, fineness, RADIUS, disc)
-    return disc_response(mesh, blocks, omega, 0 if drive == "axial" else 1, disc)
 
 
 SEED, DRAWS, FINENESS = 1, 32, 1.0
@@ -473,7 +450,13 @@ def fem_sensitivities(
             moved = motion(one, drive, Setting(), _COARSE)
             for reading in levels:
                 shown = moved.skin if reading == "skin" else moved.edge
-                levels[reading].append(amplitude(shown, drive, "along") / abs(moved.motor))
+                levels[reading].append(
+                    amplitude(
+                        shown,
+                        drive,
+                    )
+                    / abs(moved.motor)
+                )
         return np.ones(len(variants))
 
     sensitivities(variant, solve, step)

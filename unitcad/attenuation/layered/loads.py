@@ -35,13 +35,6 @@ _FIRST_ORDER = 100  # J of this order is below 1e-25 for |x| up to _FAR
 _LEAST = 1e-220  # start of the downward recurrence: at |x| = _SERIES it grows by 1e189
 
 
-def bessel(order: int, x: Any) -> Any:
-    """Return J0 or J1 of a real or complex array."""
-    if np.iscomplexobj(x):
-        return special.jv(order, x)
-    return special.j0(x) if order == 0 else special.j1(x)
-
-
 def bessels(orders: tuple[int, ...], x: Any) -> Any:
     """Return J of each of the orders 0, 1 or 2 at real x >= 0 or complex x, shape (orders,) + x.shape."""
     if np.iscomplexobj(x):
@@ -110,7 +103,7 @@ def _by_recurrence(x: Any) -> Any:
         if order == 2:
             second = here
         above, here = here, order * inverse * here - above
-    true0, true1 = bessel(0, x), bessel(1, x)
+    true0, true1 = bessels((0, 1), x)
     # J0 and J1 have no common zero: the larger one gives the factor.
     by0 = np.abs(true0) > np.abs(true1)
     factor = np.where(by0, true0, true1) / np.where(by0, here, above)
@@ -126,7 +119,8 @@ def _by_expansion(x: Any) -> Any:
     zero, one = np.zeros_like(x), np.zeros_like(x)
     for of_zero, of_one in reversed(_coefficients()):  # Horner
         zero, one = zero * inverse + of_zero, one * inverse + of_one
-    return inverse + (bessel(1, x) * zero / x - bessel(0, x) * one) / x
+    zeroth, first = bessels((0, 1), x)
+    return inverse + (first * zero / x - zeroth * one) / x
 
 
 @cache
@@ -291,12 +285,17 @@ def _check_wavenumbers(k: Any) -> None:
         raise Refusal("k", str(wrong.flat[0]), f"wavenumbers must be finite, at most {MOST:g}")
 
 
-def _orders(direction: Direction) -> tuple[int, ...]:
-    return (0, 2, 1) if direction == "tangential" else (1, 0)
+class _Directed:
+    direction: Direction
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Orders of the Bessel functions that the rows of the kernel meet."""
+        return (0, 2, 1) if self.direction == "tangential" else (1, 0)
 
 
 @dataclass(frozen=True)
-class Point:
+class Point(_Directed):
     """A force of one newton at the origin.
 
     A radial point load is the traction 1 / (2 pi r^2), whose transform is constant like that of the normal one.
@@ -322,11 +321,6 @@ class Point:
 
     def __post_init__(self) -> None:
         _check(self.direction)
-
-    @property
-    def orders(self) -> tuple[int, ...]:
-        """Orders of the Bessel functions that the rows of the kernel meet."""
-        return _orders(self.direction)
 
     @property
     def reach(self) -> float:
@@ -361,7 +355,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class UniformDisc:
+class UniformDisc(_Directed):
     """A uniform stress of one pascal on a disc.
 
     Parameters
@@ -391,11 +385,6 @@ class UniformDisc:
         _check(self.direction)
 
     @property
-    def orders(self) -> tuple[int, ...]:
-        """Orders of the Bessel functions that the rows of the kernel meet."""
-        return _orders(self.direction)
-
-    @property
     def reach(self) -> float:
         return self.radius
 
@@ -414,7 +403,7 @@ class UniformDisc:
         if self.direction == "radial":
             return a * a * moment(k * a)
         at_zero = np.abs(k) * a < 1e-8  # the next term is (ka)^2 / 8 of the first
-        return np.where(at_zero, a * a / 2.0, a * bessel(1, k * a) / np.where(at_zero, 1.0, k))[()]
+        return np.where(at_zero, a * a / 2.0, a * bessels((1,), k * a)[0] / np.where(at_zero, 1.0, k))[()]
 
     def envelope(self, k: Any) -> Any:
         """Return a bound of |q(k)| for real k."""

@@ -1,22 +1,19 @@
 """Makes compliance.json: 60-digit compliances and condition numbers for seeded stiff and extreme cases.
 
-Run by hand: python tests/attenuation/references/make_compliance.py   (some minutes; needs mpmath only)
+Run by hand: python -m benchmarks.accuracy.references.make_compliance   (some minutes; needs mpmath only)
 """
 
 from __future__ import annotations
 
 import json
 import random
-import sys
 from pathlib import Path
 
 import mpmath as mp
 
-HERE = Path(__file__).parent
-OUT = HERE.parents[2] / "benchmarks" / "accuracy" / "references"
-sys.path.insert(0, str(HERE.parent))
+from benchmarks.accuracy.layered_mp import Body, compliance, condition
 
-from layered_mp import Body, compliance, condition  # noqa: E402
+OUT = Path(__file__).parent
 
 NU = (0.0, 0.3, 0.49, 0.4999999, 0.5 - 1e-12, 0.5)
 OMEGA = (6e3, 785.0, 1.0, 6e-4, 6e-8, 0.0)
