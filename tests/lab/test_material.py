@@ -1,22 +1,39 @@
-"""`unitcad material`: layouts and units, several specimens, a table that a spec takes, refusals, dynamic tests."""
+"""`unitcad material`: layouts and units, methods on exact curves, the table of a spec, refusals, dynamic tests."""
 
+from __future__ import annotations
+
+import csv
 import json
 import math
 import os
 import tomllib
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from tests.robustness.test_bad_values import check_words_are_refused
+from unitcad import catalogue
 from unitcad.attenuation import FractionalKelvinVoigt
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimating import estimate_input
-from unitcad.lab.material import Specimen, declared, evaluate, evaluate_dynamic, header_of, read_curve, read_dynamic
+from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.lab.material import (
+    Specimen,
+    declared,
+    default_method,
+    evaluate,
+    evaluate_dynamic,
+    fit_start,
+    header_of,
+    moduli,
+    read_curve,
+    read_dynamic,
+    secant,
+)
 from unitcad.validation import load
 
 C10 = 1.2e4
@@ -447,3 +464,135 @@ def test_a_unit_s_case_does_not_matter_where_it_can_t_be_another_unit(unit, fact
 @pytest.mark.parametrize("option", ["--gauge-mm", "--cell-n"])
 def test_an_option_that_is_no_number_is_refused(option, tmp_path, capsys, monkeypatch):
     check_words_are_refused(["material", "none.csv", option, "nan"], option, tmp_path, capsys, monkeypatch)
+
+
+YOUNG = 6e4
+
+
+def young_neo_hooke(strain):
+    """The nominal stress of a bar by neo-Hooke's law, Pa."""
+    stretch = 1.0 + strain
+    return YOUNG / 3 * (stretch - stretch**-2)
+
+
+@pytest.mark.parametrize("at", [0.1, 0.15, 0.25, 0.5, 1.0])
+def test_a_secant_of_neo_hookes_law_is_exact(at):
+    """E (1 + 1/L + 1/L^2) / 3 with L the stretch: (L - 1/L^2) / (L - 1) = (L^2 + L + 1) / L^2."""
+    strain = np.linspace(0.001, 3.5, 3500)
+    stretch = 1 + at
+    exact = YOUNG * (1 + 1 / stretch + 1 / stretch**2) / 3
+    assert secant(strain, young_neo_hooke(strain), at) == pytest.approx(exact, rel=1e-4)
+
+
+def test_every_method_gives_a_straight_lines_slope():
+    strain = np.linspace(0.0, 1.5, 151)
+    values = {one.method: one.value for one in moduli(strain, YOUNG * strain, 0.12, 0.24)}
+    toe = values.pop(default_method(0.12, 0.24))  # its law bends
+    assert values == pytest.approx(dict.fromkeys(values, YOUNG))
+    assert toe is not None
+
+
+@pytest.mark.parametrize("slack", [0.0, 0.03, -0.02])
+def test_slack_and_an_offset_of_the_force_do_not_move_the_default(slack):
+    strain = np.linspace(0.04, 0.6, 60)
+    bar = young_neo_hooke(strain - slack)
+    toe = fit_start(strain, bar, 0.24)
+    assert toe is not None
+    assert toe.origin == pytest.approx(slack, abs=1e-6)
+    exact = np.mean([YOUNG / 3 * (s**2 + s + 1) / s**2 for s in np.linspace(1.12, 1.24, 1001)])
+    assert moduli(strain, bar, 0.12, 0.24)[0].value == pytest.approx(exact, rel=1e-4)
+    plain = secant(strain, bar, 0.15)
+    assert plain is not None
+    assert (abs(plain / exact - 1) > 0.1) == (slack != 0)
+
+
+def test_a_method_that_a_curve_does_not_reach_says_so():
+    strain = np.linspace(0.05, 0.4, 30)
+    found = {one.method: one for one in moduli(strain, 1e5 * strain, 0.12, 0.24)}
+    assert found["secant at 50 %"].value is None
+    assert "5 to 40 %" in found["secant at 50 %"].reason
+    short = moduli(strain[:10], 1e5 * strain[:10], 0.12, 0.24)[0]
+    assert short.value is None
+    assert "ends" in short.reason
+
+
+DATA = Path(__file__).parent / "data" / "soft-robotics-materials-database"
+FILES = {path.stem.lower().replace(" ", "-"): path for path in DATA.glob("*.csv")}
+NAMES = ("ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30")
+PROTOTYPE = {
+    "secant at 15 %": (18.0, 37.7, 51.3, 110, 454),
+    "slope 0 to 25 % with offset": (24.5, 37.3, 59.7, 114, 451),
+    "secant at 100 % (ISO 37, ASTM D412)": (14.8, 29.7, 41.0, 113, 437),
+}
+"""Moduli in kPa that another program worked out from the same files."""
+
+
+@pytest.fixture(scope="module")
+def results():
+    known = catalogue.materials()
+    bare = declared(["strain=Engineering Strain:1"])  # the files give no unit
+    return {n: evaluate([read_curve(FILES[n], bare, Specimen())], (0.12, 0.24), known[n]) for n in NAMES}
+
+
+@pytest.mark.parametrize("method", PROTOTYPE)
+def test_every_method_gives_what_another_program_gave(method, results):
+    for name, expected in zip(NAMES, PROTOTYPE[method], strict=True):
+        row = next(row for row in results[name].rows if row.method == method)
+        assert row.value is not None
+        assert row.value / 1e3 == pytest.approx(expected, rel=0.01)
+        assert row.defensible
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_reader_finds_the_engineering_columns(name, results):
+    with open(FILES[name], encoding="utf-8-sig", newline="") as file:
+        rows = [row for row in csv.reader(file, delimiter=";") if row[0][:1].isdigit()]
+    strain, stress = (np.array([float(row[i]) for row in rows]) for i in (3, 4))
+    curve = results[name].curves[0]
+    np.testing.assert_allclose(
+        np.interp([0.15, 0.5, 3], curve.strain, curve.stress),
+        1e6 * np.interp([0.15, 0.5, 3], strain, stress),
+        rtol=1e-9,
+    )
+    assert curve.specimen == Specimen(6, 3, 33, pytest.approx(18), 1000, 450, True)
+    assert curve.rate == pytest.approx(450 / 60 / 33, rel=0.01)
+
+
+def test_the_shipped_values_are_those_of_the_curves(results):
+    sources = catalogue.moduli_by_source()
+    for name, result in results.items():
+        shipped = catalogue.materials()[name].quasistatic_modulus_kpa
+        assert shipped is not None
+        assert shipped.method == result.method
+        for value, exact in ((shipped.value, result.value), (shipped.low, result.low), (shipped.high, result.high)):
+            assert value == pytest.approx(exact / 1e3, rel=1e-3)
+        for row in result.rows:
+            at = sources.get(f"tensile, {row.method}", {}).get(name)
+            assert (at is not None) == row.defensible
+            assert at is None or at == pytest.approx((row.value or 0) / 1e3, rel=1e-3)
+
+
+def test_the_warnings_name_what_is_doubtful(results):
+    codes = {name: {one.code for one in result.warnings} for name, result in results.items()}
+    assert codes["ecoflex-00-10"] == {"force", "start", "toe", "break", "crosshead", "specimens"}
+    assert "force" not in codes["dragon-skin-30"]
+    assert "break" not in codes["dragon-skin-10-medium"]
+
+
+def test_a_spec_chooses_the_second_source_and_the_estimate_says_so():
+    default, chosen = load("encapsulating"), load("encapsulating", ["estimate.moduli=quasi-static"])
+    inner = estimate_input(chosen).layers[0].youngs_modulus
+    value = catalogue.materials()["ecoflex-00-10"].quasistatic_modulus_kpa
+    assert value is not None
+    assert inner.value == pytest.approx(1e3 * value.value)
+    assert inner.ends == pytest.approx((1e3 * (value.low or math.nan), 1e3 * (value.high or math.nan)))
+    assert estimate_input(default).layers[0].youngs_modulus.value == 15e3
+    said = [line for line in estimate_spec(chosen)["assumptions"] if "quasi-static" in line]
+    assert any(line.startswith("ecoflex-00-10 youngs_modulus: quasi-static") for line in said)
+    assert not any("quasi-static" in line for line in estimate_spec(default)["assumptions"])
+
+
+def test_an_own_quasi_static_modulus_is_used_where_it_is_chosen():
+    own = "materials.ours={like='ecoflex-00-10', quasistatic_modulus_kpa=30.0}"
+    spec = load("encapsulating", [own, "layers.0.material=ours", "estimate.moduli=quasi-static"])
+    assert estimate_input(spec).layers[0].youngs_modulus.value == 30e3
