@@ -554,7 +554,7 @@ def test_the_reader_finds_the_engineering_columns(name, results):
         1e6 * np.interp([0.15, 0.5, 3], strain, stress),
         rtol=1e-9,
     )
-    assert curve.specimen == Specimen(6, 3, 33, pytest.approx(18), 1000, 450, True)
+    assert curve.specimen == Specimen(6, 3, 33, pytest.approx(18), 1000, True)
     assert curve.rate == pytest.approx(450 / 60 / 33, rel=0.01)
 
 

@@ -44,7 +44,7 @@ MOST_APART = 0.1
 
 @dataclass(frozen=True)
 class Level:
-    """A level with the ends of its interval of 95 %, the repeats above and below the line, and degrees of freedom.
+    """A level with the ends of its interval of 95 %, the repeats above and below the line.
 
     `scatter` is the standard deviation of the repeats' logarithms, the larger of both sides'.
     """
@@ -53,7 +53,6 @@ class Level:
     low: float
     high: float
     repeats: tuple[int, int]
-    freedom: float
     scatter: float
 
 
@@ -82,7 +81,7 @@ def level(amplitudes: Sequence[float], references: Sequence[float] | None = None
     quantile = (1 + COVERAGE) / 2
     half = math.hypot(float(t.ppf(quantile, freedom)) * math.sqrt(sum(parts)), float(norm.ppf(quantile)) * shared)
     ends = (math.exp(log), math.exp(log - half), math.exp(log + half))
-    return Level(*ends, (counts[0], counts[-1]), freedom, math.sqrt(max(variances)))
+    return Level(*ends, (counts[0], counts[-1]), math.sqrt(max(variances)))
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from unitcad.spec import convert
 from unitcad.text import some
 from unitcad.validation.typed_files import load_file
 
-LEAST_LAYER, MOST_DEPTH = 0.5, 100.0
+LEAST_LAYER = 0.5
 _LAYER_NAME = "small letters a to z, digits and -, the first a letter"
 _NAME = "small letters a to z, digits and -, the first a letter or digit"
 
@@ -74,11 +74,6 @@ class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     waste: Annotated[float, Meta(ge=0, le=2, description="extra mix, as a fraction")] = 0.1
     scale_resolution_g: Annotated[float, Meta(ge=1e-4, le=10, description="smallest step of the scale")] = 0.1
     room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room")] = 23.0
-
-    @property
-    def depth_mm(self) -> float:
-        """All layers together."""
-        return sum(layer.thickness_mm for layer in self.layers)
 
 
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
@@ -521,23 +516,18 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
     size = lengths(table, inside, printer)
     tools = tuple(pieces(table, size, printer))
     for piece in printed(tools):
-        x0, y0, z0, x1, y1, z1 = bounds(realise(piece.shape, SEGMENTS))
-        long, short = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
-        bed = _bed(printer)
-        if short <= bed[0] and long <= bed[1] and z1 - z0 <= bed[2]:
+        lengths_mm = np.diff(np.reshape(bounds(realise(piece.shape, SEGMENTS)), (2, 3)), axis=0)[0]
+        needed_mm, bed = (*np.sort(lengths_mm[:2]), lengths_mm[2]), _bed(printer)
+        over = float(np.max(np.subtract(needed_mm, bed)[:2]))
+        if np.all(np.less_equal(needed_mm, bed)):
             continue
-        fitting = [
-            name
-            for name, one in printers().items()
-            if short <= _bed(one)[0] and long <= _bed(one)[1] and z1 - z0 <= _bed(one)[2]
-        ]
-        over = max(short - bed[0], long - bed[1], 0.0)
-        left = inside - over
-        limit = f"the {piece.name} is {long:.0f} x {short:.0f} x {z1 - z0:.0f} mm, the bed {bed[1]:g} x {bed[0]:g}"
-        if over and left > 40:
-            echo = echo_pct(table, recipes, left / 2)
-            limit += f"; about {left:.0f} mm inside would fit, whose walls echo {echo:.2g} %"
-        raise Refusal("printer", printer.name, limit, fitting[0] if fitting else None)
+        short, long, high = needed_mm
+        fitting = (name for name, one in printers().items() if np.all(np.less_equal(needed_mm, _bed(one))))
+        limit = f"the {piece.name} is {long:.0f} x {short:.0f} x {high:.0f} mm, the bed {bed[1]:g} x {bed[0]:g}"
+        if over > 0 and inside - over > 40:
+            echo = echo_pct(table, recipes, (inside - over) / 2)
+            limit += f"; about {inside - over:.0f} mm inside would fit, whose walls echo {echo:.2g} %"
+        raise Refusal("printer", printer.name, limit, next(fitting, None))
     layers = tuple(cast(table, size))
     volumes = tuple(float(realise(body.shape, SEGMENTS).volume()) for body in layers)
     response = expected(table, recipes, inside / 2, wall, tuple(map(tissue_layer, tissue())))

@@ -208,7 +208,6 @@ def _summary(found: _Solution, time: Floats, rate: float, mains: Mains) -> LineF
         end_s=span[1],
         mains_hz=order * mains.frequency_hz,
         phase=found.phase,
-        blocks=tuple(complex(b) for b in blocks),
     )
 
 
