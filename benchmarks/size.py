@@ -18,7 +18,7 @@ ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
     "total": (543_700, 388, 67_700),
     "core": (272_300, 221, 35_000),
-    "tests": (404_100, 0, 0),
+    "tests": (402_900, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900

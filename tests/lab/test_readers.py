@@ -15,7 +15,7 @@ from recordings import columns as recorded
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.lab import material, readers
 from unitcad.lab.campaign import RecordingTable, SensorTable
-from unitcad.lab.readers import AS_FOUND, Layout, Unreadable, open_recording
+from unitcad.lab.readers import AS_FOUND, Layout, Unreadable, open_recording, text
 from unitcad.lab.record import open_signal
 
 DATA = Path(__file__).parent / "data"
@@ -130,8 +130,9 @@ def test_words_may_follow_the_numbers_and_a_gap_is_not_a_number(tmp_path):
 
 def test_a_long_text_is_read_whole(tmp_path):
     file = tmp_path / "long.csv"
-    count = 100_000
-    lines = "\n".join(f"{i},{i * 2}.0" for i in range(count))
+    count = 12_000
+    lines = "\n".join(f"{i},{i * 2}.{'0' * 80}" for i in range(count))
+    assert len(lines) > text.HEAD
     file.write_text(f"n,twice\n{lines}\n")
     assert_array_equal(open_recording(file).columns((1,))[:, 0], 2.0 * np.arange(count))
     with open(file, "a") as more:
