@@ -28,7 +28,6 @@ from unitcad.kernels.mesh import bounds, realise
 from unitcad.moulds.pieces import bar
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union
 from unitcad.shape.body import Body
-from unitcad.shape.lettering import HEIGHT, engraving, text_width
 from unitcad.spec import convert
 from unitcad.text import some
 from unitcad.validation.typed_files import load_file
@@ -252,20 +251,14 @@ def cast(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
     return bodies
 
 
-def pieces(phantom: PhantomTable, size: BoxLengths, printer: Printer) -> list[Body]:
-    """Draw tray, plate, frames (skin first, each with its pour's number), lid, blade and holder as assembled."""
-    stroke, depth = float(printer.engraving_stroke_mm), float(printer.engraving_depth_mm)
-    frames = [
-        Body(
-            f"frame{len(size.tops) - i}",
-            "tool",
-            "frame",
-            _frame(size, size.tops[i + 1], size.tops[i], str(len(size.tops) - i), stroke, depth),
-            _COLOURS["frame"],
-            step=len(size.tops) - i,
-        )
-        for i in range(len(size.tops) - 1)
-    ]
+def pieces(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
+    """Draw tray, plate, frames (skin first), lid, blade and holder as assembled."""
+    frames = []
+    for step, (high, low) in enumerate(pairwise(size.tops)):
+        opening = Extrude(_square(size.rim), low - 1.0, high + 1.0)
+        shape = cut(_outline(size, low, high), [opening, *_peg_holes(size, low, high)])
+        number = len(size.tops) - step
+        frames.append(Body(f"frame{number}", "tool", "frame", shape, _COLOURS["frame"], step=number))
     blade = moved(turned(bar(size.outer + PEG_FROM_WALL - PEG_RADIUS - 1.0, 0.0), "z", 1), 0, 0, size.tray_rim)
     plate = Extrude(_square(size.inner - PLATE_PLAY), -size.plate, 0.0)
     return [
@@ -296,15 +289,6 @@ def _tray(size: BoxLengths) -> Shape:
     holes = _at_corners(hole, 0.6 * size.inner, 0.6 * size.inner)
     pegs = _at_corners(cylinder(PEG_RADIUS, size.tray_rim - 1.0, size.tops[0] + LID), size.peg_x, size.ear_y)
     return union((cut(_outline(size, size.bottom, size.tray_rim), [cavity, pocket, *holes]), *pegs))
-
-
-def _frame(size: BoxLengths, low: float, high: float, number: str, stroke: float, depth: float) -> Shape:
-    """Draw a frame; its pour's number is engraved on an ear, beyond the peg, out of the blade's way."""
-    y = size.ear_y + (size.hole + EAR_HALF - HEIGHT * stroke) / 2
-    depth = min(depth, (high - low) / 2)
-    figure = moved(engraving(number, stroke, high - depth, high + 1.0), size.peg_x - text_width(number, stroke) / 2, y)
-    opening = Extrude(_square(size.rim), low - 1.0, high + 1.0)
-    return cut(_outline(size, low, high), [opening, figure, *_peg_holes(size, low, high)])
 
 
 def _outline(size: BoxLengths, low: float, high: float) -> Shape:
@@ -514,7 +498,7 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
         )
         raise Refusal("inside_mm", inside, limit, needed)
     size = lengths(table, inside, printer)
-    tools = tuple(pieces(table, size, printer))
+    tools = tuple(pieces(table, size))
     for piece in printed(tools):
         lengths_mm = np.diff(np.reshape(bounds(realise(piece.shape, SEGMENTS)), (2, 3)), axis=0)[0]
         needed_mm, bed = (*np.sort(lengths_mm[:2]), lengths_mm[2]), _bed(printer)

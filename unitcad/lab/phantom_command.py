@@ -276,7 +276,7 @@ def _figures(phantom: PhantomSet, p: PhantomPour) -> Iterator[tuple[str, str, st
 
 
 def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
-    one, frame = phantom.recipes[p.layer], f"frame {p.index} ({p.name})"
+    one, frame = phantom.recipes[p.layer], f"frame {p.index} ({p.name}, {p.frame_mm:g} mm high)"
     if p.index > 1:
         yield (
             f"When the layer before is firm: trim the film off the rim below, put {frame} on the pegs and press it "
