@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from tests.robustness.test_long_lists import MANY, check_error_is_short
 
 
-def table(name: str) -> str:
+def table(name):
     return f"time (s),{','.join(name.format(i) for i in range(MANY))}\n" + f"0.5{',1' * MANY}\n" * 20
 
 
@@ -38,5 +36,5 @@ FILES = {
     ],
     ids=" ".join,
 )
-def test_no_error_line_is_long(words: tuple[str, ...], tmp_path: Path) -> None:
+def test_no_error_line_is_long(words, tmp_path):
     check_error_is_short(words, FILES, tmp_path)

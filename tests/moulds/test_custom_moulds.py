@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 from faulty_sets import broken, mesh_findings, of_spec, set_of
-from unitcad.casting.written import to_markdown
 
 from unitcad.casting.procedure import procedure
+from unitcad.casting.procedure_text import to_markdown
 from unitcad.checks import check_moulds, mould_checks, opening
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.export import printing

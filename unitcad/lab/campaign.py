@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -28,8 +28,8 @@ Positive = Annotated[float, Meta(ge=1e-12, le=1e12)]
 Column = Annotated[int, Meta(ge=1, le=4096)] | Name
 Rate = Annotated[float, Meta(ge=1, le=1e10)]
 TimeUnit = Literal["s", "ms", "us", "ns"]
-Delimiter = Literal["", ",", ";", "\t", " "]
-DecimalSign = Literal["", ".", ","]
+Delimiter = Literal[",", ";", "\t", " "]
+DecimalSign = Literal[".", ","]
 SkippedLines = Annotated[int, Meta(ge=0, le=100000)]
 
 
@@ -48,41 +48,50 @@ class SensorTable(Table, frozen=True, kw_only=True):
     ] = None
 
 
-class RecordingOverride(Table, frozen=True, kw_only=True):
-    """Settings of some records; they override [recording]."""
-
-    records: Annotated[Records, Meta(description="names of records, or patterns such as motor-*.mat")]
-    rate_hz: Annotated[Rate | None, Meta(description="samples per second")] = None
-    channel: Annotated[Column | None, Meta(description="the unit's channel: a name, or a number from 1")] = None
-    motor_channel: Annotated[Column | None, Meta(description="the motor's channel")] = None
-    time_column: Annotated[Column | None, Meta(description="column of the time")] = None
-    time_unit: Annotated[TimeUnit | None, Meta(description="unit of the time column")] = None
-    delimiter: Annotated[Delimiter | None, Meta(description="sign between two columns")] = None
-    decimal: Annotated[DecimalSign | None, Meta(description="decimal sign")] = None
-    skip_lines: Annotated[SkippedLines | None, Meta(description="lines to skip at the beginning")] = None
-
-
-class RecordingTable(Table, frozen=True, kw_only=True):
-    """Settings of all records, for what their files do not state."""
+class RecordingSettings(Table, frozen=True, kw_only=True):
+    """Settings of recordings, for what their files do not state."""
 
     rate_hz: Annotated[Rate | None, Meta(description="samples per second, if the files do not state it")] = None
     channel: Annotated[Column | None, Meta(description="the unit's channel: a name, or a number from 1")] = None
     motor_channel: Annotated[Column | None, Meta(description="the motor's channel, recorded at the same time")] = None
     time_column: Annotated[Column | None, Meta(description="column of the time")] = None
     time_unit: Annotated[TimeUnit | None, Meta(description="unit of the time column")] = None
-    delimiter: Annotated[Delimiter, Meta(description="sign between two columns; default: found in the file")] = ""
-    decimal: Annotated[DecimalSign, Meta(description="decimal sign; default: found in the file")] = ""
-    skip_lines: Annotated[SkippedLines, Meta(description="lines to skip at the beginning of each file")] = 0
+    delimiter: Annotated[Delimiter | None, Meta(description="sign between two columns; default: found in the file")] = (
+        None
+    )
+    decimal: Annotated[DecimalSign | None, Meta(description="decimal sign; default: found in the file")] = None
+    skip_lines: Annotated[SkippedLines | None, Meta(description="lines to skip at the beginning of a file")] = None
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The settings that are given."""
+        return {key: one for key in _SETTINGS if (one := getattr(self, key)) is not None}
+
+
+_SETTINGS = RecordingSettings.__struct_fields__
+
+
+class RecordingOverride(RecordingSettings, frozen=True, kw_only=True):
+    """Settings of some records; they override [recording]."""
+
+    records: Annotated[Records, Meta(description="names of records, or patterns such as motor-*.mat")]
+
+    def matching(self, names: Iterable[str], *patterns: str) -> list[str]:
+        """Return the names that the records name, or some of their patterns do."""
+        patterns = patterns or self.records
+        return [name for name in names if any(one == name or fnmatchcase(name, one) for one in patterns)]
+
+
+class RecordingTable(RecordingSettings, frozen=True, kw_only=True):
+    """Settings of all records."""
+
     override: Annotated[tuple[RecordingOverride, ...], Meta(max_length=100)] = ()
 
 
 class BlankTable(Table, frozen=True, kw_only=True):
     """Records with the motor off. They show the mains of the sensor."""
 
-    records: Annotated[Records, Meta(description="records with the motor off")]
-    motor_records: Annotated[
-        Records, Meta(description="records with the motor off by motor_sensor, if that sensor records alone")
-    ] = ()
+    records: Annotated[Records, Meta(description="records with the motor off")] = ()
 
 
 class PointTable(Table, frozen=True, kw_only=True):
@@ -101,7 +110,6 @@ class UnitTable(Table, frozen=True, kw_only=True):
     cavity: Annotated[Cavity | None, Meta(description="cavity of the cast record")] = None
     reference: Annotated[Records, Meta(description="records of the motor alone, without motor_channel")] = ()
     edge: Annotated[Records, Meta(description="records at the unit's edge")] = ()
-    lines: Annotated[int, Meta(ge=1, description="only 1: one motor runs at a time")] = 1
     point: tuple[PointTable, ...] = ()
 
 
@@ -113,7 +121,7 @@ class Campaign(Table, frozen=True, kw_only=True):
     sensor: SensorTable
     recording: RecordingTable = RecordingTable()
     motor_sensor: SensorTable | None = None
-    blank: BlankTable | None = None
+    blank: BlankTable = BlankTable()
     chain: ChainTable = ChainTable()
     unit: Annotated[tuple[UnitTable, ...], Meta(min_length=1, description="one [[unit]] table or more")]
 
@@ -132,40 +140,21 @@ def _campaign_of(data: dict[str, Any]) -> Campaign:
     for key, sensor in (("sensor", campaign.sensor), ("motor_sensor", campaign.motor_sensor)):
         if sensor is not None:
             to_si(sensor.unit, sensor.quantity, f"{key}.unit")
-    excess = "is not allowed together with recording.motor_channel"
-    if campaign.blank is not None and campaign.blank.motor_records:
-        records = list(campaign.blank.motor_records)
-        if motor_channel is not None:
-            limit = f"{excess}: the channel of blank.records shows the motor's mains"
-            raise Refusal("blank.motor_records", records, limit)
-        if campaign.motor_sensor is None:
-            limit = "needs [motor_sensor]: blank.records shows the mains of the one sensor"
-            raise Refusal("blank.motor_records", records, limit)
     names = [unit.name for unit in campaign.unit]
     for i, unit in enumerate(campaign.unit):
         field = f"unit.{i}"
         if names.index(unit.name) != i:
             raise Refusal(f"{field}.name", unit.name, "is the name of two units")
-        if unit.lines > 1:
-            raise Refusal(f"{field}.lines", unit.lines, "run one motor at a time, and record each by itself", 1)
         if not unit.edge and not unit.point:
             raise Refusal(f"{field}.edge", None, "is required, or a [[unit.point]]")
         distances = [point.distance_mm for point in unit.point]
         if len(set(distances)) < len(distances):
             raise Refusal(f"{field}.point", distances, "has a distance twice; put its records together")
         if bool(unit.reference) == (motor_channel is not None):
-            given = list(unit.reference)
-            limit = excess if given else "is required, or recording.motor_channel"
-            raise Refusal(f"{field}.reference", given or None, limit)
+            both = "is not allowed together with recording.motor_channel"
+            limit = both if unit.reference else "is required, or recording.motor_channel"
+            raise Refusal(f"{field}.reference", list(unit.reference) or None, limit)
     return campaign
-
-
-def blank_files(campaign: Campaign) -> Iterator[tuple[str, str]]:
-    """Yield key and name of the motor-off records."""
-    if campaign.blank is not None:
-        for key in ("records", "motor_records"):
-            for i, name in enumerate(getattr(campaign.blank, key)):
-                yield f"blank.{key}.{i}", name
 
 
 def check_files(campaign: Campaign, folder: Path) -> None:
@@ -174,26 +163,23 @@ def check_files(campaign: Campaign, folder: Path) -> None:
     Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice in
     one unit by its path or its bytes, a [[recording.override]] of no record.
     """
-    names = []
-    for field, name in blank_files(campaign):
-        expect_ending(file_of(folder, name, field), field)
-        names.append(name)
-    records = []
+    blanks = [(f"blank.records.{i}", name) for i, name in enumerate(campaign.blank.records)]
+    by_unit = []
     for i, unit in enumerate(campaign.unit):
         places = {"reference": unit.reference, "edge": unit.edge}
         places |= {f"point.{k}.records": point.records for k, point in enumerate(unit.point)}
-        records.append(
-            [(f"unit.{i}.{at}.{k}", name) for at, several in places.items() for k, name in enumerate(several)]
-        )
-    _check_own(campaign.recording, list(dict.fromkeys([*names, *(name for unit in records for _, name in unit)])))
-    for i, (unit, several) in enumerate(zip(campaign.unit, records, strict=True)):
+        by_unit.append([(f"unit.{i}.{at}.{k}", name) for at, names in places.items() for k, name in enumerate(names)])
+    every = [*blanks, *(one for records in by_unit for one in records)]
+    _check_overrides(campaign.recording, list(dict.fromkeys(name for _, name in every)))
+    for i, unit in enumerate(campaign.unit):
         source_file(unit, folder, f"unit.{i}")
-        paths = [file_of(folder, name, field) for field, name in several]
-        for (field, _), path in zip(several, paths, strict=True):
-            expect_ending(path, field)
-        sizes = [path.stat().st_size for path in paths]
+    for field, name in every:
+        expect_ending(file_of(folder, name, field), field)
+    for records in by_unit:
+        sizes = [(folder / name).stat().st_size for _, name in records]
         seen: dict[str, str] = {}
-        for (field, name), path, size in zip(several, paths, sizes, strict=True):
+        for (field, name), size in zip(records, sizes, strict=True):
+            path = folder / name
             for key in (str(path.resolve()), *([sha256(path)] if sizes.count(size) > 1 else [])):
                 if seen.setdefault(key, field) != field:
                     limit = f"is the record of {seen[key]} again; a repeat is a recording of its own"
@@ -206,10 +192,10 @@ _TIME_KEYS = ("rate_hz", "time_column", "time_unit")
 
 def recording_of(table: RecordingTable, name: str) -> RecordingTable:
     """Return the settings of a record: `table` with the values of the [[recording.override]] that names it."""
-    given = next((_given(one) for one in table.override if _matching(one, [name])), {})
+    given = next((one.given for one in table.override if one.matching([name])), {})
     if "rate_hz" in given or "time_column" in given:
         given = dict.fromkeys(_TIME_KEYS) | given
-    return msgspec.structs.replace(table, override=(), **given) if given else table
+    return msgspec.structs.replace(table, override=(), **given)
 
 
 @contextmanager
@@ -223,26 +209,24 @@ def own_keys(table: RecordingTable, name: str) -> Iterator[None]:
             raise
         field, limit = refusal.field, f"{refusal.limit}; [[recording.override]] sets it for some records only"
         for i, own in enumerate(table.override):
-            if _matching(own, [name]) and key in _given(own):
+            if own.matching([name]) and key in own.given:
                 field, limit = f"recording.override.{i}.{key}", refusal.limit
         raise type(refusal)(field, refusal.value, limit, refusal.nearest) from None
 
 
-def _check_own(table: RecordingTable, names: list[str]) -> None:
+def _check_overrides(table: RecordingTable, names: list[str]) -> None:
     """Refuse a [[recording.override]] that sets nothing, that names no record of the campaign, or one of another's."""
     taken: dict[str, int] = {}
     for i, own in enumerate(table.override):
         field = f"recording.override.{i}"
         if not own.records:
             raise Refusal(f"{field}.records", [], "names no record")
-        given = _given(own)
-        if not given:
-            keys = ", ".join(key for key in msgspec.structs.asdict(own) if key != "records")
-            raise Refusal(field, None, f"sets nothing for its records: {keys}")
-        if "motor_channel" in given and table.motor_channel is None:
-            raise Refusal(f"{field}.motor_channel", given["motor_channel"], "needs recording.motor_channel")
+        if not own.given:
+            raise Refusal(field, None, f"sets nothing for its records: {', '.join(_SETTINGS)}")
+        if own.motor_channel is not None and table.motor_channel is None:
+            raise Refusal(f"{field}.motor_channel", own.motor_channel, "needs recording.motor_channel")
         for k, pattern in enumerate(own.records):
-            found = _matching(own, names, pattern)
+            found = own.matching(names, pattern)
             if not found:
                 close = difflib.get_close_matches(pattern, names, n=1)
                 limit = "names no record of the campaign"
@@ -251,14 +235,3 @@ def _check_own(table: RecordingTable, names: list[str]) -> None:
                 if taken.setdefault(name, i) != i:
                     limit = f"names {name}, which recording.override.{taken[name]} does too"
                     raise Refusal(f"{field}.records.{k}", pattern, limit)
-
-
-def _given(own: RecordingOverride) -> dict[str, Any]:
-    """Return the keys that a table sets, without the records."""
-    return {key: value for key, value in msgspec.structs.asdict(own).items() if key != "records" and value is not None}
-
-
-def _matching(own: RecordingOverride, names: list[str], *patterns: str) -> list[str]:
-    """Return the names that a table's records name, or some of its patterns do."""
-    patterns = patterns or own.records
-    return [name for name in names if any(one == name or fnmatchcase(name, one) for one in patterns)]

@@ -48,20 +48,22 @@ class Declared:
     unit: str = ""
 
 
-def declared(texts: Iterable[str], field: str = "--column") -> dict[str, Declared]:
+def declared(texts: Iterable[str]) -> dict[str, Declared]:
     """Parse QUANTITY=COLUMN[:UNIT]. Raises Refusal for anything else."""
     found: dict[str, Declared] = {}
     for text in texts:
         quantity, equals, rest = (part.strip() for part in text.partition("="))
         if not equals or not rest:
-            raise Refusal(field, text, "needs the form QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, such as stress=3:kPa")
+            raise Refusal(
+                "--column", text, "needs the form QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, such as stress=3:kPa"
+            )
         if quantity not in COLUMN_UNITS:
-            raise unknown_name(field, quantity, COLUMN_UNITS)
+            raise unknown_name("--column", quantity, COLUMN_UNITS)
         column, colon, unit = rest.rpartition(":")
         if not colon:
             column, unit = rest, ""
         elif _unit(unit, quantity) is None:
-            raise unknown_name(field, unit, COLUMN_UNITS[quantity])
+            raise unknown_name("--column", unit, COLUMN_UNITS[quantity])
         found[quantity] = Declared(int(column) if column.isdecimal() else column, unit)
     return found
 
@@ -125,7 +127,7 @@ _FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
 
 @dataclass(frozen=True)
 class Specimen:
-    """A specimen and its machine: lengths mm, the cell's full scale N, the speed mm/min; None if not known.
+    """A specimen and its machine: lengths mm, the cell's full scale N; None if not known.
 
     `crosshead`: the strain is the crosshead's travel over the gauge length, not the specimen's own.
     """
@@ -135,7 +137,6 @@ class Specimen:
     gauge_mm: float | None = None
     area_mm2: float | None = None
     cell_n: float | None = None
-    speed_mm_min: float | None = None
     crosshead: bool | None = None
 
     def over(self, other: Specimen) -> Specimen:
@@ -256,7 +257,6 @@ _HEADER = (
     (r"(?:specimen|gauge|initial) length\s*[\[(](mm|cm|in)[\])]", "gauge_mm"),
     (r"^\s*length\s*[\[(](mm|cm|in)[\])]", "length_mm"),
     (r"(?:cross-?section|area)\s*[\[(](mm2|mm\^2|cm2|cm\^2)[\])]", "area_mm2"),
-    (r"(?:speed|rate)\s*[\[(](mm/min)[\])]", "speed_mm_min"),
     (r"load cell", "cell_n"),
 )
 
@@ -317,7 +317,6 @@ class Toe:
 
     origin: float
     youngs_modulus: float
-    up_to: float
 
     def stress(self, strain: np.ndarray) -> np.ndarray:
         """Return the fitted nominal stress (Pa) at engineering strains as recorded."""
@@ -351,7 +350,7 @@ def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None
 
         start, bounds = [1.0, -offset / slope], ([1e-6, -0.5], [1e3, float(x.max())])
         found = least_squares(misfit, start, bounds=bounds, xtol=1e-14, ftol=1e-14)
-        toe = Toe(float(found.x[1]), float(found.x[0] * slope), up_to)
+        toe = Toe(float(found.x[1]), float(found.x[0] * slope))
         up_to = high + max(toe.origin, 0.0)
     return toe
 
@@ -446,7 +445,6 @@ class TensileResult:
     high: float
     method: str
     rows: tuple[MethodRow, ...]
-    by_curve: tuple[tuple[Modulus, ...], ...]
     toes: tuple[Toe | None, ...]
     curves: tuple[TensileCurve, ...]
     scatter: float | None
@@ -469,7 +467,7 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
             limit = "is given twice" if before.path == curve.path else f"has the same content as {before.name}"
             raise Refusal("FILES", curve.name, f"{limit}: one specimen counts once")
         known[curve.sha256] = curve
-    by_curve = tuple(moduli(curve.strain, curve.stress, *used) for curve in curves)
+    by_curve = (moduli(curve.strain, curve.stress, *used) for curve in curves)
     rows = tuple(_row(methods) for methods in zip(*by_curve, strict=True))
     chosen = rows[0]
     if chosen.value is None:
@@ -505,7 +503,7 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
             message = f"{off:.3g} times the 100 % modulus of {sheet.name}, {float(sheet.modulus_100pct_kpa):g} kPa"
             warnings.append(Warned("sheet", f"{message}: check the units and --like"))
     return TensileResult(
-        chosen.value, min(values) / widened, max(values) * widened, chosen.method, rows, by_curve, toes, tuple(curves),
+        chosen.value, min(values) / widened, max(values) * widened, chosen.method, rows, toes, tuple(curves),
         scatter, geometry, max(values) / min(values), used, float(np.median(rates)) if rates else None, tuple(warnings),
     )  # fmt: skip
 

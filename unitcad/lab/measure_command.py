@@ -270,7 +270,7 @@ def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
         if chain.zeros_hz and len(frequency):
             first = np.ceil(frequency[0] / chain.zeros_hz) or 1.0
             zeros = np.arange(first * chain.zeros_hz, frequency[-1] + 1e-9, chain.zeros_hz)
-            bars = [(floor, float(size.max()))] * len(zeros)
+            bars = [(floor, max(float(size.max()), floor))] * len(zeros)  # a sensor that is off has zeros only
             name = f"zeros of {chain.name}'s comb"
             series.append(Series(name, zeros, np.full(len(zeros), floor), points=True, bars=bars))
     filtered = next((chain for chain in chains if chain.pass_hz), None)

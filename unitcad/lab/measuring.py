@@ -14,7 +14,6 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from scipy.stats import norm, t
 
@@ -22,18 +21,15 @@ from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.lab.campaign import (
     Campaign,
-    RecordingTable,
     SensorTable,
     UnitTable,
-    blank_files,
     check_files,
     own_keys,
     recording_of,
 )
 from unitcad.lab.chains import Chain, Mains, chains_of
 from unitcad.lab.chains.line import mains_columns, mains_orders, solve, trend_columns
-from unitcad.lab.readers import Layout, open_recording
-from unitcad.lab.record import LabFinding, RecordResult, expect_one_unit, found, measure_record, open_signal
+from unitcad.lab.record import LabFinding, RecordResult, expect_one_unit, finding, measure_record, open_signal
 from unitcad.lab.unit_files import source_file
 
 COVERAGE = 0.95
@@ -48,7 +44,7 @@ MOST_APART = 0.1
 
 @dataclass(frozen=True)
 class Level:
-    """A level with the ends of its interval of 95 %, the repeats above and below the line, and degrees of freedom.
+    """A level with the ends of its interval of 95 %, the repeats above and below the line.
 
     `scatter` is the standard deviation of the repeats' logarithms, the larger of both sides'.
     """
@@ -57,7 +53,6 @@ class Level:
     low: float
     high: float
     repeats: tuple[int, int]
-    freedom: float
     scatter: float
 
 
@@ -86,7 +81,7 @@ def level(amplitudes: Sequence[float], references: Sequence[float] | None = None
     quantile = (1 + COVERAGE) / 2
     half = math.hypot(float(t.ppf(quantile, freedom)) * math.sqrt(sum(parts)), float(norm.ppf(quantile)) * shared)
     ends = (math.exp(log), math.exp(log - half), math.exp(log + half))
-    return Level(*ends, (counts[0], counts[-1]), freedom, math.sqrt(max(variances)))
+    return Level(*ends, (counts[0], counts[-1]), math.sqrt(max(variances)))
 
 
 @dataclass(frozen=True)
@@ -138,7 +133,7 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     levels: list[PlaceLevel] = []
     records: dict[str, tuple[RecordResult, ...]] = {}
     findings: list[LabFinding] = []
-    specs = {name: sha256(folder / name) for _, name in blank_files(campaign)}
+    specs = {name: sha256(folder / name) for name in campaign.blank.records}
     for i, unit in enumerate(campaign.unit):
         if name := source_file(unit, folder, f"unit.{i}"):
             specs[name] = sha256(folder / name)
@@ -156,48 +151,34 @@ def _mains_of_blanks(
 ) -> tuple[Mains, Mains]:
     """Return the mains of the unit's sensor and of the motor's, by multiple the largest amplitude of all records.
 
-    The motor's are of the motor's channel if blank.records have it, of blank.motor_records if its sensor records alone,
-    and the unit's if both have one sensor. Raises Refusal for a record that can't be read.
+    The motor's are of its channel. If its sensor records alone, they are the unit's if both have one sensor, otherwise
+    not known. Raises Refusal for a record that can't be read.
     """
-    hertz, table, blank = campaign.chain.mains_hz, campaign.recording, campaign.blank
-
-    def mains(names: Sequence[str], of_motor: bool) -> Mains:
-        largest: dict[int, float] = {}
-        sensor = campaign.motor_sensor if of_motor and campaign.motor_sensor else campaign.sensor
-        for name in names:
-            own = recording_of(table, name)
-            if of_motor and own.motor_channel is not None:
-                own = msgspec.structs.replace(own, channel=own.motor_channel, motor_channel=None)
-            with own_keys(table, name):
-                signal = open_signal(folder / name, own, (sensor,), name)
-            expect_one_unit(stated, signal.units, (sensor,), name)
-            samples = signal.samples[:, 0]
+    hertz, paired = campaign.chain.mains_hz, campaign.recording.motor_channel is not None
+    sensors = _sensors(campaign)
+    largest: tuple[dict[int, float], ...] = tuple({} for _ in sensors)
+    for name in campaign.blank.records:
+        with own_keys(campaign.recording, name):
+            signal = open_signal(folder / name, recording_of(campaign.recording, name), sensors, name)
+        expect_one_unit(stated, signal.units, sensors, name)
+        time = np.arange(len(signal.samples)) / signal.rate
+        orders = mains_orders(hertz, signal.rate, (), float(time[-1]))
+        columns = np.concatenate([mains_columns(time, hertz, orders), trend_columns(time)])
+        for by_order, samples in zip(largest, signal.samples.T, strict=True):
             good = np.isfinite(samples)
-            time = np.arange(len(samples)) / signal.rate
-            orders = mains_orders(hertz, signal.rate, (), float(time[-1]))
-            columns = np.concatenate([mains_columns(time, hertz, orders), trend_columns(time)])
             values = solve(columns, np.where(good, samples, 0.0), good)[0]
             for i, order in enumerate(orders):
-                largest[order] = max(largest.get(order, 0.0), float(np.hypot(*values[2 * i : 2 * i + 2])))
-        return Mains(hertz, tuple(sorted(largest.items())))
-
-    if blank is None:
-        return Mains(hertz), Mains(hertz)
-    unit = mains(blank.records, False)
-    if table.motor_channel is not None:
-        return unit, mains(
-            [name for name in blank.records if _has_motor(folder / name, recording_of(table, name))], True
-        )
-    if campaign.motor_sensor in (None, campaign.sensor):
-        return unit, unit
-    return unit, mains(blank.motor_records, True)
+                by_order[order] = max(by_order.get(order, 0.0), float(np.hypot(*values[2 * i : 2 * i + 2])))
+    unit, *motor = (Mains(hertz, tuple(sorted(found.items()))) for found in largest)
+    if not paired:
+        motor = [unit if campaign.motor_sensor in (None, campaign.sensor) else Mains(hertz)]
+    return unit, motor[0]
 
 
-def _has_motor(path: Path, table: RecordingTable) -> bool:
-    """Tell whether a motor-off record has the motor's channel; a record of only the unit's sensor need not."""
-    channel = table.motor_channel
-    channels = open_recording(path, Layout(table.delimiter, table.decimal, table.skip_lines)).channels
-    return channel <= len(channels) if isinstance(channel, int) else channel in [one.name for one in channels]
+def _sensors(campaign: Campaign) -> tuple[SensorTable, ...]:
+    """Return the sensors of a record's channels: the unit's, and the motor's if it was recorded at the same time."""
+    motor = campaign.motor_sensor or campaign.sensor
+    return (campaign.sensor, motor) if campaign.recording.motor_channel is not None else (campaign.sensor,)
 
 
 def _places(unit: UnitTable) -> list[tuple[str, float]]:
@@ -216,7 +197,6 @@ def _records(
 ) -> list[RecordResult]:
     """Measure a unit's records: the motor's first, near whose frequency the others' lines are looked for."""
     motor = campaign.motor_sensor or campaign.sensor
-    paired = campaign.recording.motor_channel is not None
     band = campaign.chain.band_hz
     out: list[RecordResult] = []
 
@@ -233,7 +213,7 @@ def _records(
     if hertz:
         middle = float(np.median(hertz))
         band = (max(band[0], middle * (1 - NEAR_MOTOR)), min(band[1], middle * (1 + NEAR_MOTOR)))
-    sensors = (campaign.sensor, motor) if paired else (campaign.sensor,)
+    sensors = _sensors(campaign)
     places = [("edge", unit.edge), *((f"{point.distance_mm:g} mm", point.records) for point in unit.point)]
     for role, names in places:
         for name in names:
@@ -251,13 +231,13 @@ def _levels(
     where = f"{unit.name}, {role}"
     for side in (there,) if paired else (there, motor):
         if len(side) < LEAST_REPEATS:
-            return [], [found("L112", where, f"{len(side)} usable records; a level needs {LEAST_REPEATS}")]
+            return [], [finding("L112", where, f"{len(side)} usable records; a level needs {LEAST_REPEATS}")]
     shared = max(record.shared for record in (*there, *motor))
     base = there if paired else motor
     middle = float(np.median([one.frequency_hz for one in base]))
     near = [one for one in there if abs(one.frequency_hz - middle) < MOST_APART * middle]
     if not near:
-        return [], [found("L116", where, f"nothing near the motor's {middle:.2f} Hz")]
+        return [], [finding("L116", where, f"nothing near the motor's {middle:.2f} Hz")]
     hertz = float(np.median([one.frequency_hz for one in near]))
     levels: list[PlaceLevel] = []
     findings: list[LabFinding] = []
@@ -270,15 +250,15 @@ def _levels(
         count = min(len(values), len(below))
         if count < LEAST_REPEATS:
             message = f"{count} usable records; a level needs {LEAST_REPEATS}"
-            findings.append(found("L112", f"{where}, {hertz:.2f} Hz, by {chain.name}", message))
+            findings.append(finding("L112", f"{where}, {hertz:.2f} Hz, by {chain.name}", message))
             continue
         result = level(values, None if paired else below, shared)
         levels.append(PlaceLevel(unit.name, distance, chain.name, result, hertz))
         if result.scatter > MOST_DISAGREEMENT:
             message = f"by {chain.name}: logarithms scatter by {result.scatter:.2f}"
-            findings.append(found("L109", where, message))
+            findings.append(finding("L109", where, message))
     for one, other in combinations(levels, 2):
         if one.level.high < other.level.low or other.level.high < one.level.low:
             said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
-            findings.append(found("L115", where, said))
+            findings.append(finding("L115", where, said))
     return levels, findings

@@ -28,12 +28,11 @@ from unitcad.kernels.mesh import bounds, realise
 from unitcad.moulds.pieces import bar
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union
 from unitcad.shape.body import Body
-from unitcad.shape.lettering import HEIGHT, engraving, text_width
 from unitcad.spec import convert
 from unitcad.text import some
 from unitcad.validation.typed_files import load_file
 
-LEAST_LAYER, MOST_DEPTH = 0.5, 100.0
+LEAST_LAYER = 0.5
 _LAYER_NAME = "small letters a to z, digits and -, the first a letter"
 _NAME = "small letters a to z, digits and -, the first a letter or digit"
 
@@ -74,11 +73,6 @@ class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     waste: Annotated[float, Meta(ge=0, le=2, description="extra mix, as a fraction")] = 0.1
     scale_resolution_g: Annotated[float, Meta(ge=1e-4, le=10, description="smallest step of the scale")] = 0.1
     room_c: Annotated[float, Meta(ge=5, le=45, description="temperature of the room")] = 23.0
-
-    @property
-    def depth_mm(self) -> float:
-        """All layers together."""
-        return sum(layer.thickness_mm for layer in self.layers)
 
 
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
@@ -257,20 +251,14 @@ def cast(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
     return bodies
 
 
-def pieces(phantom: PhantomTable, size: BoxLengths, printer: Printer) -> list[Body]:
-    """Draw tray, plate, frames (skin first, each with its pour's number), lid, blade and holder as assembled."""
-    stroke, depth = float(printer.engraving_stroke_mm), float(printer.engraving_depth_mm)
-    frames = [
-        Body(
-            f"frame{len(size.tops) - i}",
-            "tool",
-            "frame",
-            _frame(size, size.tops[i + 1], size.tops[i], str(len(size.tops) - i), stroke, depth),
-            _COLOURS["frame"],
-            step=len(size.tops) - i,
-        )
-        for i in range(len(size.tops) - 1)
-    ]
+def pieces(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
+    """Draw tray, plate, frames (skin first), lid, blade and holder as assembled."""
+    frames = []
+    for step, (high, low) in enumerate(pairwise(size.tops)):
+        opening = Extrude(_square(size.rim), low - 1.0, high + 1.0)
+        shape = cut(_outline(size, low, high), [opening, *_peg_holes(size, low, high)])
+        number = len(size.tops) - step
+        frames.append(Body(f"frame{number}", "tool", "frame", shape, _COLOURS["frame"], step=number))
     blade = moved(turned(bar(size.outer + PEG_FROM_WALL - PEG_RADIUS - 1.0, 0.0), "z", 1), 0, 0, size.tray_rim)
     plate = Extrude(_square(size.inner - PLATE_PLAY), -size.plate, 0.0)
     return [
@@ -301,15 +289,6 @@ def _tray(size: BoxLengths) -> Shape:
     holes = _at_corners(hole, 0.6 * size.inner, 0.6 * size.inner)
     pegs = _at_corners(cylinder(PEG_RADIUS, size.tray_rim - 1.0, size.tops[0] + LID), size.peg_x, size.ear_y)
     return union((cut(_outline(size, size.bottom, size.tray_rim), [cavity, pocket, *holes]), *pegs))
-
-
-def _frame(size: BoxLengths, low: float, high: float, number: str, stroke: float, depth: float) -> Shape:
-    """Draw a frame; its pour's number is engraved on an ear, beyond the peg, out of the blade's way."""
-    y = size.ear_y + (size.hole + EAR_HALF - HEIGHT * stroke) / 2
-    depth = min(depth, (high - low) / 2)
-    figure = moved(engraving(number, stroke, high - depth, high + 1.0), size.peg_x - text_width(number, stroke) / 2, y)
-    opening = Extrude(_square(size.rim), low - 1.0, high + 1.0)
-    return cut(_outline(size, low, high), [opening, figure, *_peg_holes(size, low, high)])
 
 
 def _outline(size: BoxLengths, low: float, high: float) -> Shape:
@@ -519,25 +498,20 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
         )
         raise Refusal("inside_mm", inside, limit, needed)
     size = lengths(table, inside, printer)
-    tools = tuple(pieces(table, size, printer))
+    tools = tuple(pieces(table, size))
     for piece in printed(tools):
-        x0, y0, z0, x1, y1, z1 = bounds(realise(piece.shape, SEGMENTS))
-        long, short = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
-        bed = _bed(printer)
-        if short <= bed[0] and long <= bed[1] and z1 - z0 <= bed[2]:
+        lengths_mm = np.diff(np.reshape(bounds(realise(piece.shape, SEGMENTS)), (2, 3)), axis=0)[0]
+        needed_mm, bed = (*np.sort(lengths_mm[:2]), lengths_mm[2]), _bed(printer)
+        over = float(np.max(np.subtract(needed_mm, bed)[:2]))
+        if np.all(np.less_equal(needed_mm, bed)):
             continue
-        fitting = [
-            name
-            for name, one in printers().items()
-            if short <= _bed(one)[0] and long <= _bed(one)[1] and z1 - z0 <= _bed(one)[2]
-        ]
-        over = max(short - bed[0], long - bed[1], 0.0)
-        left = inside - over
-        limit = f"the {piece.name} is {long:.0f} x {short:.0f} x {z1 - z0:.0f} mm, the bed {bed[1]:g} x {bed[0]:g}"
-        if over and left > 40:
-            echo = echo_pct(table, recipes, left / 2)
-            limit += f"; about {left:.0f} mm inside would fit, whose walls echo {echo:.2g} %"
-        raise Refusal("printer", printer.name, limit, fitting[0] if fitting else None)
+        short, long, high = needed_mm
+        fitting = (name for name, one in printers().items() if np.all(np.less_equal(needed_mm, _bed(one))))
+        limit = f"the {piece.name} is {long:.0f} x {short:.0f} x {high:.0f} mm, the bed {bed[1]:g} x {bed[0]:g}"
+        if over > 0 and inside - over > 40:
+            echo = echo_pct(table, recipes, (inside - over) / 2)
+            limit += f"; about {inside - over:.0f} mm inside would fit, whose walls echo {echo:.2g} %"
+        raise Refusal("printer", printer.name, limit, next(fitting, None))
     layers = tuple(cast(table, size))
     volumes = tuple(float(realise(body.shape, SEGMENTS).volume()) for body in layers)
     response = expected(table, recipes, inside / 2, wall, tuple(map(tissue_layer, tissue())))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -79,8 +80,8 @@ def pours(phantom: PhantomSet) -> list[PhantomPour]:
         silicone = total * 100.0 / (100.0 + one.thinner_pct)
         share = float(one.silicone.mix_ratio) / (1 + float(one.silicone.mix_ratio))
         height = float(phantom.printer.layer_mm)
-        count = layer.thickness_mm / height
-        fitted = layer.thickness_mm / math.ceil(count - NEAR_LAYER)
+        heights = layer.thickness_mm / height
+        fitted = layer.thickness_mm / math.ceil(heights - NEAR_LAYER)
         found.append(
             PhantomPour(
                 index,
@@ -95,7 +96,7 @@ def pours(phantom: PhantomSet) -> list[PhantomPour]:
                 at_room(float(one.silicone.cure_h), table.room_c),
                 at_room(float(one.silicone.pot_life_min), table.room_c),
                 fitted,
-                abs(count - round(count)) > NEAR_LAYER and i < len(table.layers) - 1,
+                abs(heights - round(heights)) > NEAR_LAYER and i < len(table.layers) - 1,
             )
         )
     return found
@@ -103,39 +104,30 @@ def pours(phantom: PhantomSet) -> list[PhantomPour]:
 
 def casting_markdown(phantom: PhantomSet) -> str:
     """Write the procedure for the bench."""
-    table, found = phantom.table, pours(phantom)
-    lines = [f"# Casting the phantom {markdown(table.name)}", ""]
-    lines += [
-        "Nothing of this tooling has been printed yet: every clearance is a choice with a check behind it. The "
-        "phantom is "
-        "repeatable, not skin-like: read [what to expect](#what-to-expect) first.",
+    table, number = phantom.table, count(1)
+
+    def steps(texts: Iterator[str]) -> list[str]:
+        return [f"{next(number)}. {text}" for text in texts]
+
+    lines = [
+        f"# Casting the phantom {markdown(table.name)}",
         "",
-    ]
-    lines += [
+        "Nothing of this tooling has been printed yet: every clearance is a choice with a check behind it. The phantom "
+        "is repeatable, not skin-like: read [what to expect](#what-to-expect) first.",
+        "",
         "## Recipe",
         "",
         "| layer, from the skin down | silicone | thinner to 100 of A + B | E, kPa | thickness, mm |",
+        "| --- | --- | --- | --- | --- |",
     ]
-    lines += ["| --- | --- | --- | --- | --- |"]
     for layer, one in zip(table.layers, phantom.recipes, strict=True):
         lines.append(
             f"| {layer.name} | {one.silicone.name} | {one.thinner_pct:g} | {one.modulus_kpa:.3g} ({one.low_kpa:.3g} "
             f"to {one.high_kpa:.3g}) | {layer.thickness_mm:g} |"
         )
-    lines += [
-        "",
-        *_moduli(phantom),
-        "",
-    ]
-    number = iter(range(1, 1000))
-
-    def steps(texts: Iterator[str]) -> list[str]:
-        return [f"{next(number)}. {text}" for text in texts]
-
-    lines += ["## Before the first pour", "", *steps(_preparation(phantom, found)), ""]
-    for pour in found:
-        silicone = phantom.recipes[pour.layer].silicone
-        lines += [f"## Pour {pour.index}: {pour.name}, {silicone.name}", ""]
+    lines += ["", *_moduli(phantom), "", "## Before the first pour", "", *steps(_preparation(phantom)), ""]
+    for pour in pours(phantom):
+        lines += [f"## Pour {pour.index}: {pour.name}, {phantom.recipes[pour.layer].silicone.name}", ""]
         lines += ["| figure | value | source |", "| --- | --- | --- |"]
         lines += [f"| {' | '.join(row)} |" for row in _figures(phantom, pour)]
         lines += ["", *steps(_pour(phantom, pour)), ""]
@@ -180,46 +172,35 @@ def sheet_markdown(phantom: PhantomSet) -> str:
 def bill(phantom: PhantomSet) -> list[Item]:
     """Return the pieces to print, cut, buy and weigh."""
     table, found = phantom.table, pours(phantom)
-    items = [
-        Item(
-            body.name,
-            1,
-            "piece",
-            "printed upside down" if body.upside_down else "printed as drawn",
-            f"{phantom.printer.name}",
-        )
+    rows: list[tuple[str, float, str, str, str]] = [
+        (body.name, 1, "piece", f"printed {'upside down' if body.upside_down else 'as drawn'}", phantom.printer.name)
         for body in printed(phantom.tools)
     ]
     side = 2 * phantom.size.inner - 0.6
-    items.append(
-        Item("plate", 1, "piece", "cut", f"acrylic, {side:.1f} x {side:.1f} x {table.plate_thickness_mm:g} mm")
-    )
+    rows.append(("plate", 1, "piece", "cut", f"acrylic, {side:.1f} x {side:.1f} x {table.plate_thickness_mm:g} mm"))
     for name in dict.fromkeys(one.silicone.name for one in phantom.recipes):
         own = [p for p in found if phantom.recipes[p.layer].silicone.name == name]
-        items.append(Item(f"{name} part A", sum(p.part_a_g for p in own), "g", "bought", f"{len(own)} pours"))
-        items.append(Item(f"{name} part B", sum(p.part_b_g for p in own), "g", "bought", f"{len(own)} pours"))
-    items.append(Item("silicone thinner", sum(p.thinner_g for p in found), "g", "bought", "of the silicones' maker"))
-    for tool, note in (
-        ("scale", f"reads {table.scale_resolution_g:g} g"),
-        ("level", "0.2 mm over the box's side"),
-        ("calliper", "0.02 mm"),
-    ):
-        items.append(Item(tool, 1, "piece", "at hand", note))
-    items.append(Item("mixing cup and stick", len(found), "piece", "bought", "a set for each pour"))
-    items.append(Item("vacuum chamber and pump", 1, "piece", "at hand", "degasses each mix before it is poured"))
-    for stuff in ("release agent", "petroleum jelly", "talc", "nitrile gloves"):
-        items.append(Item(stuff, 1, "piece", "bought", "for all pours"))
-    for stuff, note in (
-        ("tape or clips", "hold the frames down"),
-        ("pen", "marks the skin through the lid"),
-        ("thin blade", "loosens the slab from the wall"),
-        ("rubber band", "fixes the tray in its holder"),
-        ("emery paper, fine", "roughens the plate"),
-        ("silicone primer", "optional: bonds the lowest layer to the plate, in place of roughening it"),
-    ):
-        items.append(Item(stuff, 1, "piece", "bought", note))
-    items.append(Item("bolt", 4, "piece", "bought", f"M{table.stage_bolt_mm:g}, for the holder"))
-    return items
+        rows.append((f"{name} part A", sum(p.part_a_g for p in own), "g", "bought", f"{len(own)} pours"))
+        rows.append((f"{name} part B", sum(p.part_b_g for p in own), "g", "bought", f"{len(own)} pours"))
+    rows.append(("silicone thinner", sum(p.thinner_g for p in found), "g", "bought", "of the silicones' maker"))
+    rows += [
+        ("scale", 1, "piece", "at hand", f"reads {table.scale_resolution_g:g} g"),
+        ("level", 1, "piece", "at hand", "0.2 mm over the box's side"),
+        ("calliper", 1, "piece", "at hand", "0.02 mm"),
+        ("mixing cup and stick", len(found), "piece", "bought", "a set for each pour"),
+        ("vacuum chamber and pump", 1, "piece", "at hand", "degasses each mix before it is poured"),
+    ]
+    bought = dict.fromkeys(("release agent", "petroleum jelly", "talc", "nitrile gloves"), "for all pours") | {
+        "tape or clips": "hold the frames down",
+        "pen": "marks the skin through the lid",
+        "thin blade": "loosens the slab from the wall",
+        "rubber band": "fixes the tray in its holder",
+        "emery paper, fine": "roughens the plate",
+        "silicone primer": "optional: bonds the lowest layer to the plate, in place of roughening it",
+    }
+    rows += [(name, 1, "piece", "bought", note) for name, note in bought.items()]
+    rows.append(("bolt", 4, "piece", "bought", f"M{table.stage_bolt_mm:g}, for the holder"))
+    return [Item(*row) for row in rows]
 
 
 def _moduli(phantom: PhantomSet) -> Iterator[str]:
@@ -233,8 +214,8 @@ def _moduli(phantom: PhantomSet) -> Iterator[str]:
     )
 
 
-def _preparation(phantom: PhantomSet, found: Sequence[PhantomPour]) -> Iterator[str]:
-    table, size = phantom.table, phantom.size
+def _preparation(phantom: PhantomSet) -> Iterator[str]:
+    table, size, found = phantom.table, phantom.size, pours(phantom)
     yield (
         "Print the pieces in the orientation of their files: the blade edge up, the lid flat. "
         "Uncured resin and latex keep silicone from curing: wash and post-cure resin prints fully, cast a small trial "
@@ -295,7 +276,7 @@ def _figures(phantom: PhantomSet, p: PhantomPour) -> Iterator[tuple[str, str, st
 
 
 def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
-    one, frame = phantom.recipes[p.layer], f"frame {p.index} ({p.name})"
+    one, frame = phantom.recipes[p.layer], f"frame {p.index} ({p.name}, {p.frame_mm:g} mm high)"
     if p.index > 1:
         yield (
             f"When the layer before is firm: trim the film off the rim below, put {frame} on the pegs and press it "
@@ -445,6 +426,9 @@ def tissue_toml(phantom: PhantomSet) -> str:
     return "\n".join(lines) + "\n"
 
 
+_RECIPE = ("thinner_pct", "modulus_kpa", "low_kpa", "high_kpa", "density_g_cm3", "source")
+
+
 def casting_data(phantom: PhantomSet) -> dict[str, Any]:
     """Return recipe, pours and lengths as JSON-ready data."""
     return {
@@ -456,12 +440,7 @@ def casting_data(phantom: PhantomSet) -> dict[str, Any]:
             {
                 "layer": layer.name,
                 "silicone": one.silicone.name,
-                "thinner_pct": one.thinner_pct,
-                "modulus_kpa": one.modulus_kpa,
-                "low_kpa": one.low_kpa,
-                "high_kpa": one.high_kpa,
-                "density_g_cm3": one.density_g_cm3,
-                "source": one.source,
+                **{key: getattr(one, key) for key in _RECIPE},
                 "loss_factor": list(one.loss),
             }
             for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True)

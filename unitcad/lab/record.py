@@ -100,7 +100,7 @@ class LabFinding:
         return {**asdict(self), "title": RULES[self.code].title, "fix": RULES[self.code].fix}
 
 
-def found(code: str, where: str, message: str, severity: str | None = None) -> LabFinding:
+def finding(code: str, where: str, message: str, severity: str | None = None) -> LabFinding:
     """Return a finding with the severity of its rule, or the one that is given."""
     return LabFinding(code, severity or RULES[code].severity, where, message)
 
@@ -149,7 +149,7 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
 
     Raises Refusal, naming the key to add, for a value that neither the file nor the campaign states.
     """
-    recording = open_recording(path, Layout(table.delimiter, table.decimal, table.skip_lines))
+    recording = open_recording(path, Layout(table.delimiter or "", table.decimal or "", table.skip_lines or 0))
     channels = recording.channels
     time = recording.time if table.time_column is None else recording.index(table.time_column, "recording.time_column")
     wanted = {"channel": table.channel, "motor_channel": table.motor_channel}
@@ -395,16 +395,16 @@ def measure_record(
     hint = f"; the strongest line outside that is at about {hertz:.0f} Hz" if hertz else ""
     findings: list[LabFinding] = []
     if signal.off_grid > IRREGULAR:
-        findings.append(found("L103", shown, f"a time is {signal.off_grid:.2g} steps off an even grid"))
+        findings.append(finding("L103", shown, f"a time is {signal.off_grid:.2g} steps off an even grid"))
     fits = _fits(samples, rate, band, mains, sensors)
     for fit, channel, gaps, where in zip(fits, samples.T, signal.missing, names, strict=True):
         level = fit.clipped if fit else _clipped(channel)
         if level < np.inf:
-            findings.append(found("L101", where, f"at about {level:.2f} of the amplitude"))
+            findings.append(finding("L101", where, f"at about {level:.2f} of the amplitude"))
         if gaps:
             message = f"{gaps} of {signal.count} samples ({gaps / signal.count:.2g} of them) are no numbers"
             severity = "error" if gaps > MOST_MASKED * signal.count else "warning"
-            findings.append(found("L119", where, message, severity))
+            findings.append(finding("L119", where, message, severity))
     none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, sensors[0].unit, picture, ())
     none = replace(none, units=signal.units)
     if any(one.code == "L101" for one in findings):
@@ -412,12 +412,12 @@ def measure_record(
     for each, where in zip(fits, names, strict=True):
         if each is None:
             message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz{hint}"
-            return replace(none, findings=(*findings, found("L111", where, message)))
+            return replace(none, findings=(*findings, finding("L111", where, message)))
         if each.lines:
             listed = ", ".join(f"{one.frequency_hz:.2f} Hz" for one in each.lines)
             message = f"{listed}, of {', '.join(_sizes(each))} of the strongest; run one motor at a time"
             lines = tuple(one.frequency_hz for one in each.lines)
-            return replace(none, findings=(*findings, found("L104", where, message)), lines=lines)
+            return replace(none, findings=(*findings, finding("L104", where, message)), lines=lines)
     fit, *motors = (each for each in fits if each)
     motor = motors[0] if motors else None
     for each, where, known in zip((fit, *motors), names, mains, strict=False):
@@ -429,10 +429,10 @@ def measure_record(
     steady, length = fit.end_s - fit.start_s, len(samples) / rate
     if steady < LEAST_STEADY * length and not any(one.severity == "error" for one in findings):
         message = f"steady for {steady:.2f} s of {length:.2f} s; only that part was used"
-        findings.append(found("L107", shown, message))
+        findings.append(finding("L107", shown, message))
     outside = _outside(frequency, size, campaign.chain.band_hz, mains_hz, fit.frequency_hz)
     if outside is not None:
-        findings.append(found("L117", shown, f"a stronger line is at about {outside:.0f} Hz, outside chain.band_hz"))
+        findings.append(finding("L117", shown, f"a stronger line is at about {outside:.0f} Hz, outside chain.band_hz"))
     hertz = fit.frequency_hz
     factor = displacement(sensors[0], hertz) / signal.gain(hertz)
     ratio, lag = None, None
@@ -449,14 +449,14 @@ def measure_record(
             gains[chain.name] = chain.gain(hertz)
         if (gain := gains.get(chain.name, 1.0)) < LEAST_GAIN:
             message = f"the filters of the chain {chain.name} pass {gain:.3f} of {hertz:.2f} Hz"
-            findings.append(found("L106", shown, message))
+            findings.append(finding("L106", shown, message))
         try:
             values = [chain.amplitude(samples[:, i], rate, each) for i, each in enumerate((fit, *motors))]
             reason = chain.unfit([fit, *motors])
         except Refusal as refusal:
             values, reason = [], refusal.limit
         if reason:
-            unfit.append(found("L114", shown, f"{chain.name}: {reason}"))
+            unfit.append(finding("L114", shown, f"{chain.name}: {reason}"))
         elif gain >= LEAST_GAIN:
             by_chain[chain.name] = over * (values[0] / values[1] if motor else values[0])
     if "line" in by_chain:
@@ -513,7 +513,7 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
     out = []
 
     def say(code: str, message: str, severity: str | None = None) -> None:
-        out.append(found(code, where, message, severity))
+        out.append(finding(code, where, message, severity))
 
     hertz = fit.frequency_hz
     if fit.masked > MOST_MASKED:

@@ -78,8 +78,6 @@ class LineFit:
     """The multiple of the mains' frequency that the record can't tell from the line; 0 if there is none."""
     lines: tuple[Line, ...] = ()
     phase: Phase | None = field(default=None, compare=False, repr=False)
-    blocks: tuple[complex, ...] = field(default=(), repr=False)
-    """The line's complex amplitude in equal blocks of the span."""
 
 
 Hertz = Annotated[float, Meta(ge=1, le=500)]

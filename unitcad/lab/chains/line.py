@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 from scipy.signal import oaconvolve
-from scipy.stats import norm
 from scipy.stats import t as student
 
 from unitcad.geometry.arrays import Bools, Floats
@@ -25,8 +24,8 @@ NO_MAINS = Mains()
 HARMONICS = 3
 FAR = 4.5
 """Robust standard deviations of the residual beyond which a sample is excluded; noise exceeds it now and then."""
-FALSE_ALARM = 1e-3
-"""Largest fraction of records of pure normal noise in which a sample may be called a drop-out."""
+DROP_OUT = 6.2
+"""Robust standard deviations beyond which a sample is a drop-out: at most one record of noise in a thousand has one."""
 ROUNDS = 6
 LEAST_SAMPLES = 16
 RESOLVED = 1.5
@@ -142,7 +141,7 @@ def _fit_running(
         left[inside] = np.where(use, residual, 0.0)
         towards = found[:2] / max(float(np.hypot(*found[:2])), 1e-300)
         widening = np.sqrt(max(float(towards @ covariance[:2, :2] @ towards) * use.sum() / 2, 1.0))
-        far_off = deviation > 0 and np.any(left_out > most_of_noise(len(left_out)) * deviation)
+        far_off = deviation > 0 and np.any(left_out > DROP_OUT * deviation)
         value = complex(found[0], -found[1])
         return _Solution(phase, span, frequency, value, left, hum, shape, kept, float(widening), bool(far_off))
 
@@ -209,18 +208,7 @@ def _summary(found: _Solution, time: Floats, rate: float, mains: Mains) -> LineF
         end_s=span[1],
         mains_hz=order * mains.frequency_hz,
         phase=found.phase,
-        blocks=tuple(complex(b) for b in blocks),
     )
-
-
-def most_of_noise(count: int) -> float:
-    """Return the largest of `count` samples of normal noise, in robust standard deviations.
-
-    One record in 1 / FALSE_ALARM exceeds it at most, with the deviation estimated from the same samples: three standard
-    errors of a median of absolute values, 1.17 over the root of the count, are added.
-    """
-
-    return float(norm.isf(FALSE_ALARM / 4 / count)) * (1 + 3 * 1.17 / np.sqrt(count))
 
 
 def _best_phase(

@@ -107,8 +107,6 @@ LONGEST_S = 60.0
 """Seconds that a format's library may take to read a file."""
 MEMORY = 3 << 30
 """Bytes that a format's library may take."""
-MOST_NUMBERS = 2**26
-"""Numbers that a file may state: a small file can state more than fits into memory."""
 OTHER_PROGRAMS = {
     **dict.fromkeys((".svd", ".pvd"), "only Polytec's library reads it: export UFF"),
     **dict.fromkeys((".xls", ".xlsx", ".ods"), "a spreadsheet: save the sheet with the numbers as CSV"),
@@ -117,20 +115,6 @@ OTHER_PROGRAMS = {
 _MOST = 1e30
 """Beyond it, and beyond its inverse, a number is none that was measured."""
 _EXTRA = {"pyuff": "pyuff", "nptdms": "npTDMS", "h5py": "h5py"}
-
-
-def expect_held(path: Path, name: str, stated: int, held: int, size: int = 1) -> None:
-    """Raise Unreadable if a file states more numbers than it contains or than unitcad reads; `size`: bytes of one.
-
-    `held`: the largest number of bytes that its stored data can expand to.
-    """
-    if stated > MOST_NUMBERS:
-        limit = f"{name} states {stated} numbers; at most {MOST_NUMBERS} are read: cut the record"
-        raise Unreadable(str(path), None, limit)
-    if stated * size > held:
-        raise Unreadable(
-            str(path), None, f"{name} states {stated * size} bytes and stores {held} at most: it is damaged"
-        )
 
 
 class Unreadable(Refusal):

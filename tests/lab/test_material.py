@@ -1,22 +1,38 @@
-"""`unitcad material`: layouts and units, several specimens, a table that a spec takes, refusals, dynamic tests."""
+"""`unitcad material`: layouts and units, methods on exact curves, the table of a spec, refusals, dynamic tests."""
 
+from __future__ import annotations
+
+import csv
 import json
 import math
 import os
 import tomllib
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from tests.robustness.test_bad_values import check_words_are_refused
+from unitcad import catalogue
 from unitcad.attenuation import FractionalKelvinVoigt
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimate_inputs import estimate_input
-from unitcad.lab.material import Specimen, declared, evaluate, evaluate_dynamic, header_of, read_curve, read_dynamic
+from unitcad.estimate_inputs import estimate_input, estimate_spec
+from unitcad.lab.material import (
+    Specimen,
+    declared,
+    evaluate,
+    evaluate_dynamic,
+    fit_start,
+    header_of,
+    moduli,
+    read_curve,
+    read_dynamic,
+    secant,
+)
 from unitcad.validation import load
 
 C10 = 1.2e4
@@ -38,76 +54,64 @@ def _table(path, head, columns, lines=(), sign=","):
     return path
 
 
+def _pull(path, strain, stress):
+    """Write a curve of strain and of stress in Pa."""
+    return _table(path, "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3])
+
+
 def _curve(factor=1.0, most=1.5):
     strain = np.linspace(0.0, most, 301)
     return strain, factor * neo_hooke(strain)
 
 
-def _layouts():
-    strain, stress = _curve()
-    area, gauge = 18e-6, 33.0
-
-    def plain(folder):
-        return _table(folder / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3]), {}, Specimen()
-
-    def true_values(folder):
-        head = "Time (s);True Strain (1);True Stress (MPa)"
-        columns = [strain / 0.2, np.log1p(strain), stress * (1 + strain) / 1e6]
-        return _table(folder / "b.csv", head, columns, sign=";"), {}, Specimen()
-
-    def force_and_travel(folder):
-        lines = ("Specimen Thickness (mm);3;", "Specimen Width (mm);6;", "Specimen Length (mm);33;", "Load Cell;50 N;")
-        head = "Extension (mm);Force (N);Time (s)"
-        columns = [12.0 + strain * gauge, stress * area, strain / 0.2]
-        return _table(folder / "c.csv", head, columns, lines, ";"), {}, Specimen()
-
-    def given_lengths(folder):
-        columns = [strain * gauge, stress * area * 1e3]
-        return _table(folder / "d.csv", "Extension (mm),Load (mN)", columns), {}, Specimen(6.0, 3.0, gauge)
-
-    def declared_columns(folder):
-        path = _table(folder / "e.txt", "a\tb\tc", [strain / 0.2, stress / 6894.757293168, 100 * strain], sign="\t")
-        return path, {"stress": "2:psi", "strain": "c:%"}, Specimen()
-
-    def quoted(folder, decimal=".", sign=",", units=("(s)", "(mm)", "(N)")):
-        head = ['"Specimen","a, b"', '"Specimen Width","6{0}0","mm"', '"Specimen Thickness (mm)","3{0}0"']
-        rows = [("Time", "Extension", "Force"), units]
-        rows += [
-            tuple(f"{value:.7f}".replace(".", decimal) for value in row)
-            for row in zip(strain / 0.2, strain * gauge, stress * area, strict=True)
-        ]
-        lines = [line.format(decimal) for line in head] + [sign.join(f'"{cell}"' for cell in row) for row in rows]
-        path = folder / "f.csv"
-        path.write_text("\n".join(lines) + "\n")
-        return path, {}, Specimen(gauge_mm=gauge)
-
-    def quoted_commas(folder):
-        return quoted(folder, ",")
-
-    def quoted_semicolons(folder):
-        return quoted(folder, ",", ";", ("[s]", "[mm]", "[N]"))
-
-    def quoted_tabs(folder):
-        return quoted(folder, ".", "\t", ("s", "mm", "N"))
-
-    def row_of_units(folder):
-        rows = [f"{a:.7f},{b:.7f}" for a, b in zip(strain, stress / 6894.757293168, strict=True)]
-        path = folder / "g.csv"
-        path.write_text("\n".join(["Strain,Stress", "(mm/mm),(psi)", "", *rows]) + "\n")
-        return path, {}, Specimen()
-
-    made = (plain, true_values, force_and_travel, given_lengths, declared_columns)
-    made = (*made, quoted, quoted_commas, quoted_semicolons, quoted_tabs, row_of_units)
-    return {f.__name__: f for f in made}
+STRAIN, STRESS = _curve()
+AREA, GAUGE = 18e-6, 33.0
+HEADER = ("Specimen Thickness (mm);3;", "Specimen Width (mm);6;", "Specimen Length (mm);33;", "Load Cell;50 N;")
 
 
-@pytest.mark.parametrize("layout", _layouts())
-def test_one_curve_in_every_layout_is_the_same_curve(layout, tmp_path):
-    path, columns, specimen = _layouts()[layout](tmp_path)
-    curve = read_curve(path, declared(f"{q}={c}" for q, c in columns.items()), specimen)
+def _quoted(decimal, sign, *units):
+    """Return lines of quoted cells, with a row of units and a header that has the cross-section."""
+    lines = ['"Specimen","a, b"', f'"Specimen Width","6{decimal}0","mm"', f'"Specimen Thickness (mm)","3{decimal}0"']
+    rows = [("Time", "Extension", "Force"), units]
+    for row in zip(STRAIN / 0.2, STRAIN * GAUGE, STRESS * AREA, strict=True):
+        rows.append(tuple(f"{value:.7f}".replace(".", decimal) for value in row))
+    return [*lines, *(sign.join(f'"{cell}"' for cell in row) for row in rows)]
+
+
+LAYOUTS = {
+    "plain": ("Strain (%),Stress (kPa)", [100 * STRAIN, STRESS / 1e3]),
+    "true values": (
+        "Time (s);True Strain (1);True Stress (MPa)",
+        [STRAIN / 0.2, np.log1p(STRAIN), STRESS * (1 + STRAIN) / 1e6],
+    ),
+    "force and travel": ("Extension (mm);Force (N);Time (s)", [12.0 + STRAIN * GAUGE, STRESS * AREA, STRAIN / 0.2]),
+    "given lengths": ("Extension (mm),Load (mN)", [STRAIN * GAUGE, STRESS * AREA * 1e3]),
+    "declared columns": ("a\tb\tc", [STRAIN / 0.2, STRESS / 6894.757293168, 100 * STRAIN]),
+    "quoted": _quoted(".", ",", "(s)", "(mm)", "(N)"),
+    "quoted commas": _quoted(",", ",", "(s)", "(mm)", "(N)"),
+    "quoted tabs": _quoted(".", "\t", "s", "mm", "N"),
+    "row of units": ("Strain,Stress\n(mm/mm),(psi)\n", [STRAIN, STRESS / 6894.757293168]),
+}
+DECLARED = {"declared columns": ["stress=2:psi", "strain=c:%"]}
+SPECIMENS = {"given lengths": Specimen(6.0, 3.0, GAUGE)}
+
+
+def _layout(folder, name):
+    """Write a curve in a layout."""
+    made, path = LAYOUTS[name], folder / "a.csv"
+    if isinstance(made, list):
+        path.write_text("\n".join(made) + "\n")
+        return path
+    sign = next(sign for sign in ";\t," if sign in made[0])
+    return _table(path, *made, HEADER if name == "force and travel" else (), sign)
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_one_curve_in_every_layout_is_the_same_curve(name, tmp_path):
+    specimen = SPECIMENS.get(name, Specimen(gauge_mm=GAUGE if "quoted" in name else None))
+    curve = read_curve(_layout(tmp_path, name), declared(DECLARED.get(name, [])), specimen)
     assert float(np.interp(0.15, curve.strain, curve.stress)) / 0.15 == pytest.approx(EXACT_15, rel=1e-3)
-    result = evaluate([curve], (0.12, 0.24))
-    row = next(row for row in result.rows if row.method == "secant at 15 %")
+    row = next(row for row in evaluate([curve], (0.12, 0.24)).rows if row.method == "secant at 15 %")
     assert row.value == pytest.approx(EXACT_15, rel=1e-3)
 
 
@@ -169,17 +173,16 @@ def test_what_would_be_a_guess_is_refused(head, columns, field, part, tmp_path):
 
 
 def test_rows_without_a_number_are_counted_and_a_gap_gives_no_modulus(tmp_path):
-    strain, stress = _curve()
-    few = stress.copy()
+    few = STRESS.copy()
     few[[40, 90, 91]] = np.nan
-    curve = read_curve(_table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, few / 1e3]), {}, Specimen())
+    curve = read_curve(_pull(tmp_path / "a.csv", STRAIN, few), {}, Specimen())
     result = evaluate([curve], (0.12, 0.24))
     assert curve.lost == 3
     assert next(one.message for one in result.warnings if one.code == "gaps").startswith("a.csv: 3 rows lack")
     assert result.value == pytest.approx(evaluate([replace(curve, lost=0)], (0.12, 0.24)).value, rel=1e-9)
     for low, high in ((0.07, 0.30), (0.13, 0.20)):
-        gone = np.where((strain > low) & (strain < high), np.nan, stress)
-        path = _table(tmp_path / "b.csv", "Strain (%),Stress (kPa)", [100 * strain, gone / 1e3])
+        gone = np.where((low < STRAIN) & (high > STRAIN), np.nan, STRESS)
+        path = _pull(tmp_path / "b.csv", STRAIN, gone)
         with pytest.raises(Refusal, match="no point between") as refused:
             evaluate([read_curve(path, {}, Specimen())], (0.12, 0.24))
         assert refused.value.field == "--strain"
@@ -188,7 +191,7 @@ def test_rows_without_a_number_are_counted_and_a_gap_gives_no_modulus(tmp_path):
 def test_specimens_that_are_not_one_silicone_s_are_refused_and_an_odd_one_is_named(tmp_path):
     def made(factor):
         x, y = _curve(factor)
-        path = _table(tmp_path / f"{factor:g}.csv", "Strain (%),Stress (kPa)", [100 * x, y / 1e3])
+        path = _pull(tmp_path / f"{factor:g}.csv", x, y)
         return read_curve(path, {}, Specimen())
 
     with pytest.raises(Refusal, match="factor of 10 ") as refused:
@@ -200,8 +203,7 @@ def test_specimens_that_are_not_one_silicone_s_are_refused_and_an_odd_one_is_nam
 
 
 def test_one_specimen_counts_once(tmp_path):
-    strain, stress = _curve()
-    path = _table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3])
+    path = _pull(tmp_path / "a.csv", STRAIN, STRESS)
     copy = tmp_path / "b.csv"
     copy.write_bytes(path.read_bytes())
     for second, part in ((path, "given twice"), (tmp_path / "." / "a.csv", "given twice"), (copy, "same content")):
@@ -212,8 +214,7 @@ def test_one_specimen_counts_once(tmp_path):
 
 
 def test_an_option_that_would_have_no_effect_is_refused(tmp_path):
-    strain, stress = _curve()
-    path = _table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3])
+    path = _pull(tmp_path / "a.csv", STRAIN, STRESS)
     for words in (("--deformation", "shear"), ("--cell-n", "50"), ("--cell-n", "50", "--width-mm", "6")):
         done = _invoke(path, "--like", "ecoflex-00-30", *words, fails=True)
         assert isinstance(done.exception, Refusal)
@@ -222,14 +223,13 @@ def test_an_option_that_would_have_no_effect_is_refused(tmp_path):
 
 
 def test_a_reversed_or_short_curve_is_refused(tmp_path):
-    strain, stress = _curve()
     with pytest.raises(UnitcadError, match="reversed"):
-        read_curve(_table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, -stress]), {}, Specimen())
-    empty = np.full_like(strain, np.nan)
+        read_curve(_pull(tmp_path / "a.csv", STRAIN, -STRESS), {}, Specimen())
+    empty = np.full_like(STRAIN, np.nan)
     with pytest.raises(UnitcadError, match="no row"):
-        read_curve(_table(tmp_path / "c.csv", "Strain (%),Stress (kPa)", [100 * strain, empty]), {}, Specimen())
+        read_curve(_pull(tmp_path / "c.csv", STRAIN, empty), {}, Specimen())
     with pytest.raises(UnitcadError, match="points"):
-        read_curve(_table(tmp_path / "b.csv", "Strain (%),Stress (kPa)", [strain[:3], stress[:3]]), {}, Specimen())
+        read_curve(_pull(tmp_path / "b.csv", STRAIN[:3], STRESS[:3]), {}, Specimen())
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,7 @@ def test_a_wrong_declaration_is_refused(text, part):
 def test_the_range_covers_methods_specimens_and_cross_section(tmp_path):
     factors = (0.9, 1.0, 1.1)
     curves = [
-        read_curve(_table(tmp_path / f"{f}.csv", "Strain (%),Stress (kPa)", [100 * x, y / 1e3]), {}, Specimen(6.0, 3.0))
+        read_curve(_pull(tmp_path / f"{f}.csv", x, y), {}, Specimen(6.0, 3.0))
         for f, (x, y) in ((f, _curve(f, 3.5)) for f in factors)
     ]
     result = evaluate(curves, (0.12, 0.24))
@@ -266,7 +266,7 @@ def test_cycles_count_by_their_first_pull(tmp_path):
     strain, stress = _curve(most=0.5)
     there = np.concatenate([strain[:200], strain[199:0:-1], strain])
     back = np.concatenate([stress[:200], 0.7 * stress[199:0:-1], 0.7 * stress[:200], stress[200:]])
-    curve = read_curve(_table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * there, back / 1e3]), {}, Specimen())
+    curve = read_curve(_pull(tmp_path / "a.csv", there, back), {}, Specimen())
     assert float(np.interp(0.15, curve.strain, curve.stress)) / 0.15 == pytest.approx(EXACT_15, rel=1e-3)
     assert "cycles" in {one.code for one in evaluate([curve], (0.12, 0.24)).warnings}
 
@@ -286,10 +286,7 @@ PASTED = {
 
 
 def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path):
-    curves = [
-        _table(tmp_path / f"{i}.csv", "Strain (%),Stress (kPa)", [100 * x, y / 1e3])
-        for i, (x, y) in enumerate((_curve(1.0, 3.5), _curve(1.05, 3.5)))
-    ]
+    curves = [_pull(tmp_path / f"{i}.csv", x, y) for i, (x, y) in enumerate((_curve(1.0, 3.5), _curve(1.05, 3.5)))]
     done = _invoke(*curves, "--name", "our blend", "--like", "ecoflex-00-30", "-o", tmp_path / "out")
     assert "quasi-static" in done.output
     assert "Without that" not in done.output  # ecoflex-00-30 has no modulus that would be taken instead
@@ -321,7 +318,7 @@ def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path):
 
 def test_a_refusal_leaves_nothing_behind(tmp_path):
     strain, stress = _curve(most=0.2)
-    path = _table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3])
+    path = _pull(tmp_path / "a.csv", strain, stress)
     for words, field in (
         ((path,), "--like"),
         ((path, "--like", "ecoflex-00-10"), "--strain"),
@@ -339,7 +336,7 @@ def test_a_refusal_leaves_nothing_behind(tmp_path):
 def test_a_damaged_file_is_read_as_it_was_or_refused(tmp_path):
     """Bytes changed, cut out or doubled: a curve without gaps, or one clear error."""
     random = np.random.default_rng(7)
-    whole = _layouts()["force_and_travel"](tmp_path)[0].read_bytes()
+    whole = _layout(tmp_path, "force and travel").read_bytes()
     path, read = tmp_path / "damaged.csv", 0
     for _ in range(150):
         data = bytearray(whole)
@@ -437,13 +434,120 @@ def test_a_dynamic_test_fills_the_modulus_at_the_motor_s_frequency(tmp_path):
 
 @pytest.mark.parametrize(("unit", "factor"), [("lbF", 4.4482216152605), ("LBF", 4.4482216152605), ("KGF", 9.80665)])
 def test_a_unit_s_case_does_not_matter_where_it_can_t_be_another_unit(unit, factor, tmp_path):
-    strain, stress = _curve()
     head = f"Travel [mm],Load [{unit}]"
-    path = _table(tmp_path / "a.csv", head, [33 * strain, stress * 18e-6 / factor])
+    path = _table(tmp_path / "a.csv", head, [33 * STRAIN, STRESS * 18e-6 / factor])
     curve = read_curve(path, {}, Specimen(6.0, 3.0, 33.0))
-    assert curve.stress[-1] == pytest.approx(stress[-1], rel=1e-6)
+    assert curve.stress[-1] == pytest.approx(STRESS[-1], rel=1e-6)
 
 
 @pytest.mark.parametrize("option", ["--gauge-mm", "--cell-n"])
 def test_an_option_that_is_no_number_is_refused(option, tmp_path, capsys, monkeypatch):
     check_words_are_refused(["material", "none.csv", option, "nan"], option, tmp_path, capsys, monkeypatch)
+
+
+YOUNG = 6e4
+
+
+def young_neo_hooke(strain):
+    """The nominal stress of a bar by neo-Hooke's law, Pa."""
+    stretch = 1.0 + strain
+    return YOUNG / 3 * (stretch - stretch**-2)
+
+
+@pytest.mark.parametrize("at", [0.1, 0.15, 0.25, 0.5, 1.0])
+def test_a_secant_of_neo_hookes_law_is_exact(at):
+    """E (1 + 1/L + 1/L^2) / 3 with L the stretch: (L - 1/L^2) / (L - 1) = (L^2 + L + 1) / L^2."""
+    strain = np.linspace(0.001, 3.5, 3500)
+    stretch = 1 + at
+    exact = YOUNG * (1 + 1 / stretch + 1 / stretch**2) / 3
+    assert secant(strain, young_neo_hooke(strain), at) == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.parametrize("slack", [0.0, 0.03, -0.02])
+def test_slack_and_an_offset_of_the_force_do_not_move_the_default(slack):
+    strain = np.linspace(0.04, 0.6, 60)
+    bar = young_neo_hooke(strain - slack)
+    toe = fit_start(strain, bar, 0.24)
+    assert toe is not None
+    assert toe.origin == pytest.approx(slack, abs=1e-6)
+    exact = np.mean([YOUNG / 3 * (s**2 + s + 1) / s**2 for s in np.linspace(1.12, 1.24, 1001)])
+    assert moduli(strain, bar, 0.12, 0.24)[0].value == pytest.approx(exact, rel=1e-4)
+    plain = secant(strain, bar, 0.15)
+    assert plain is not None
+    assert (abs(plain / exact - 1) > 0.1) == (slack != 0)
+
+
+DATA = Path(__file__).parent / "data" / "soft-robotics-materials-database"
+FILES = {path.stem.lower().replace(" ", "-"): path for path in DATA.glob("*.csv")}
+NAMES = ("ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30")
+PROTOTYPE = {
+    "secant at 15 %": (18.0, 37.7, 51.3, 110, 454),
+    "slope 0 to 25 % with offset": (24.5, 37.3, 59.7, 114, 451),
+    "secant at 100 % (ISO 37, ASTM D412)": (14.8, 29.7, 41.0, 113, 437),
+}
+"""Moduli in kPa that another program worked out from the same files."""
+
+
+@pytest.fixture(scope="module")
+def results():
+    known = catalogue.materials()
+    bare = declared(["strain=Engineering Strain:1"])  # the files give no unit
+    return {n: evaluate([read_curve(FILES[n], bare, Specimen())], (0.12, 0.24), known[n]) for n in NAMES}
+
+
+@pytest.mark.parametrize("method", PROTOTYPE)
+def test_every_method_gives_what_another_program_gave(method, results):
+    for name, expected in zip(NAMES, PROTOTYPE[method], strict=True):
+        row = next(row for row in results[name].rows if row.method == method)
+        assert row.value is not None
+        assert row.value / 1e3 == pytest.approx(expected, rel=0.01)
+        assert row.defensible
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_reader_finds_the_engineering_columns(name, results):
+    with open(FILES[name], encoding="utf-8-sig", newline="") as file:
+        rows = [row for row in csv.reader(file, delimiter=";") if row[0][:1].isdigit()]
+    strain, stress = (np.array([float(row[i]) for row in rows]) for i in (3, 4))
+    curve = results[name].curves[0]
+    np.testing.assert_allclose(
+        np.interp([0.15, 0.5, 3], curve.strain, curve.stress),
+        1e6 * np.interp([0.15, 0.5, 3], strain, stress),
+        rtol=1e-9,
+    )
+    assert curve.specimen == Specimen(6, 3, 33, pytest.approx(18), 1000, True)
+    assert curve.rate == pytest.approx(450 / 60 / 33, rel=0.01)
+
+
+def test_the_shipped_values_are_those_of_the_curves(results):
+    sources = catalogue.moduli_by_source()
+    for name, result in results.items():
+        shipped = catalogue.materials()[name].quasistatic_modulus_kpa
+        assert shipped is not None
+        assert shipped.method == result.method
+        for value, exact in ((shipped.value, result.value), (shipped.low, result.low), (shipped.high, result.high)):
+            assert value == pytest.approx(exact / 1e3, rel=1e-3)
+        for row in result.rows:
+            at = sources.get(f"tensile, {row.method}", {}).get(name)
+            assert (at is not None) == row.defensible
+            assert at is None or at == pytest.approx((row.value or 0) / 1e3, rel=1e-3)
+
+
+def test_the_warnings_name_what_is_doubtful(results):
+    codes = {name: {one.code for one in result.warnings} for name, result in results.items()}
+    assert codes["ecoflex-00-10"] == {"force", "start", "toe", "break", "crosshead", "specimens"}
+    assert "force" not in codes["dragon-skin-30"]
+    assert "break" not in codes["dragon-skin-10-medium"]
+
+
+def test_a_spec_chooses_the_second_source_and_the_estimate_says_so():
+    default, chosen = load("encapsulating"), load("encapsulating", ["estimate.moduli=quasi-static"])
+    inner = estimate_input(chosen).layers[0].youngs_modulus
+    value = catalogue.materials()["ecoflex-00-10"].quasistatic_modulus_kpa
+    assert value is not None
+    assert inner.value == pytest.approx(1e3 * value.value)
+    assert inner.ends == pytest.approx((1e3 * (value.low or math.nan), 1e3 * (value.high or math.nan)))
+    assert estimate_input(default).layers[0].youngs_modulus.value == 15e3
+    said = [line for line in estimate_spec(chosen)["assumptions"] if "quasi-static" in line]
+    assert any(line.startswith("ecoflex-00-10 youngs_modulus: quasi-static") for line in said)
+    assert not any("quasi-static" in line for line in estimate_spec(default)["assumptions"])

@@ -1,0 +1,524 @@
+"""`unitcad measure`: levels of synthetic campaigns with known truth, their files, findings and refusals."""
+
+import hashlib
+import json
+import math
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat, wavfile
+from scipy.stats import ttest_ind, ttest_rel
+from typer.testing import CliRunner
+
+from benchmarks.accuracy.synthetic_records import Scenario, synthetic
+from unitcad.cli import app
+from unitcad.errors import Refusal
+from unitcad.lab import measure_command, measuring
+from unitcad.lab.campaign import read_campaign
+from unitcad.lab.chains import CHAINS
+from unitcad.lab.measuring import level, measure
+from unitcad.lab.record import RULES
+
+RATE = 2000
+TIME = np.arange(2 * RATE) / RATE
+FULL = 500.0
+NAME = 'name = "t"\n'
+UM = '[sensor]\nquantity = "displacement"\nunit = "um"\n'
+HEAD = f"{UM}scale = 500.0\n"
+BOTH = '[chain]\nuse = ["line", "bandpass"]\n'
+UNIT = '[[unit]]\nname = "a"\nreference = ["m0.wav", "m1.wav", "m2.wav"]\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
+PAIRED = '[recording]\nchannel = 1\nmotor_channel = 2\n[[unit]]\nname = "a"\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
+
+
+def noise(size=1.0, seed=1):
+    return size * np.random.default_rng(seed).standard_normal(len(TIME))
+
+
+def wave(size, hertz=121.3, phase=0.0):
+    return size * np.cos(2 * np.pi * hertz * TIME + phase)
+
+
+def write(path, *channels, rate=RATE):
+    wavfile.write(path, rate, np.column_stack(channels).astype("<f4") / np.float32(FULL))
+
+
+def repeats(folder, **lines):
+    """Write three records of each line, or of each pair of lines, in noise: its letter and a number."""
+    for name, channels in lines.items():
+        for i in range(3):
+            several = channels if isinstance(channels, tuple) else (channels,)
+            seeds = [[i, k, ord(name)] for k in range(len(several))]
+            columns = (x * (1 + 0.005 * i) + noise(seed=seed) for x, seed in zip(several, seeds, strict=True))
+            write(folder / f"{name}{i}.wav", *columns)
+
+
+def campaign(folder, text, head=HEAD):
+    (folder / "c.toml").write_text(NAME + head + text)
+    return measure(read_campaign(folder / "c.toml"), folder)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A campaign with a motor, an edge and a point, each with mains, harmonics, drift and spin-up; and a blank."""
+    settings = {"snr": 60.0, "drift": 0.004, "mains": (0.01, 0.004, 0.004), "harmonics": (0.1, 0.05)}
+    scenario = Scenario("lab", spin_up_s=0.05, **settings)
+    for name, size, hertz in (("m", 300, 122), ("e", 120, 122.5), ("s", 30, 121.6)):
+        for i in range(3):
+            rng = np.random.default_rng([0, i, size])
+            write(tmp_path / f"{name}{i}.wav", synthetic(scenario, rng, size * (1 + 0.02 * (i - 1)), hertz).x)
+    write(tmp_path / "off.wav", wave(3, 50) + wave(1.2, 100))
+    point = '[[unit.point]]\ndistance_mm = 10.0\nrecords = ["s0.wav", "s1.wav", "s2.wav"]\n'
+    text = f'[blank]\nrecords = ["off.wav"]\n{BOTH}{UNIT}spec = "encapsulating"\n{point}'
+    (tmp_path / "c.toml").write_text(NAME + HEAD + "full_scale = 500.0\n" + text)
+    return tmp_path
+
+
+def test_a_campaign_has_the_levels_of_its_truth(folder):
+    result = measure(read_campaign(folder / "c.toml"), folder)
+    assert result.findings == ()
+    truth = {0.0: 120 / 300, 10.0: 30 / 300}
+    for one in result.levels:
+        assert one.level.value == pytest.approx(truth[one.distance_mm], rel=0.005 if one.chain == "line" else 0.02)
+        assert one.level.low < truth[one.distance_mm] < one.level.high
+    assert len(result.levels) == 4
+    for record in result.records["a"]:
+        assert record.u_um < 0.02 * record.amplitude_um
+        assert record.gains["bandpass"] == pytest.approx(1.0, abs=0.01)
+    assert dict(result.mains)[1] == pytest.approx(3.0, rel=1e-3)
+
+
+def test_the_files_of_a_campaign(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    done = CliRunner().invoke(app, ["measure", "c.toml", "-o", "one"])
+    assert done.exit_code == 0, done.output
+    assert done.output.splitlines()[-1] == "one"
+    CliRunner().invoke(app, ["measure", "c.toml", "-o", "two"])
+    files = {file.name: file.read_bytes() for file in Path("one").iterdir()}
+    assert files == {file.name: file.read_bytes() for file in Path("two").iterdir()}
+    measured = tomllib.loads(files["measured.toml"].decode())
+    assert {level["status"] for level in measured["level"]} == {"measured"}
+    assert measured["assumed"] == {"order": 4, "q": 30.0, "zero_phase": True, "measure": "rms", "trim_s": 0.25}
+    assert len({record["sha256"] for record in measured["record"]}) == 9
+    hashes = {one["file"]: one["sha256"] for one in measured["source"]}
+    assert hashes == {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in ("c.toml", "off.wav")}
+    charts = {f"record-{i:02d}-{kind}.svg" for i in range(1, 10) for kind in ("time", "periods", "spectrum")}
+    assert set(files) == {"measured.toml", "measure.json", "measure.html", "decay-01.svg", *charts}
+    page = files["measure.html"].decode()
+    assert "http://" not in page.replace("http://www.w3.org/2000/svg", "")
+    assert "<script" not in page
+    again = json.loads(CliRunner().invoke(app, ["measure", "c.toml", "--json"]).stdout)
+    assert again["levels"] == measured["level"]
+
+
+def test_a_second_run_replaces_its_own_files_only(tmp_path):
+    repeats(tmp_path, m=wave(300), e=wave(90), s=wave(40))
+    point = '[[unit.point]]\ndistance_mm = 5.0\nrecords = ["s0.wav", "s1.wav", "s2.wav"]\n'
+    out = tmp_path / "out"
+    measure_command.write(campaign(tmp_path, UNIT + point), out)
+    (out / "record-01-time.svg.bak").write_text("mine")
+    assert (out / "record-09-time.svg").exists()
+    measure_command.write(campaign(tmp_path, UNIT), out)
+    assert (out / "record-01-time.svg.bak").read_text() == "mine"
+    assert not (out / "record-07-time.svg").exists()
+
+
+def test_velocity_over_j_omega_is_displacement(tmp_path):
+    """The same motion as velocity in mm/s, as displacement in um, and as acceleration in m/s2, by construction."""
+    omega = 2 * math.pi * 123.0
+    rows = (("um", "displacement", 1.0), ("mm/s", "velocity", omega * 1e-3), ("m/s2", "acceleration", omega**2 * 1e-6))
+    amplitudes = {}
+    for unit, quantity, factor in rows:
+        for i in range(6):
+            size = (300.0 if i < 3 else 120.0) * (1 + 0.01 * i)
+            x = size * factor * (np.cos(omega * TIME[:1000] + i) + noise(0.01, i)[:1000])
+            text = "\n".join(f"{t:.4f},{v:.6e}" for t, v in zip(TIME, x, strict=False))
+            (tmp_path / f"{'m' if i < 3 else 'e'}{i % 3}.csv").write_text(f"time (s),u ({unit})\n{text}\n")
+        sensor = f'[sensor]\nquantity = "{quantity}"\nunit = "{unit}"\n'
+        result = campaign(tmp_path, UNIT.replace("wav", "csv"), sensor)
+        assert result.findings == ()
+        amplitudes[quantity] = [record.amplitude_um for record in result.records["a"]]
+    assert amplitudes["velocity"] == pytest.approx(amplitudes["displacement"], rel=1e-3)
+    assert amplitudes["acceleration"] == pytest.approx(amplitudes["displacement"], rel=1e-3)
+    assert amplitudes["displacement"][0] == pytest.approx(300.0, rel=2e-3)
+
+
+def test_a_motor_channel_gives_the_ratio_and_the_lag(tmp_path):
+    """Both channels wander together: their ratio is far better known than either amplitude's mean."""
+    for i in range(3):
+        motor = synthetic(Scenario("m", snr=100.0, wander=0.04, drift=0.01), np.random.default_rng(i), 250.0, 118.0).x
+        write(tmp_path / f"e{i}.wav", 0.35 * (1 + 0.01 * (i - 1)) * np.roll(motor, 1) + noise(seed=50 + i), motor)
+    result = campaign(tmp_path, PAIRED)
+    assert result.levels[0].level.value == pytest.approx(0.35, rel=2e-3)
+    assert result.records["a"][1].ratio == pytest.approx(0.35, rel=1e-3)
+    assert result.records["a"][1].lag_deg == pytest.approx(-360 * 118.0 / RATE, abs=0.4)
+
+
+def test_a_levels_interval_is_welchs():
+    """scipy's Welch test of the same logarithms."""
+    edge, motor = [41.0, 44.0, 40.5, 43.1], [101.0, 98.0, 105.0]
+    found = level(edge, motor)
+    welch = ttest_ind(np.log(edge), np.log(motor), equal_var=False).confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx((math.exp(welch.low), math.exp(welch.high)), rel=1e-9)
+    assert found.repeats == (4, 3)
+    pairs = level([a / b for a, b in zip(edge, motor, strict=False)])
+    paired = ttest_rel(np.log(edge[:3]), np.log(motor)).confidence_interval(0.95)
+    assert (pairs.low, pairs.high) == pytest.approx((math.exp(paired.low), math.exp(paired.high)), rel=1e-9)
+    assert level(edge, motor, shared=0.1).high > found.high
+
+
+def test_a_chain_is_one_module_and_one_entry(tmp_path, monkeypatch):
+    """A chain that reads the standard deviation: its name, gain, levels and refusals come with the entry."""
+    (tmp_path / "rms_chain.py").write_text(
+        "import numpy as np\n"
+        "from unitcad.lab.chains import Chain\n"
+        "def chain(table):\n"
+        "    broken = 'it is out of order' if table.q == 7 else ''\n"
+        "    rms = lambda x, rate, fit: float(np.sqrt(2) * np.std(x))\n"
+        "    return Chain('rms', rms, unfit=lambda fits: broken, gain=lambda hertz: 0.95)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    repeats(tmp_path, m=wave(300), e=wave(90))
+    use = BOTH.replace("bandpass", "rms")
+    with pytest.raises(Refusal, match="rms") as refused:
+        campaign(tmp_path, use + UNIT)
+    assert refused.value.field == "chain.use.1"
+    monkeypatch.setitem(CHAINS, "rms", "rms_chain:chain")
+    result = campaign(tmp_path, use + UNIT)
+    levels = {one.chain: one.level.value for one in result.levels}
+    assert levels["rms"] == pytest.approx(levels["line"], rel=1e-3)
+    assert result.records["a"][0].gains == {"rms": 0.95}
+    result = campaign(tmp_path, f"{use}q = 7.0\n{UNIT}")
+    assert [one.chain for one in result.levels] == ["line"]
+    assert {one.message for one in result.findings} == {"rms: it is out of order"}
+
+
+# Findings.
+
+
+def _faulty(code):
+    """Return samples and rate of a record with one fault; other lines than the motor's are allowed."""
+    if code == "L102":
+        return 100 * np.cos(2 * np.pi * 110 * np.arange(800) / 400), 400
+    if code in ("L105", "L106"):
+        return synthetic(Scenario("m", mains=(0, 0.02, 0)), np.random.default_rng(5), 100, 100.2).x, RATE
+    if code == "L108":
+        return wave(100, 120)[:300] + noise()[:300], RATE
+    return noise(0.001), RATE
+
+
+@pytest.mark.parametrize("code", ["L102", "L105", "L106", "L108", "L111"])
+def test_a_faulty_record_is_a_finding(code, tmp_path, monkeypatch):
+    x, rate = _faulty(code)
+    repeats(tmp_path, m=wave(300, 122))
+    names = "e" if code == "L108" else "me"
+    for i, name in enumerate(f"{letter}{k}" for letter in names for k in range(3)):
+        write(tmp_path / f"{name}.wav", x + 1e-4 * i, rate=rate)
+    (tmp_path / "c.toml").write_text(NAME + HEAD + (BOTH if code == "L106" else "") + UNIT)
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["measure", "c.toml", "-o", "out"])
+    assert done.exit_code == 1, done.output
+    findings = json.loads(Path("out/measure.json").read_text())["findings"]
+    assert code in {one["code"] for one in findings}, findings
+    levels = tomllib.loads(Path("out/measured.toml").read_text())["level"]
+    assert (levels == []) == (RULES[code].severity == "error")
+
+
+def test_an_uneven_time_axis_and_disagreeing_repeats(tmp_path):
+    time = TIME[:1000]
+    for i in range(7):
+        x = (300.0 + 0.1 * i if i < 3 or i == 6 else 100.0 * 1.4**i) * np.cos(2 * np.pi * 120 * time)
+        stamps = np.where(time > 0.3, time + 0.0032, time) if i == 0 else time
+        rows = "\n".join(f"{t:.5f}\t{v:.5f}" for t, v in zip(stamps, x, strict=True))
+        (tmp_path / f"{i}.txt").write_text(f"t (s)\tu (um)\n{rows}\n")
+    text = '[[unit]]\nname = "a"\nreference = ["0.txt", "1.txt", "2.txt"]\nedge = ["3.txt", "4.txt", "5.txt"]\n'
+    assert {("L103", "0.txt"), ("L112", "a, edge")} <= {
+        (f.code, f.where) for f in campaign(tmp_path, text, UM).findings
+    }
+    assert {one.code for one in campaign(tmp_path, text.replace('"0.txt"', '"6.txt"'), UM).findings} == {"L109"}
+
+
+MOTOR, RNG = wave(300), np.random.default_rng(9)
+
+
+@pytest.mark.parametrize(
+    ("code", "motor"),
+    [
+        ("L101", np.clip(MOTOR, -150, 150)),
+        ("L110", MOTOR + np.where(RNG.random(4000) < 0.2, RNG.choice([-900.0, 900.0], 4000), 0.0)),
+        ("L111", noise()),
+        ("L111", 0 * TIME),
+    ],
+)
+def test_a_bad_motor_channel_gives_no_level(tmp_path, code, motor):
+    for i in range(3):
+        write(tmp_path / f"e{i}.wav", wave(60 + i) + noise(seed=i), motor)
+    result = campaign(tmp_path, PAIRED)
+    assert result.levels == ()
+    found = {(one.code, one.severity) for one in result.findings if one.where == "e0.wav, motor"}
+    assert (code, "error") in found, result.findings
+
+
+def test_the_motors_range_is_its_sensors(tmp_path):
+    repeats(tmp_path, e=(wave(60), MOTOR))
+    sensor = f"{UM.replace('sensor', 'motor_sensor')}scale = 500.0\nfull_scale = 300.0\n"
+    found = {(one.code, one.where) for one in campaign(tmp_path, sensor + PAIRED).findings}
+    assert found == {*(("L101", f"e{i}.wav, motor") for i in range(3)), ("L112", "a, edge")}
+
+
+def test_two_motors_at_once_give_no_level(tmp_path):
+    """Each record names both lines, the strongest first, and shows no amplitude."""
+    repeats(tmp_path, e=wave(60, 118.0) + wave(90, 126.0), m=wave(300, 118.0) + wave(150, 126.0))
+    result = campaign(tmp_path, BOTH + UNIT)
+    assert result.levels == ()
+    said = {one.where: one.message for one in result.findings if one.code == "L104"}
+    assert said["m0.wav"] == "118.00 Hz, 126.00 Hz, of 1.00, 0.50 of the strongest; run one motor at a time"
+    assert said["e0.wav"] == "126.00 Hz, 118.00 Hz, of 1.00, 0.67 of the strongest; run one motor at a time"
+    data = measure_command.as_data(result)["records"]
+    assert [record["amplitude_um"] for record in data] == [None] * 6
+    shown = [text for text in measure_command.lines(result) if ".wav" in text]
+    assert all(text.endswith("not used, L104 several lines") for text in shown)
+
+
+def test_a_motor_below_the_band_is_not_measured_by_its_harmonic(tmp_path):
+    repeats(tmp_path, e=wave(90, 44.0) + wave(27, 88.0, 1), m=wave(300, 44.0) + wave(90, 88.0, 1))
+    result = campaign(tmp_path, UNIT)
+    assert result.levels == ()
+    outside = [one.message for one in result.findings if one.code == "L117"]
+    assert len(outside) == 6
+    assert "about 44 Hz" in outside[0]
+
+
+def test_a_record_that_is_not_used_is_shown_without_uncertainty(tmp_path):
+    repeats(tmp_path, m=wave(300), e=wave(90))
+    write(tmp_path / "e1.wav", np.clip(wave(90), -30, 30))
+    write(tmp_path / "e2.wav", np.where(TIME > 0.6, wave(90), 0.0) + noise())
+    result = campaign(tmp_path, UNIT)
+    lines = {text.split(", ")[2].split(": ")[0]: text for text in measure_command.lines(result)}
+    assert "not used" in lines["e1.wav"]
+    assert ("+-" in lines["e1.wav"], "+-" in lines["e0.wav"]) == (False, True)
+    data = {one["file"]: one for one in measure_command.as_data(result)["records"]}
+    assert (data["e1.wav"]["usable"], data["e1.wav"]["u_um"]) == (False, None)
+    page = measure_command.page(result, {})
+    row = page[page.index("<td>e1.wav") :].partition("</tr>")[0]
+    assert row.startswith("<td>e1.wav</td><td>no</td><td></td>")
+    used = f"{result.records['a'][5].steady_s:.3g}"
+    assert 1.0 < float(used) < 1.4
+    assert f"121.30 Hz over {used} s of 2 s" in lines["e2.wav"]
+    assert f"<td>{used} of 2</td>" in page
+
+
+def test_a_silent_record_has_a_page(tmp_path):
+    """A sensor that was off: zeros, which have no spectrum."""
+    repeats(tmp_path, m=wave(300), e=wave(90))
+    write(tmp_path / "e1.wav", 0 * TIME)
+    result = campaign(tmp_path, BOTH + UNIT)
+    assert ("L111", "e1.wav") in {(one.code, one.where) for one in result.findings}
+    assert "e1.wav: spectrum" in measure_command.charts_of(result)["record-05-spectrum.svg"]
+
+
+# Refusals.
+
+
+@pytest.mark.parametrize(
+    ("text", "field"),
+    [
+        ('[[unit]]\nname = "a"\nedge = ["x.csv"]\n', "unit.0.reference"),
+        ('[[unit]]\nname = "a"\nreference = ["x.csv"]\n', "unit.0.edge"),
+        ('[[unit]]\nname = "a"\nreference = ["w.csv"]\nedge = ["x.csv"]\nspecs = "e"\n', "unit.0.specs"),
+        ('[[unit]]\nname = "a"\nreference = ["w.csv"]\nedge = ["x.csv"]\n', "recording.rate_hz"),
+        ('[recording]\nrate_hz = 2000.0\n[[unit]]\nname = "a"\nreference = ["t.csv"]\nedge = ["x.csv"]\n',
+         "recording.channel"),
+        ('[recording]\ntime_column = 1\n[[unit]]\nname = "a"\nreference = ["n.csv"]\nedge = ["x.csv"]\n',
+         "recording.time_unit"),
+        ('[recording]\nrate_hz = 2000.0\n[[unit]]\nname = "a"\nreference = ["v.csv"]\nedge = ["x.csv"]\n',
+         "sensor.unit"),
+        ('[chain]\nband_hz = [200.0, 100.0]\n[[unit]]\nname = "a"\nreference = ["w.csv"]\nedge = ["x.csv"]\n',
+         "chain.band_hz"),
+    ],
+)  # fmt: skip
+def test_what_is_not_known_is_asked_for(text, field, tmp_path):
+    (tmp_path / "w.csv").write_text("u\n" + "1.5\n0.5\n" * 50)
+    (tmp_path / "x.csv").write_text("u\n" + "0.5\n1.5\n" * 50)
+    (tmp_path / "t.csv").write_text("u,v\n" + "0.5,2.5\n1.5,1.5\n" * 50)
+    (tmp_path / "n.csv").write_text("n,v\n" + "\n".join(f"{i}.5,{i % 7}.5" for i in range(99)) + "\n")
+    (tmp_path / "v.csv").write_text("u (V)\n" + "0.5\n1.5\n" * 50)
+    with pytest.raises(Refusal) as refused:
+        campaign(tmp_path, text, UM)
+    assert refused.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "nearest"),
+    [
+        ('"e1.wav"', '"./e0.wav"', "unit.0.edge.1", None),
+        ('"e1.wav"', '"copy.wav"', "unit.0.edge.1", None),
+        ('"e1.wav"', '"gone.wav"', "unit.0.edge.1", None),
+        ('"e1.wav"', '"x.svd"', "unit.0.edge.1", None),
+        ('"e1.wav"', '"x.odd"', "unit.0.edge.1", None),
+        ('name = "a"', 'name = "a"\nspec = "encapsulatign"', "unit.0.spec", "encapsulating"),
+        ('name = "a"', 'name = "a"\nspec = "gone.toml"', "unit.0.spec", None),
+        ("[[unit]]", '[chain]\nuse = ["line", "line"]\n[[unit]]', "chain.use", ["line"]),
+        ("[[unit]]", '[motor_sensor]\nquantity = "velocity"\nunit = "um"\n[[unit]]', "motor_sensor.unit", None),
+    ],
+)
+def test_what_a_campaign_names_is_checked_first(tmp_path, monkeypatch, old, new, field, nearest):
+    repeats(tmp_path, m=wave(300), e=wave(90))
+    shutil.copy(tmp_path / "e0.wav", tmp_path / "copy.wav")
+    for name in ("x.svd", "x.odd"):
+        (tmp_path / name).write_bytes(b"x")
+    monkeypatch.setattr(measuring, "measure_record", lambda *_: pytest.fail("a record was measured"))
+    with pytest.raises(Refusal) as refused:
+        campaign(tmp_path, UNIT.replace(old, new))
+    assert refused.value.field == field
+    if nearest is not None:
+        assert refused.value.nearest == nearest
+
+
+@pytest.mark.parametrize(("rate", "accepted"), [(2001.0, True), (2010.0, False)])
+@pytest.mark.parametrize("ending", ["wav", "csv"])
+def test_a_rate_that_the_file_contradicts_is_refused(tmp_path, rate, accepted, ending):
+    repeats(tmp_path, m=wave(300), e=wave(90))
+    for file in list(tmp_path.glob("*.wav")) if ending == "csv" else ():
+        rows = "\n".join(f"{i / 2000:.4f},{value:.6f}" for i, value in enumerate(wavfile.read(file)[1][:1000]))
+        file.with_suffix(".csv").write_text(f"time (s),u\n{rows}\n")
+    text = f"[recording]\nrate_hz = {rate}\n" + ('channel = "u"\n' if ending == "csv" else "")
+    if accepted:
+        assert campaign(tmp_path, text + UNIT.replace("wav", ending)).levels
+        return
+    with pytest.raises(Refusal) as refused:
+        campaign(tmp_path, text + UNIT.replace("wav", ending))
+    assert refused.value.field == "recording.rate_hz"
+    assert refused.value.nearest == pytest.approx(2000.0, rel=1e-6)
+
+
+# Records of two loggers.
+
+
+@pytest.fixture
+def loggers(tmp_path):
+    """Motor records of one logger, MATLAB at 5 kHz; the edge's of another, text with times, at 2 kHz."""
+    for i in range(3):
+        time = np.arange(5000) / 5000
+        motor = 200 * np.sin(2 * np.pi * 123.0 * time) + np.random.default_rng(i).standard_normal(5000)
+        savemat(tmp_path / f"m{i}.mat", {"disp": motor[:, None], "temperature": np.zeros((5000, 1))})
+        rows = [f"{1e3 * t:.2f},{v:.4f},0" for t, v in zip(TIME[:2000], wave(50, 123.0) + noise(seed=i), strict=False)]
+        (tmp_path / f"e{i}.csv").write_text("\n".join(["clock,laser (um),spare", *rows]))
+    return tmp_path
+
+
+LOGGERS = '[[unit]]\nname = "a"\nreference = ["m0.mat", "m1.mat", "m2.mat"]\nedge = ["e0.csv", "e1.csv", "e2.csv"]\n'
+BASE = '[recording]\ntime_column = "clock"\ntime_unit = "ms"\nchannel = "laser"\n'
+OVERRIDE = '[[recording.override]]\nrecords = ["m*.mat"]\nrate_hz = 5000\nchannel = "disp"\n'
+
+
+def test_records_of_two_loggers_are_one_campaign(loggers):
+    write(loggers / "off.wav", 0 * TIME, wave(3, 50))
+    off = '[[recording.override]]\nrecords = ["off.wav"]\nchannel = 2\nrate_hz = 2000\n'
+    text = BASE + OVERRIDE + off + '[blank]\nrecords = ["off.wav"]\n' + LOGGERS
+    result = campaign(loggers, text, HEAD.replace("500.0", "1.0"))
+    assert result.levels[0].level.value == pytest.approx(0.25, rel=0.005)
+    assert result.levels[0].frequency_hz == pytest.approx(123.0, abs=0.01)
+    rates = {record.file: record.rate_hz for record in result.records["a"]}
+    assert (rates["m1.mat"], rates["e1.csv"]) == pytest.approx((5000, 2000))
+    assert dict(result.mains)[1] == pytest.approx(3.0 / FULL, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("own", "field", "nearest"),
+    [
+        ('records = ["m?.mta"]\nrate_hz = 5000\n', "recording.override.0.records.0", "m2.mat"),
+        ('records = ["m1.mat"]\n', "recording.override.0", None),
+        ("records = []\nrate_hz = 5000\n", "recording.override.0.records", None),
+        ('records = ["m*.mat"]\nmotor_channel = 2\n', "recording.override.0.motor_channel", None),
+        (OVERRIDE[23:] + OVERRIDE.replace("*", "1"), "recording.override.1.records.0", None),
+        ('records = ["m*.mat"]\nrate_hz = 5000\nchannel = "dsp"\n', "recording.override.0.channel", "disp"),
+    ],
+)
+def test_an_override_that_can_not_be_meant_is_refused(loggers, own, field, nearest):
+    with pytest.raises(Refusal) as refusal:
+        campaign(loggers, f"{BASE}[[recording.override]]\n{own}{LOGGERS}", UM)
+    assert (refusal.value.field, refusal.value.nearest) == (field, nearest)
+
+
+# Units between columns, files and records.
+
+LEVEL = 0.4
+
+
+def measured(folder, sensor, motor, edge, paired=True):
+    """Measure three records; `motor` and `edge` have a channel's unit in the file, and the size of a unit in it."""
+    time = TIME[:1000]
+    for i in range(3):
+        columns = {}
+        for name, (unit, size), part in (("m", motor, 1.0), ("e", edge, LEVEL)):
+            columns[f"{name} ({unit})" if unit else name] = size * part * np.cos(2 * np.pi * 125.3 * time + i)
+        files = {"r": columns} if paired else {key[0]: {key: x} for key, x in columns.items()}
+        for stem, own in files.items():
+            rows = (",".join(f"{value:.9g}" for value in row) for row in zip(time, *own.values(), strict=True))
+            (folder / f"{stem}{i}.csv").write_text("\n".join([",".join(["Time (s)", *own]), *rows]) + "\n")
+    names = {key: [f"{key}{i}.csv" for i in range(3)] for key in "rem"}
+    keys = f"edge = {names['r']}" if paired else f"reference = {names['m']}\nedge = {names['e']}"
+    channels = '[recording]\nchannel = "e"\nmotor_channel = "m"\n' if paired else ""
+    return campaign(folder, f'{channels}[[unit]]\nname = "u"\n{keys}\n', sensor)
+
+
+def sensor(quantity, unit, more="", table="sensor"):
+    return f'[{table}]\nquantity = "{quantity}"\nunit = "{unit}"\n{more}'
+
+
+VELOCITY, VOLTS = sensor("velocity", "mm/s"), sensor("velocity", "mm/s", 'scale = 50.0\nper = "V"\n')
+MOTION = [
+    (VELOCITY, ("mm/s", 1.0), ("um/s", 1000.0)),
+    (sensor("acceleration", "m/s2"), ("g", 1 / 9.80665), ("m/s^2", 1.0)),
+    (sensor("displacement", "um"), ("mm", 0.001), ("µm", 1.0)),
+    (VOLTS, ("V", 1.0), ("mV", 1000.0)),
+    (VOLTS, ("uV", 1e6), ("Volt", 1.0)),
+    (VOLTS, ("", 1.0), ("mV", 1000.0)),
+    (sensor("velocity", "mm/s", 'scale = 3.0\nper = "mm/s"\n'), ("um/s", 1000.0), ("mm/s", 1.0)),
+]
+
+
+@pytest.mark.parametrize("paired", [True, False])
+@pytest.mark.parametrize(("table", "motor", "edge"), MOTION)
+def test_units_that_a_file_states_are_converted(tmp_path, table, motor, edge, paired):
+    result = measured(tmp_path, table, motor, edge, paired)
+    assert result.levels[0].level.value == pytest.approx(LEVEL, rel=1e-4)
+
+
+def test_a_scale_is_per_its_own_unit(tmp_path):
+    """50 mm/s per mV at 125.3 Hz, in the motor's sensor too."""
+    table = sensor("velocity", "mm/s", 'scale = 50.0\nper = "mV"\n')
+    result = measured(tmp_path, table, ("mV", 1.0), ("V", 1e-3), paired=False)
+    (motor,) = {round(one.amplitude_um, 1) for one in result.records["u"] if one.role == "reference"}
+    assert motor == pytest.approx(50e3 / (2 * np.pi * 125.3), rel=1e-3)
+
+
+@pytest.mark.parametrize("paired", [True, False])
+@pytest.mark.parametrize(
+    ("table", "motor", "edge", "field", "words"),
+    [
+        (sensor("velocity", "mm/s", "scale = 50.0\n"), "V", "mV", "sensor.per", ("mV", "V")),
+        (sensor("velocity", "mm/s", "scale = 50.0\n"), "V", "", "sensor.per", ("V", "no unit")),
+        (sensor("velocity", "mm/s", "scale = 50.0\n"), "mA", "V", "sensor.per", ("mA", "V")),
+        (sensor("velocity", "mm/s", "scale = 2.0\n"), "mm/s", "um/s", "sensor.scale", ("needs no scale",)),
+        (VELOCITY, "um/s", "", "sensor.per", ("um/s", "no unit")),
+        (VELOCITY, "um", "mm/s", "sensor.unit", ("um",)),
+        (VELOCITY, "V", "V", "sensor.unit", ("V", "sensor.scale")),
+        (VOLTS, "mm/s", "V", "sensor.per", ("mm/s", "'V'")),
+    ],
+)
+def test_units_that_nobody_can_convert_are_refused(tmp_path, table, motor, edge, field, words, paired):
+    with pytest.raises(Refusal) as refused:
+        measured(tmp_path, table, (motor, 1.0), (edge, 1.0), paired)
+    assert refused.value.field == field
+    assert all(word in str(refused.value) for word in words), str(refused.value)
+
+
+def test_two_sensors_may_have_two_units(tmp_path):
+    tables = sensor("velocity", "mm/s", "scale = 50.0\n") + sensor("displacement", "um", table="motor_sensor")
+    size = 1e3 / (2 * np.pi * 125.3)  # um of 1 mm/s
+    result = measured(tmp_path, tables, ("nm", 1e3 * size), ("V", 1 / 50), paired=False)
+    assert result.levels[0].level.value == pytest.approx(LEVEL, rel=1e-4)

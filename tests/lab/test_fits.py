@@ -1,0 +1,654 @@
+"""`unitcad fit`: its file and results, cast records in it, the shrunk fits, and a fit in `estimate` and `build`."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from recordings import RATE
+from scipy import stats
+from scipy.io import wavfile
+from typer.testing import CliRunner
+
+from unitcad.attenuation.edge.closed_form import crossings, published_path
+from unitcad.attenuation.edge.measured import measured_table, nominal
+from unitcad.attenuation.edge.models import COMPARED, assess_all, stored
+from unitcad.attenuation.edge.ranges import predictive, predictive_of, unit_key
+from unitcad.cli import app
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.estimate_inputs import estimate_input, estimate_spec, fit_of, frequency_table_of_spec
+from unitcad.files import sha256
+from unitcad.lab.campaign import check_files, read_campaign
+from unitcad.lab.fit_command import contents, fit_toml
+from unitcad.lab.fitting import fit_lab, load_fit_lab
+from unitcad.lab.shrunk_fit import Campaigns, gradients, judge, paired, shrunk
+from unitcad.spec import spec_hash, to_data
+from unitcad.validation import load
+
+UNITS = [
+    {"name": "a", "spec": "embedded", "level": {"value": 0.11, "low": 0.1, "high": 0.12}},
+    {"name": "b", "spec": "encapsulating", "frequency_hz": 110.0, "level": {"value": 0.06}},
+]
+
+
+def _written(folder, **changes):
+    data = {"name": "bench", "unit": UNITS, **changes}
+    path = folder / "lab.toml"
+    path.write_text(tomli_w.dumps({key: value for key, value in data.items() if value is not None}))
+    return str(path)
+
+
+def test_the_shipped_lab_says_that_it_is_synthetic_and_gives_the_same_bytes():
+    lab = load_fit_lab("synthetic-bench")
+    assert "Synthetic" in lab.settings.note
+    made = contents(fit_lab(lab))
+    assert made == contents(fit_lab(lab))
+    fit = tomllib.loads(made["lab-fit.toml"])
+    assert fit["units"] == 3
+    assert set(fit["model"]) == set(COMPARED)
+    assert fit["leads"] == "rule"
+    assert "baseline" in made["fit.md"]
+    assert "Synthetic" in made["fit.md"]
+    data = json.loads(made["fit.json"])
+    assert len(data["units"]) == 12
+    assert set(data["by_moduli"]) == {"small-strain", "quasi-static", "data sheet"}
+
+
+def test_the_units_on_which_the_models_differ_most_come_first():
+    """The levels of each unit of the lab are those of a fit without it, whose own constants the model has."""
+    lab = load_fit_lab("synthetic-bench")
+    result = fit_lab(lab)
+    rows = json.loads(contents(result)["fit.json"])["models_differ_on"]
+    assert {row["unit"] for row in rows} == {unit.name for unit in lab.units}
+    assert [row["factor"] for row in rows] == sorted((row["factor"] for row in rows), reverse=True)
+    row = rows[0]
+    assert set(row["levels"]) == set(COMPARED) - {"baseline"}
+    assert row["factor"] == pytest.approx(max(row["levels"].values()) / min(row["levels"].values()), rel=1e-5)
+    unit = next(unit for unit in lab.units if unit.name == row["unit"])
+    others = replace(lab, units=tuple(other for other in lab.units if other is not unit))
+    without = fit_lab(others).fit.model["crossings"].constants["s"]
+    path = crossings(nominal(estimate_input(unit.spec, unit.frequency_hz)))
+    assert row["levels"]["crossings"] == pytest.approx(without * float(path[0]), rel=1e-4)
+    page = contents(result)["fit.md"]
+    assert f"| {rows[0]['unit']} |" in page.partition("## Units on which the models differ most")[2]
+
+
+def test_levels_come_from_a_file_of_measure(tmp_path):
+    level = {"distance_mm": 0.0, "value": 0.2, "low": 0.18, "high": 0.22, "frequency_hz": 131.5}
+    rows = [
+        {"unit": "b", "spec": "campaign/u.toml", "chain": "line", **level},
+        {"unit": "b", "chain": "bandpass", **level, "value": 0.3},
+        {"unit": "b", "chain": "line", **level, "distance_mm": 5.0, "value": 0.1},
+    ]
+    (tmp_path / "u.toml").write_text(Path("templates/embedded.toml").read_text())
+    sha = hashlib.sha256((tmp_path / "u.toml").read_bytes()).hexdigest()
+    measured = {
+        "status": "measured",
+        "chain": "line",
+        "level": rows,
+        "source": [{"file": "campaign/u.toml", "sha256": sha}],  # as the campaign's file names it
+    }
+    (tmp_path / "measured.toml").write_text(tomli_w.dumps(measured))
+    units = [UNITS[0], {"name": "b", "spec": "u.toml", "measured": "measured.toml"}]
+    lab = load_fit_lab(_written(tmp_path, unit=units))
+    assert lab.units[1].level.value == 0.2
+    assert lab.units[1].frequency_hz == 131.5
+    assert {one.file for one in lab.inputs} == {"lab.toml", "u.toml", "measured.toml"}
+    units[1] = {**units[1], "spec": "encapsulating"}
+    measured["level"][0]["spec"] = "embedded"
+    (tmp_path / "measured.toml").write_text(tomli_w.dumps(measured))
+    with pytest.raises(Refusal, match="measured of the template embedded, not encapsulating"):
+        load_fit_lab(_written(tmp_path, unit=units))
+    (tmp_path / "measured.toml").write_bytes(b"")
+    units[1] = {**units[1], "name": "c"}
+    with pytest.raises(UnitcadError):
+        load_fit_lab(_written(tmp_path, unit=units))
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"unit": []}, "unit"),
+        ({"unit": [UNITS[0], UNITS[0]]}, "unit.1.name"),
+        ({"unit": [{"name": "a", "spec": "embedded"}]}, "unit.0.level"),
+        ({"unit": [{**UNITS[0], "measured": "m.toml"}]}, "unit.0.level"),
+        ({"unit": [{"name": "a", "spec": "embedded", "measured": "m.toml"}]}, "unit.0.measured"),
+        ({"unit": [{**UNITS[0], "spec": "embeded"}]}, "unit.0.spec"),
+        ({"unit": [{**UNITS[0], "set": {"layers.0.wall_mm": -1}}]}, "unit.0.layers.0.wall_mm"),
+        ({"unit": [{**UNITS[0], "level": {"value": 0.2, "low": 0.3, "high": 0.4}}]}, "unit.0.level.value"),
+        ({"unit": [{**UNITS[0], "level": {"value": 0.2, "low": 0.1}}]}, "unit.0.level.high"),
+        ({"unit": [{**UNITS[0], "level": {"value": -0.2}}]}, "unit.0.level.value"),
+        ({"unit": [{**UNITS[0], "frequency_hz": 0.1}]}, "unit.0.frequency_hz"),
+        ({"include_paper_units": False}, "unit"),
+        ({"moduli": "static"}, "moduli"),
+        ({"between_labs": -1.0}, "between_labs"),
+        ({"levels": 3}, "levels"),
+    ],
+)
+def test_what_is_refused(tmp_path, changes, field):
+    with pytest.raises(Refusal) as refused:
+        fit_lab(load_fit_lab(_written(tmp_path, **changes)))
+    assert refused.value.field.startswith(field)
+
+
+def test_a_silicone_without_a_modulus_leaves_that_source_out(tmp_path):
+    """Nobody measured Ecoflex 00-50 at the motor's frequency; its tensile test and data sheet stand."""
+    units = [*UNITS, {**UNITS[0], "name": "c", "set": {"layers.0.material": "ecoflex-00-50"}}]
+    with pytest.raises(Refusal, match="no modulus is known"):
+        fit_lab(load_fit_lab(_written(tmp_path, unit=units)))
+    made = fit_lab(load_fit_lab(_written(tmp_path, unit=units, moduli="quasi-static")))
+    assert made.by_source["small-strain"].reason.startswith("unit.2.layers.0")
+    assert made.fit.moduli == "quasi-static"
+    assert "ecoflex-00-50" in contents(made)["fit.md"]
+
+
+def test_the_command_writes_four_files_and_prints_the_null(tmp_path):
+    out = tmp_path / "fit"
+    done = CliRunner().invoke(app, ["fit", _written(tmp_path), "-o", str(out)])
+    assert done.exit_code == 0, done.output
+    assert "baseline" in done.output
+    assert "rule leads" in done.output
+    assert done.output.strip().splitlines()[-1] == str(out)
+    assert sorted(file.name for file in out.iterdir()) == ["fit.json", "fit.md", "fit.svg", "lab-fit.toml"]
+    shown = CliRunner().invoke(app, ["fit", _written(tmp_path), "--json"])
+    assert json.loads(shown.output)["fit"] == tomllib.loads((out / "lab-fit.toml").read_text())
+
+
+def test_units_that_do_not_determine_q_are_named(tmp_path):
+    """Controls alone: nothing states a softer inside does, and the fit says so."""
+    names = ("ecoflex-00-10", "dragon-skin-30")
+    units = [
+        {
+            "name": f"u{i}{j}",
+            "spec": "single-embedded",
+            "set": {"layers.0.material": names[i]},
+            "level": {"value": 0.4 + 0.03 * (i + 2 * j)},
+        }
+        for i in (0, 1)
+        for j in range(3)
+    ]
+    result = fit_lab(load_fit_lab(_written(tmp_path, unit=units, include_paper_units=False)))
+    assert result.fit.model["rule"].at_bound == "q"
+    assert result.fit.model["rule"].constants["q"] == 1.0
+    assert "rule: the units do not determine q" in contents(result)["fit.md"]
+
+
+def thick(folder, scatter):
+    """Write a lab of eight made-up units whose level falls with the wall, as the published model has it."""
+    rng = np.random.default_rng(3)
+    own = {"like": "ecoflex-00-10", "youngs_modulus_kpa": 15, "loss_factor": 1.0}
+    units = []
+    for i, wall in enumerate((1.0, 1.5, 2.5, 4.0, 6.0, 8.0, 10.0, 12.0)):
+        changes = {"layers.0.material": "lossy", "layers.0.wall_mm": wall, "diameter_mm": 45.0}
+        spec = load("embedded", {"materials.lossy": own, **changes})
+        level = 0.2 * float(published_path(nominal(estimate_input(spec)))[0]) * np.exp(scatter * rng.normal())
+        units.append({"name": f"u{i}", "spec": "embedded", "set": changes, "level": {"value": level}})
+    return _written(folder, unit=units, materials={"lossy": own})
+
+
+def test_a_lab_where_thickness_matters_overturns_the_rule(tmp_path):
+    """By the written rule: told apart from rule and baseline on the lab's own units, each left out."""
+    result = fit_lab(load_fit_lab(thick(tmp_path, 0.05)))
+    assert result.fit.leads == "published"
+    judged = {name: np.abs(one.errors[one.own]) for name, one in result.chosen.judged.items()}
+    for other in ("rule", "baseline"):
+        assert judged["published"].mean() < judged[other].mean()
+        assert stats.wilcoxon(judged["published"], judged[other]).pvalue < 0.05
+    assert result.chosen.order[0] == "published"
+    assert "published leads: x " in contents(result)["fit.md"]
+    (tmp_path / "lab-fit.toml").write_text(contents(result)["lab-fit.toml"])
+    lossy = {"materials.lossy": {"like": "ecoflex-00-10", "youngs_modulus_kpa": 15, "loss_factor": 1.0}}
+    common = {
+        **lossy,
+        "layers.0.material": "lossy",
+        "diameter_mm": 45.0,
+        "estimate.fit": str(tmp_path / "lab-fit.toml"),
+    }
+    thin, wide = (
+        estimate_spec(load("embedded", {**common, "layers.0.wall_mm": wall}))["answer"] for wall in (2.0, 9.0)
+    )
+    assert thin["model"] == "published"
+    assert thin["level"] > 1.5 * wide["level"]
+    assert "By published fitted to 8 units of bench and the paper's nine." in thin["lines"][0]
+
+
+def test_a_lab_whose_units_scatter_about_the_rule_keeps_it(tmp_path):
+    assert fit_lab(load_fit_lab(thick(tmp_path, 0.8))).fit.leads == "rule"
+
+
+def test_a_lab_s_own_units_draw_the_range_of_their_neighbours(tmp_path):
+    """The residual of the lab's unit enters at its own lengths; at others the range is wider."""
+    fit = fit_lab(load_fit_lab(_written(tmp_path))).fit
+    at, near, far = (
+        predictive_of([estimate_input(load("embedded", {"diameter_mm": d}))], fit) for d in (14.0, 15.0, 60.0)
+    )
+    model = COMPARED["rule"]
+    own = np.array(list(fit.model["rule"].constants.values()))
+    plain = float(model.logs(nominal(estimate_input(load("embedded"))), own)[0])
+    residual = np.log(0.11) - plain
+    assert fit.measured[0].residual == pytest.approx(residual, abs=1e-5)
+    assert at.centre[0] == pytest.approx(plain + 0.5 * residual, abs=1e-3)
+    assert abs(far.centre[0] - plain) < abs(near.centre[0] - plain) < abs(at.centre[0] - plain)
+    assert at.below[0] < near.below[0] < far.below[0]
+
+
+def one_kind(folder):
+    """Write a lab of eight made-up units of one design and one pair of silicones, which differ in the walls."""
+    units = []
+    for i, wall in enumerate(np.linspace(1.0, 4.0, 8)):
+        changes = {"layers.0.wall_mm": wall, "layers.1.wall_mm": wall, "diameter_mm": 9.0 + 4 * wall}
+        units.append({"name": f"u{i}", "spec": "embedded", "set": changes, "level": {"value": 0.2 / wall}})
+    return _written(folder, unit=units, include_paper_units=False)
+
+
+def test_a_lab_of_one_kind_of_unit_gives_a_fit_that_is_taken(tmp_path):
+    """No unit tells s from q: that is said. The lab's own measurement leads, and the paper's is in the details only."""
+    made = contents(fit_lab(load_fit_lab(one_kind(tmp_path))))
+    assert "rule: the units do not determine q" in made["fit.md"]
+    (tmp_path / "lab-fit.toml").write_text(made["lab-fit.toml"])
+    fit = {"estimate.fit": str(tmp_path / "lab-fit.toml")}
+    assert estimate_spec(load("embedded", {**fit, "diameter_mm": 13.0}))["answer"]["nearest"]["unit"] == "u1"
+    found = estimate_spec(load("embedded", fit))["answer"]
+    assert found["measured"] == []
+    assert found["level"] == found["p50"] != 0.156
+    assert found["highest"] == pytest.approx(0.2)
+    assert "The paper measured 16 % for this unit, in its own lab." in found["details"]
+    own = estimate_spec(load("embedded", {**fit, "layers.0.wall_mm": 1, "layers.1.wall_mm": 1, "diameter_mm": 13}))
+    assert own["answer"]["lines"][0].startswith("20 % of the motor's amplitude at the edge (measured on u0).")
+
+
+WALLS = {1: (1.38, 1.42, 1.40), 2: (1.11, 1.09)}
+CAST = "u.cast.json"
+
+
+def cast_record(folder, change=lambda data: None):
+    """Write a cast record: unit 1 without walls, unit 2 with the walls above, unit 3 not usable."""
+    spec = load("encapsulating")
+    walls = [{"layer": layer, "places_mm": list(places)} for layer, places in WALLS.items()]
+    data = {
+        "format": "unitcad cast record",
+        "version": 1,
+        "spec_name": spec.name,
+        "spec_hash": spec_hash(spec)[:12],
+        "spec": to_data(spec),
+        "cast_on": "2026-03-14",
+        "pours": [{"index": 1, "material": "ecoflex-00-10", "part_a_g": 10.0}],
+        "units": [{"cavity": 1}, {"cavity": 2, "walls": walls}, {"cavity": 3, "usable": False}],
+    }
+    change(data)
+    (folder / CAST).write_text(json.dumps(data))
+    return folder / CAST
+
+
+def cast_fit_file(folder, **unit):
+    level = {} if "measured" in unit else {"level": {"value": 0.06, "low": 0.055, "high": 0.065}}
+    data = {"name": "bench", "unit": [{"name": "b", "cast": CAST, **level, **unit}]}
+    path = folder / "lab.toml"
+    path.write_text(tomli_w.dumps({**data, "unit": [{k: v for k, v in data["unit"][0].items() if v is not None}]}))
+    return str(path)
+
+
+def test_measured_walls_stand_in_for_the_spec_s(tmp_path):
+    """The fit computes the unit with the walls that it has, and knows it by the spec that was asked for."""
+    cast_record(tmp_path)
+    lab = load_fit_lab(cast_fit_file(tmp_path, cavity=2))
+    one = lab.units[0]
+    assert [layer.wall_mm for layer in one.built.layers] == pytest.approx([1.40, 1.10])
+    assert [layer.wall_mm for layer in one.spec.layers] == [1.25, 1.25]
+    assert {file.file: file.sha256 for file in lab.inputs}[CAST] == sha256(tmp_path / CAST)
+    fit = fit_lab(lab).fit
+    walls = ["layers.0.wall_mm=1.4", "layers.1.wall_mm=1.1"]
+    own = 0.06 / float(published_path(nominal(estimate_input(load("encapsulating", walls))))[0])
+    weight = 1 / (1 + (one.error / fit.model["published"].model_error) ** 2)
+    stored, found = fit.model["published"].stored["s"], fit.model["published"].constants["s"]
+    assert np.log(found) == pytest.approx((0.9 * np.log(stored) + weight * np.log(own)) / (0.9 + weight), abs=2e-3)
+    assert fit.measured[0].key == unit_key(estimate_input(load("encapsulating")))
+    assert fit.measured[0].source == "as typed, walls as measured, 1.4, 1.1 mm"
+
+
+@pytest.mark.parametrize(
+    ("unit", "change", "field", "part"),
+    [
+        ({}, None, "unit.0.cavity", "is required: u.cast.json has the cavities 1, 2, 3"),
+        ({"cavity": 9}, None, "unit.0.cavity", "has no such unit; it has 1, 2, 3; nearest accepted: 2"),
+        ({"cavity": 3}, None, "unit.0.cavity", "not usable"),
+        ({"cavity": 2, "cast": "gone.cast.json"}, None, "unit.0.cast", "no such file"),
+        ({"cavity": 2, "spec": "encapsulating"}, None, "unit.0.cast", "excludes spec"),
+        ({"cavity": 2, "cast": None, "spec": "encapsulating"}, None, "unit.0.cavity", "there is no cast"),
+        ({"cast": None}, None, "unit.0.spec", "is required, or cast"),
+        ({"cavity": 2, "set": {"layers.0.wall_mm": 1.0}}, None, "unit.0.set", "the record has the spec that was cast"),
+        ({"cavity": 2}, lambda d: d.update(version=2), "unit.0.cast", "version = 2: must be at most 1"),
+        ({"cavity": 2}, lambda d: d.pop("spec"), "unit.0.cast", "spec: is required here"),
+        ({"cavity": 2}, lambda d: d["spec"].update(diameter_mm=3), "unit.0.cast", "diameter_mm"),
+        ({"cavity": 2}, lambda d: d["units"][1]["walls"][0].update(layer=3), "unit.0.cast", "the spec has 2 layers"),
+        ({"cavity": 2}, lambda d: d["pours"][0].update(material="ecoflex-00-30"), "unit.0.cast", "has ecoflex-00-10"),
+    ],
+)  # fmt: skip
+def test_a_cast_record_that_can_not_be_meant_is_refused(unit, change, field, part, tmp_path):
+    cast_record(tmp_path, change or (lambda data: None))
+    with pytest.raises(Refusal) as refused:
+        load_fit_lab(cast_fit_file(tmp_path, **unit))
+    assert refused.value.field == field
+    assert part in str(refused.value)
+
+
+def _campaign(folder, unit):
+    rng = np.random.default_rng(5)
+    time = np.arange(4000) / RATE
+    names = {kind: [f"{kind}-{i}.wav" for i in range(3)] for kind in ("motor", "edge")}
+    for kind, amplitude in (("motor", 0.5), ("edge", 0.05)):
+        for name in names[kind]:
+            line = amplitude * np.sin(2 * np.pi * 122.0 * time) + 1e-4 * rng.standard_normal(len(time))
+            wavfile.write(folder / name, int(RATE), line.astype(np.float32))
+    sensor = '[sensor]\nquantity = "displacement"\nunit = "um"\nscale = 500.0\n'
+    records = f"reference = {names['motor']}\nedge = {names['edge']}\n"
+    (folder / "c.toml").write_text(f'name = "c"\n{sensor}[[unit]]\nname = "b"\n{unit}\n{records}')
+    return folder / "c.toml"
+
+
+def test_a_campaign_s_unit_goes_into_a_fit_by_its_cast_record(tmp_path):
+    cast_record(tmp_path)
+    campaign = _campaign(tmp_path, f'cast = "{CAST}"\ncavity = 2')
+    done = CliRunner().invoke(app, ["measure", str(campaign), "-o", str(tmp_path / "m")])
+    assert done.exit_code == 0, done.output
+    measured = tomllib.loads((tmp_path / "m" / "measured.toml").read_text())
+    assert (measured["level"][0]["cast"], measured["level"][0]["cavity"]) == (CAST, 2)
+    assert {"file": CAST, "sha256": sha256(tmp_path / CAST)} in measured["source"]
+    lab = load_fit_lab(cast_fit_file(tmp_path, cavity=2, measured="m/measured.toml"))
+    assert lab.units[0].level.value == pytest.approx(0.1, rel=0.01)
+    assert lab.units[0].source == "m/measured.toml, chain line, walls as measured, 1.4, 1.1 mm"
+    with pytest.raises(Refusal, match="measured of cavity 2, not 1"):
+        load_fit_lab(cast_fit_file(tmp_path, cavity=1, measured="m/measured.toml"))
+    cast_record(tmp_path, lambda data: data.update(cast_on="2026-03-15"))
+    with pytest.raises(Refusal, match="SHA-256 differs"):
+        load_fit_lab(cast_fit_file(tmp_path, cavity=2, measured="m/measured.toml"))
+
+
+@pytest.mark.parametrize(
+    ("unit", "field", "part"),
+    [
+        (f'cast = "{CAST}"', "unit.0.cavity", "is required"),
+        (f'cast = "{CAST}"\ncavity = 3', "unit.0.cavity", "not usable"),
+        ('cast = "c.toml"', "unit.0.cast", "JSON"),
+        ('spec = "encapsulating"\ncavity = 1', "unit.0.cavity", "there is no cast"),
+        (f'spec = "encapsulating"\ncast = "{CAST}"', "unit.0.cast", "excludes spec"),
+    ],
+)
+def test_a_campaign_checks_the_record_before_it_measures(unit, field, part, tmp_path):
+    cast_record(tmp_path)
+    campaign = _campaign(tmp_path, unit)
+    with pytest.raises(Refusal) as refused:
+        check_files(read_campaign(campaign), tmp_path)
+    assert refused.value.field == field
+    assert part in str(refused.value)
+
+
+TABLE = measured_table()
+MODELS = COMPARED
+
+
+def logs_of(model, table, constants):
+    return table.mean(lambda units: model.logs(units, constants))
+
+
+def constants_of(model, table, weights):
+    return model.fit(table, weights[None])[0]
+
+
+def _picked_units(indices, logs):
+    def pick(values):
+        return tuple(values[i] for i in indices)
+
+    return replace(
+        TABLE,
+        names=pick(TABLE.names),
+        designs=pick(TABLE.designs),
+        layers=pick(TABLE.layers),
+        levels=np.exp(logs),
+        inputs=pick(TABLE.inputs),
+    )
+
+
+def _campaigns(own, rng, between, errors=0.0):
+    indices = [*range(9), *own]
+    table = _picked_units(indices, rng.normal(-1.0, 0.7, len(indices)))
+    ours = np.arange(len(indices)) >= 9
+    return Campaigns(table, ours, np.where(ours, errors, 0.0), between)
+
+
+@pytest.mark.parametrize("name", ["crossings", "published", "rule", "baseline"])
+@pytest.mark.parametrize("between", [0.3, 1.0, 4.0])
+@pytest.mark.parametrize("for_lab", [True, False])
+def test_a_linear_model_is_generalised_least_squares(name, between, for_lab):
+    """The lab's constants are the paper's plus a normal step: one covariance matrix over all units, no prior's weight.
+
+    The step's covariance is n between^2 (J'J)^-1 of the other campaign, and its mean is flat.
+    """
+    model = MODELS[name]
+    campaigns = _campaigns([3, 5, 7, 1], np.random.default_rng(8), between)
+    table, here = campaigns.table, campaigns.own == for_lab
+    found = shrunk(model, campaigns, for_lab)
+    size = len(model.names)
+    j = gradients(model, table, np.ones(size))
+    y = np.log(table.levels) - logs_of(model, table, np.ones(size))
+    there = ~here
+    step = there.sum() * between**2 * np.linalg.inv(j[there].T @ j[there])
+    # Unknown are the lab's constants; the other campaign's units are those less the step.
+    covariance = np.eye(y.size)
+    covariance[np.ix_(there, there)] += j[there] @ step @ j[there].T
+    inverse = np.linalg.inv(covariance)
+    information = j.T @ inverse @ j
+    mean = np.linalg.solve(information, j.T @ inverse @ y)
+    residual = y - j @ mean
+    assert np.log(found.constants) == pytest.approx(mean, rel=1e-9)
+    assert found.covariance == pytest.approx(np.linalg.inv(information), rel=1e-9)
+    assert found.df == y.size - size
+    assert found.sigma == pytest.approx(np.sqrt(residual @ inverse @ residual / found.df), rel=1e-9)
+
+
+@pytest.mark.parametrize("moduli", ["small-strain", "quasi-static", "data sheet"])
+def test_without_a_lab_s_units_the_scores_are_the_table_s(moduli):
+    """The other implementation masks units in closed forms; so do the scores by source that were measured before."""
+    table = measured_table(moduli)  # type: ignore[arg-type]
+    alone = Campaigns(table, np.zeros(9, dtype=bool), np.zeros(9))
+    judged = {name: judge(model, alone) for name, model in MODELS.items()}
+    for name, one in assess_all(table).items():
+        assert np.abs(judged[name].errors) == pytest.approx(one.left_out_errors, rel=1e-6, abs=1e-9), name
+    before = {"small-strain": (1.33, 1.35), "quasi-static": (1.76, 1.59), "data sheet": (1.89, 1.86)}[moduli]
+    scores = [judged[name].score for name in ("divider", "crossings")]
+    assert scores == pytest.approx(before, abs=0.025)
+    assert judged["baseline"].score == pytest.approx(1.327, abs=0.001)
+    assert judged["rule"].score == pytest.approx(1.290, abs=0.001)
+
+
+def test_intervals_that_were_measured_before():
+    alone = Campaigns(TABLE, np.zeros(9, dtype=bool), np.zeros(9))
+    judged = {name: judge(MODELS[name], alone) for name in ("divider", "crossings", "published", "baseline")}
+    assert [judged[name].held() for name in ("published", "crossings", "divider", "baseline")] == [8, 7, 7, 7]
+    one, two = (np.abs(judged[name].errors) for name in ("divider", "baseline"))
+    assert paired(judged["divider"], judged["baseline"])[:2] == pytest.approx(
+        (np.mean(one - two), stats.sem(one - two))
+    )
+
+
+def test_stored_constants_are_the_catalogue_s():
+    for name, constants in stored().items():
+        fitted = constants_of(MODELS[name], TABLE, np.ones(9))
+        assert dict(zip(MODELS[name].names, fitted, strict=True)) == pytest.approx(constants, rel=1e-5)
+
+
+@pytest.fixture(scope="module")
+def text():
+    return fit_toml(fit_lab(load_fit_lab("synthetic-bench")))
+
+
+@pytest.fixture
+def fit_file(text, tmp_path):
+    path = tmp_path / "lab-fit.toml"
+    path.write_text(text)
+    return path
+
+
+def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file, text):
+    spec = load("embedded", {"estimate.fit": str(fit_file)})
+    data, plain = estimate_spec(spec), estimate_spec(load("embedded"))
+    fit = tomllib.loads(text)
+    for model, block in data["models"].items():
+        one, before = fit["model"][model], plain["models"][model]
+        assert "predictive" not in before
+        s = one["constants"]["s"] / stored()[model]["s"]
+        if model in ("published", "corrected"):
+            assert block["edge_level"]["value"] == pytest.approx(s * before["edge_level"]["value"], rel=1e-5)
+        g = np.ones(1)
+        if model == "divider":
+            x = one["constants"]["kappa"] * 355 / 15
+            assert block["edge_level"]["value"] == pytest.approx(one["constants"]["s"] / (1 + x), rel=1e-8)
+            g = np.array([-x / (1 + x), 1.0])
+        if model == "rule":
+            assert block["edge_level"]["value"] == pytest.approx(
+                one["constants"]["s"] * one["constants"]["q"], rel=1e-5
+            )
+            g = np.ones(2)
+        scale = one["model_error"] * np.sqrt(1 + g @ np.array(one["covariance"]) @ g)
+        centre = np.log(block["edge_level"]["value"])
+        ends = np.exp(stats.t.ppf([0.1, 0.9], one["degrees_of_freedom"], centre, scale))
+        assert [block["predictive"]["p10"], block["predictive"]["p90"]] == pytest.approx(ends, rel=1e-7)
+        made = predictive(fit_of(spec), model, estimate_input(spec))  # type: ignore[arg-type]
+        assert made == pytest.approx((one["degrees_of_freedom"], centre, scale), rel=1e-7)
+        error = block["fit_error"]
+        assert error["left_out"]["geometric_mean"] == one["left_out"]
+        assert error["left_out"]["low"] < one["left_out"] < error["left_out"]["high"]
+        assert (error["own_left_out"], error["own_by_stored"]) == (one["own_left_out"], one["own_by_stored"])
+        assert error["held_80"] == one["held"]
+        assert error["baseline"] == fit["model"]["baseline"]["left_out"]
+        assert block["table_error"] == before["table_error"]  # of the stored constants, and said to be
+        assert "fit_error" not in before
+    assert data["table_error"]["constants"].startswith("the stored ones")
+    assert "constants" not in plain["table_error"]
+    assert data["fit"]["name"] == "synthetic-bench"
+    assert data["fit"]["left_out"]["baseline"]["geometric_mean"] == fit["model"]["baseline"]["left_out"]
+    assert data["fit"]["leads"] == data["answer"]["model"] == "rule"
+    assert [own["value"] for own in data["own_measured"]] == [0.098]
+    assert data["measured"]["level"] == plain["measured"]["level"]
+    thicker = load(spec, {"layers.0.wall_mm": 1.3})
+    assert estimate_spec(thicker)["own_measured"] == []
+    table = frequency_table_of_spec(spec, [100.0])
+    assert table["fit"] == {key: data["fit"][key] for key in ("file", "sha256", "name")}
+    rows = table["frequencies"]
+    assert rows[0]["edge_level"]["rule"]["value"] == pytest.approx(data["models"]["rule"]["edge_level"]["value"])
+
+
+def test_a_spec_names_its_fit_and_stands_alone(fit_file, tmp_path):
+    (tmp_path / "u.toml").write_text(
+        Path("templates/embedded.toml").read_text() + '\n[estimate]\nfit = "lab-fit.toml"\n'
+    )
+    spec = load(str(tmp_path / "u.toml"))
+    assert spec.estimate.fit == "lab-fit.toml"
+    fit_file.unlink()
+    again = load(spec, {"layers.0.wall_mm": 1.3})
+    assert again.estimate.fit_source == spec.estimate.fit_source
+    changed = spec.estimate.fit_source.replace('"synthetic-bench"', '"other"')  # type: ignore[union-attr]
+    (tmp_path / "other.toml").write_text(changed)
+    other = load(spec, {"estimate.fit": str(tmp_path / "other.toml")})
+    assert estimate_spec(other)["fit"]["name"] == "other"
+    assert other.estimate.fit == "other.toml"
+
+
+def test_builds_follow_the_fit(fit_file, text, tmp_path):
+    """Another fit is another result; the same fit the same bytes."""
+
+    def built(out, *options):
+        words = ["build", "embedded", "--only", "estimate", "-o", str(tmp_path / out), *options]
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 0, done.output
+        return Path(done.stdout.strip().splitlines()[-1])
+
+    plain, fitted = built("a"), built("a", "--fit", str(fit_file))
+    again = built("b", "--fit", str(fit_file))
+    assert plain.name != fitted.name == again.name
+    assert (fitted / "estimate.json").read_bytes() == (again / "estimate.json").read_bytes()
+    assert "predictive" in (fitted / "estimate.json").read_text()
+    fit_file.write_text(text.replace('"synthetic-bench"', '"other"'))
+    assert built("a", "--fit", str(fit_file)).name not in (plain.name, fitted.name)
+
+
+def test_the_terminal_shows_fit_range_and_own_measurement(fit_file):
+    done = CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--details"])
+    assert done.exit_code == 0
+    for words in ("P10 to P90", "measured here", "synthetic-bench", "rule leads", "error by the lab's fit"):
+        assert words in done.output
+    own = fit_of(load("embedded", {"estimate.fit": str(fit_file)}))
+    assert own is not None
+    by_fit = done.output.split("error by the lab's fit")[1]
+    for name in ("rule", "divider", "published", "corrected"):
+        assert f"x {own.model[name].left_out:.2f}" in by_fit
+    assert "9.8 %" in done.output.splitlines()[1]
+    assert "By a rule fitted to 3 units of synthetic-bench and the paper's nine" in done.output
+    shown = json.loads(CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--json"]).output)
+    assert len(shown["fit"]["sha256"]) == 64
+
+
+def test_a_sweep_s_table_takes_the_fit(fit_file, tmp_path):
+    from unitcad.sweeps.estimate_table import evaluate
+    from unitcad.sweeps.sweep import load_sweep
+
+    (tmp_path / "s.toml").write_text(
+        'base = "./u.toml"\n[sweep]\nmode = "product"\n"layers.0.material" = ["ecoflex-00-10", "dragon-skin-30"]\n'
+    )
+    (tmp_path / "u.toml").write_text(
+        Path("templates/embedded.toml").read_text() + '\n[estimate]\nfit = "lab-fit.toml"\n'
+    )
+    sweep = load_sweep(tmp_path / "s.toml")
+    levels = next(iter(evaluate(sweep, sweep.count))).levels["published"]
+    exact = estimate_spec(load(str(tmp_path / "u.toml")))["models"]["published"]["edge_level"]["value"]
+    assert levels[0] == pytest.approx(exact)
+
+
+def _bad(text, *path, value):
+    data = tomllib.loads(text)
+    node = data
+    for step in path[:-1]:
+        node = node[step]  # type: ignore[index]
+    if value is None:
+        del node[path[-1]]  # type: ignore[arg-type]
+    else:
+        node[path[-1]] = value  # type: ignore[index]
+    return tomli_w.dumps(data)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "says"),
+    [
+        (("model", "published"), None, "model.published: is required"),
+        (("model", "published", "constants"), {"kappa": 1.0}, "must be s"),
+        (("model", "published", "constants", "s"), -1.0, "model.published.constants.s"),
+        (("model", "published", "degrees_of_freedom"), 0, "degrees_of_freedom"),
+        (("model", "divider", "covariance"), [[1.0]], "needs 2 rows"),
+        (("model", "divider", "covariance"), [[1.0, 3.0], [3.0, 1.0]], "is no covariance"),
+        (("model", "published", "model_error"), 0.0, "model_error"),
+        (("format",), 2, "format"),
+        (("moduli",), "quasi-static", "quasi-static moduli"),
+        (("surprise",), 1, "surprise"),
+    ],
+)
+def test_a_bad_fit_is_refused(text, path, value, says, tmp_path):
+    (tmp_path / "bad.toml").write_text(_bad(text, *path, value=value))
+    done = CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(tmp_path / "bad.toml")])
+    assert isinstance(done.exception, Refusal)
+    assert done.exception.exit_code == 2
+    assert says in str(done.exception)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00\xff", b"[[[", b"a = 1\n" * 3])
+def test_what_is_no_fit_is_refused(content, tmp_path):
+    (tmp_path / "bad.toml").write_bytes(content)
+    with pytest.raises(Refusal, match=r"estimate\.fit"):
+        load("embedded", {"estimate.fit": str(tmp_path / "bad.toml")})
+    with pytest.raises(Refusal, match=r"estimate\.fit"):
+        load("embedded", {"estimate.fit": "not-there.toml"})

@@ -1,0 +1,342 @@
+"""One record: its line against exact answers and an independent fit, and the reasons to refuse or doubt it."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+from scipy.optimize import curve_fit
+
+from benchmarks.accuracy.synthetic_records import LENGTH_S, PLAIN, Scenario, synthetic
+from unitcad.errors import Refusal
+from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, UnitTable
+from unitcad.lab.chains import ChainTable, Mains, bandpass
+from unitcad.lab.chains.line import DROP_OUT, fit_line, running_part
+from unitcad.lab.record import measure_record
+
+RATE = 2000
+TIME = np.arange(2 * RATE) / RATE
+SENSOR = SensorTable(quantity="displacement", unit="um")
+BAND = (60.0, 250.0)
+
+
+def noise(size=1.0, seed=1):
+    return size * np.random.default_rng(seed).standard_normal(len(TIME))
+
+
+def wave(size, hertz, phase=0.0):
+    return size * np.cos(2 * np.pi * hertz * TIME + phase)
+
+
+def turning(size, hertz):
+    """A line of varying frequency in some noise."""
+    return size * np.cos(2 * np.pi * np.cumsum(hertz) / RATE) + noise(2.0)
+
+
+def record(folder, x, band=BAND, mains=None, use=("line",)):
+    wavfile.write(folder / "a.wav", RATE, x.astype("<f4"))
+    campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),), chain=ChainTable(use=use))
+    return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), (mains or Mains(),), band, "a.wav")
+
+
+def said(result):
+    return {one.code: one.message for one in result.findings}
+
+
+def severities(result):
+    return {(one.code, one.severity) for one in result.findings}
+
+
+def fitted(x, rate=RATE, **options):
+    fit = fit_line(x, rate, **options)  # type: ignore[arg-type]
+    assert fit is not None
+    return fit
+
+
+# The line of samples.
+
+
+def test_a_line_without_noise_is_exact():
+    x = wave(3.0, 123.4, 0.7) + wave(0.4, 246.8) + 5 + 0.1 * TIME + wave(0.8, 50) + wave(0.3, 150, 1)
+    fit = fitted(x)
+    assert fit.amplitude == pytest.approx(3.0, rel=1e-6)
+    assert fit.frequency_hz == pytest.approx(123.4, rel=1e-6)
+    assert (fit.masked, fit.lines, fit.mains_hz) == (0.0, (), 0.0)
+    assert math.isinf(fit.clipped)
+
+
+def test_a_line_is_what_a_nonlinear_fit_gives():
+    """scipy's Levenberg-Marquardt over amplitude, frequency, phase and offset shares no code with the chain."""
+    x = synthetic(PLAIN, np.random.default_rng(3), 40.0, 131.7).x
+
+    def model(t, a, hz, phase, offset):
+        return a * np.cos(2 * np.pi * hz * t + phase) + offset
+
+    fit = fitted(x)
+    assert fit.phase is not None
+    start = (fit.amplitude, fit.frequency_hz, float(fit.phase.at(np.zeros(1))[0] + np.angle(fit.value)), 0.0)
+    values, covariance = curve_fit(model, TIME, x, start)
+    assert fit.amplitude == pytest.approx(abs(values[0]), abs=0.2 * fit.u)
+    assert 0.7 < fit.u / math.sqrt(covariance[0, 0]) < 2
+    assert fit.frequency_hz == pytest.approx(values[1], abs=0.01)
+
+
+@pytest.mark.parametrize("size", [0.02, 0.2, 0.5])
+def test_lines_in_noise_are_named_each_at_its_frequency(size):
+    """A single line of varying phase follows their beat, and noise hides that it leaves more than three lines do."""
+    for seed in range(3):
+        rng, time = np.random.default_rng(seed), np.arange(20_000) / 1000
+        truth = {121.70: 0.4, 122.77: 0.2, 123.26: 0.3}
+        x = sum(a * np.cos(2 * np.pi * hz * time + rng.uniform(0, 6)) for hz, a in truth.items())
+        fit = fitted(x + 0.4 * size * rng.standard_normal(len(time)), 1000.0)
+        assert sorted(one.frequency_hz for one in fit.lines) == pytest.approx(sorted(truth), abs=0.02)
+
+
+@pytest.mark.parametrize("size", [0.02, 0.5, 2.0])
+def test_noise_makes_no_second_line(size):
+    """Steady and wandering motors over 2 and 10 s."""
+    for seed in range(6):
+        time = np.arange((2 if seed % 2 else 10) * 1000) / 1000
+        phase = 2 * np.pi * 122 * time + 3 * np.sin(2 * np.pi * 0.1 * (seed % 3) * time)
+        x = np.cos(phase) + size * np.random.default_rng(seed).standard_normal(len(time))
+        assert fitted(x, 1000.0).lines == ()
+
+
+def test_one_drifting_line_is_not_several():
+    for seed in range(5):
+        scenario = Scenario("drift and wander", drift=0.03, wander=0.02, spin_up_s=0.05)
+        made = synthetic(scenario, np.random.default_rng(seed), 1.0, 120.0 + 5 * seed)
+        fit = fitted(made.x)
+        assert fit.lines == ()
+        assert fit.drift == pytest.approx(0.03 * (1 - 0.5 / LENGTH_S), rel=0.35)
+        assert fit.amplitude == pytest.approx(made.amplitude, rel=0.01)
+
+
+def test_mains_beside_the_line_are_in_the_uncertainty():
+    made = synthetic(Scenario("mains", mains=(0.0, 0.05, 0.0)), np.random.default_rng(4), 1.0, 100.01)
+    alone, known = fitted(made.x), fitted(made.x, mains=Mains(blank=((2, 0.05),)))
+    assert alone.mains_hz == known.mains_hz == 100.0
+    assert known.u_mains == pytest.approx(0.05 / math.sqrt(2), rel=0.03)
+    assert abs(known.amplitude - made.amplitude) < 2 * known.u
+    assert fitted(synthetic(PLAIN, np.random.default_rng(4), 1.0, 103.0).x).mains_hz == 0.0
+
+
+@pytest.mark.parametrize("level", [0.95, 0.5])
+def test_clipping_is_seen_and_its_level_is_told(level):
+    x = synthetic(Scenario("clip", clip=level), np.random.default_rng(6), 2.0, 127.0).x
+    assert fitted(x).clipped == pytest.approx(level, rel=0.06)
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_a_converters_steps_are_no_clipping(bits):
+    step = 2.0 ** (1 - bits) / 0.9
+    fit = fitted(np.round(wave(1.0, 125.3) / step) * step)
+    assert math.isinf(fit.clipped)
+    assert fit.amplitude == pytest.approx(1.0, abs=step)
+
+
+@pytest.mark.parametrize("value", [3.0, np.nan])
+def test_a_record_without_a_line_has_none(value):
+    assert fit_line(np.full(4000, value), RATE) is None
+
+
+def test_noise_alone_is_called_a_drop_out_in_one_record_of_a_thousand_at_most():
+    rng = np.random.default_rng(5)
+    for count in (200, 4000):
+        x = np.abs(rng.standard_normal((5000, count)))
+        assert np.sum(x.max(axis=1) > DROP_OUT * 1.4826 * np.median(x, axis=1)) <= 5
+
+
+@pytest.mark.parametrize("zero_phase", [True, False])
+@pytest.mark.parametrize("hz", [100.0, 101.0, 117.0])
+def test_the_papers_chain_has_the_gain_that_it_states(zero_phase, hz):
+    """A long steady line through the filters themselves, not through their frequency response."""
+    chain = ChainTable(zero_phase=zero_phase, trim_s=4.0)
+    found = bandpass.amplitude(chain, 2.0 * np.cos(2 * np.pi * hz * np.arange(20000) / RATE + 0.3), RATE)
+    assert found == pytest.approx(2.0 * bandpass.gain(chain, hz), abs=2e-4)
+    assert (bandpass.gain(chain, hz) < 1e-6) == (hz == 100.0)
+
+
+# The part of a record in which the motor runs.
+
+
+def gated(start, end, size=1.0):
+    inside = (start <= TIME) & (end > TIME)
+    return np.where(inside, 40.0 * np.sin(2 * np.pi * 123.4 * TIME), 0.0) + noise(size)
+
+
+@pytest.mark.parametrize(("start", "end"), [(0.95, 2.1), (1.5, 2.1), (0.0, 0.9), (0.5, 1.4), (0.9, 1.3), (1.7, 2.1)])
+@pytest.mark.parametrize("size", [0.01, 3.0])
+def test_a_motor_that_runs_for_less_than_half_is_measured(tmp_path, start, end, size):
+    result = record(tmp_path, gated(start, end, size) + wave(5, 50))
+    assert result.usable
+    assert abs(result.amplitude_um - 40.0) < max(4 * result.u_um, 0.002 * 40)
+    assert result.frequency_hz == pytest.approx(123.4, abs=0.2)
+    assert min(end, 2.0) - start - 0.2 < result.steady_s < min(end, 2.0) - start + 0.05
+    assert set(said(result)) <= {"L107", "L108", "L105"}
+    if result.steady_s < 1:
+        assert "only that part was used" in said(result)["L107"]
+
+
+def test_pulses_are_measured_in_the_longest(tmp_path):
+    result = record(tmp_path, gated(0.1, 0.4, 0.5) + gated(1.0, 1.5, 0.5))
+    assert result.amplitude_um == pytest.approx(40.0, rel=0.01)
+    assert 0.35 < result.steady_s < 0.55
+
+
+def test_beats_and_sweeps_are_no_silence():
+    """Two lines 0.2 Hz apart fade in and out; a motor that speeds up leaves its first frequency."""
+    time = np.arange(10 * RATE) / RATE
+    beat = 40 * np.sin(2 * np.pi * 125 * time) + 38 * np.sin(2 * np.pi * 125.2 * time + 1)
+    assert len(fitted(beat).lines) == 2
+    for rise in (2, 5, 12, 25):
+        sweep = 40 * np.sin(2 * np.pi * (115 * TIME + rise * TIME**2))
+        assert running_part(sweep, np.ones(len(sweep), bool), RATE, BAND, 50.0) is None
+
+
+# The findings.
+
+
+@pytest.mark.parametrize("rail", [1, -1])
+@pytest.mark.parametrize("at", [60.0, 5.0, 0.0, -80.0])
+def test_a_clip_at_one_rail_is_clipping_and_nothing_else(tmp_path, rail, at):
+    """Down to a rail beyond the line's middle: more than half of the samples then lie on the plateau."""
+    result = record(tmp_path, 7.0 + rail * np.minimum(wave(100, 121.3) + noise(), at))
+    assert severities(result) == {("L101", "error")}
+    assert not result.usable
+
+
+@pytest.mark.parametrize("hz", [0.6, 2.5, 9.0])
+def test_a_slow_modulation_is_unsteady_and_one_line(tmp_path, hz):
+    """Two equal lines to either side of one are one amplitude that goes up and down."""
+    result = record(tmp_path, (1 + wave(0.3, hz, 0.4)) * wave(100, 121.3) + noise())
+    assert "amplitude varies by 2" in said(result).pop("L107")  # 0.3 over the root of 2
+    assert set(said(result)) == {"L107"}
+    assert result.amplitude_um == pytest.approx(100.0, abs=max(3 * result.u_um, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("ratio", "found"), [(12.0, set()), (7.0, {("L118", "warning")}), (1.0, {("L118", "warning")})]
+)
+def test_a_low_signal_to_noise_is_said(tmp_path, ratio, found):
+    result = record(tmp_path, wave(10, 121.3) + noise(10 / ratio))
+    assert severities(result) == found
+    assert result.usable
+
+
+def test_an_amplitude_below_twice_its_uncertainty_is_an_error(tmp_path):
+    """A line under mains as large as itself: the noise is small, and yet nothing is known."""
+    result = record(tmp_path, wave(10, 100.0) + noise(0.05), mains=Mains(blank=((2, 9.0),)))
+    assert ("L118", "error") in severities(result)
+    assert "L111" not in said(result)
+    assert not result.usable
+
+
+@pytest.mark.parametrize(("first", "last"), [(115.0, 139.0), (139.0, 115.0)])
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_sweep_is_unsteady(tmp_path, first, last, order):
+    """A velocity's amplitude rises with the frequency, too."""
+    hertz = first + (last - first) * TIME / 2
+    assert "L107" in said(record(tmp_path, turning(100 * (hertz / first) ** order, hertz)))
+
+
+def test_a_record_that_is_steady_for_less_than_half_says_so(tmp_path):
+    result = record(tmp_path, turning(100, 115 + 12 * TIME))
+    lengths = [one.message for one in result.findings if "steady for" in one.message]
+    assert lengths == [f"steady for {result.steady_s:.2f} s of 2.00 s; only that part was used"]
+    assert result.steady_s < 1
+    assert result.as_dict()["length_s"] == 2.0
+
+
+@pytest.mark.parametrize("constant", [0.03, 0.2])
+@pytest.mark.parametrize("order", [0, 2])
+def test_a_spin_up_is_cut_and_nothing_is_wrong(tmp_path, constant, order):
+    """A motor's speed approaches its own exponentially; the amplitude with its power, by the quantity."""
+    hertz = 125 * (1 - np.exp(-TIME / constant))
+    phase = 2 * np.pi * 125 * (TIME + constant * np.exp(-TIME / constant))
+    result = record(tmp_path, 100 * (hertz / 125) ** order * np.cos(phase) + noise(2.0))
+    assert "L107" not in said(result)
+    assert 1.0 < result.steady_s < 1.9
+    assert result.amplitude_um == pytest.approx(100.0, rel=0.01)
+
+
+@pytest.mark.parametrize(("part", "severity"), [(0.005, "warning"), (0.6, "error")])
+def test_missing_samples_are_counted_and_named(tmp_path, part, severity):
+    x = wave(100, 127.3) + noise(2.0)
+    x[np.random.default_rng(1).permutation(len(x))[: round(part * len(x))]] = np.nan
+    result = record(tmp_path, x, use=("line", "bandpass"))
+    assert ("L119", severity) in severities(result)
+    assert said(result)["L119"].startswith(f"{round(part * len(x))} of 4000 samples")
+    assert result.usable == (severity == "warning")
+    if result.usable:
+        assert "missing" in said(result)["L114"]
+        assert result.amplitude_um == pytest.approx(100.0, abs=3 * result.u_um)
+
+
+def test_a_line_outside_the_search_is_named(tmp_path):
+    near = (0.8 * 127.3, 1.2 * 127.3)
+    message = said(record(tmp_path, wave(100, 160.0) + noise(2.0), near))["L111"]
+    assert message.endswith("the strongest line outside that is at about 160 Hz")
+    assert "strongest line outside" not in said(record(tmp_path, noise(1.0), near))["L111"]
+
+
+def test_a_record_of_more_than_a_minute_is_refused(tmp_path):
+    with pytest.raises(Refusal, match=r"a\.wav: lasts 62 s; cut the record to 60 s or less"):
+        record(tmp_path, np.zeros(62 * RATE))
+
+
+def test_hdf5_tells_its_time_and_a_channel_goes_without_its_group(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, values, unit in (
+            ("G/t", TIME, "s"),
+            ("G/x", wave(100, 127.3) + noise(2.0), "um"),
+            ("H/y", TIME, "um"),
+        ):
+            file[name] = values
+            file[name].attrs["units"] = unit
+    table = RecordingTable(channel="x")
+    campaign = Campaign(name="t", sensor=SENSOR, recording=table, unit=(UnitTable(name="a"),))
+    result = measure_record(tmp_path / "a.h5", "edge", campaign, (SENSOR,), (Mains(),), BAND, "a.h5")
+    assert (result.rate_hz, result.findings) == (pytest.approx(2000.0), ())
+    assert result.amplitude_um == pytest.approx(100.0, rel=0.01)
+
+
+def odd_signal(seed):
+    """Up to three pieces of lines, noise, mains and offset of any size; rounded, cut off, with gaps or drop-outs."""
+    rng = np.random.default_rng(seed)
+    rate = float(rng.choice([300, 500, 1000, 2000]))
+    length = np.exp(rng.uniform(np.log(0.05), np.log(5)))
+    time = np.arange(max(int(length * rate), 20)) / rate
+    x = np.zeros(len(time))
+    for _ in range(int(rng.integers(0, 4))):
+        start, end = sorted(rng.uniform(-0.5 * length, 1.5 * length, 2))
+        inside = (time >= start) & (time <= end)
+        x += 10 ** rng.uniform(-3, 3) * inside * np.sin(2 * np.pi * rng.uniform(30, 300) * time + rng.uniform(0, 6))
+    x += 10 ** rng.uniform(-6, 2) * rng.standard_normal(len(x)) * rng.choice([0, 1])
+    x += 10 ** rng.uniform(-6, 2) * np.sin(2 * np.pi * 50 * time) * rng.choice([0, 1])
+    x += rng.uniform(-100, 100) * rng.choice([0, 1])
+    match rng.integers(0, 8):
+        case 1:
+            x = np.round(x)
+        case 2:
+            x = np.maximum(x, -np.quantile(np.abs(x), 0.8))
+        case 3:
+            x[rng.random(len(x)) < rng.uniform(0, 0.9)] = np.nan
+        case 4:
+            x[(first := rng.integers(0, len(x))) : first + int(len(x) * rng.uniform(0, 0.9))] = np.nan
+        case 5:
+            x[rng.integers(0, len(x), 5)] = 1e9
+        case 6:
+            x[int(0.3 * len(x)) :] = x[int(0.3 * len(x))]
+        case 7:
+            x[rng.integers(0, len(x), len(x) // 3)] = rng.uniform(-1e4, 1e4)
+    return x, rate
+
+
+@pytest.mark.parametrize("first", [150, 240, pytest.param(350, marks=pytest.mark.long), 2190])
+def test_no_signal_ends_in_an_error(first):
+    for seed in range(first, first + 25):
+        fit = fit_line(*odd_signal(seed))
+        assert fit is None or np.isfinite([fit.amplitude, fit.u, fit.frequency_hz, fit.drift]).all()
