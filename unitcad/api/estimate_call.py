@@ -45,7 +45,7 @@ class EdgeEstimate:
 
     @property
     def answer(self) -> str:
-        """The two lines that lead the estimate: what is measured or expected, and the paper's analytic model."""
+        """The two lines that lead the estimate: the measured or expected level, and the paper's analytic model."""
         return "\n".join(summary(self.data)["lines"])
 
     @property

@@ -104,7 +104,7 @@ def _build_all(
     code: bool,
     as_json: bool,
 ) -> bool:
-    """Build the specs and print what came out; return whether every check passed."""
+    """Build the specs and print the results; return whether every check passed."""
 
     outputs_asked = {"unit", "moulds"} if only is None else set(listed(only))
     if outputs_asked & {"unit", "moulds"} and (formats is None or "step" in listed(formats)):

@@ -1,4 +1,4 @@
-"""What a person reads at the end of a build: size, time, grams, warnings, level, where to look."""
+"""The summary at the end of a build: size, time, grams, warnings, level, pages to open."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from unitcad.text import listed, number
 
 
 def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[str]:
-    """Yield a line each: size and mass, times, grams, checks, the edge level, the page. What was not made has none.
+    """Yield a line each: size and mass, times, grams, checks, the edge level, the page. Skipped outputs have no line.
 
     A length that is `given`, by its path, counts as measured.
     """

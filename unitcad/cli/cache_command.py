@@ -22,7 +22,7 @@ Where = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Fold
 
 @cache.command("ls")
 def ls(where: Where = None, as_json: AsJson = False) -> None:
-    """Print what the cache holds. The last line printed is its folder."""
+    """Print the content of the cache. The last line printed is its folder."""
 
     root = where or default_root()
     used = usage(root)
@@ -40,7 +40,7 @@ def gc(
     ] = 4096,
     as_json: AsJson = False,
 ) -> None:
-    """Remove what was used longest ago, down to a size. Results keep their files: they are links."""
+    """Remove the parts that were used longest ago, down to a size. Results keep their files: they are links."""
 
     root = where or default_root()
     gone = collect(root, int(limit * 1e6))

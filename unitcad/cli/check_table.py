@@ -1,4 +1,4 @@
-"""What a settings file of `unitcad check` may hold: read only where there is one, since most runs have none."""
+"""The table of a settings file of `unitcad check`: imported only if there is one, since most runs have none."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from msgspec import Meta, Struct, field
 
 
 class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename="kebab"):
-    """Keys that a file may set, None or empty where it does not. They have the options' names."""
+    """Keys of a settings file, by the options' names; None or empty for a missing key."""
 
     select: list[str] = []
     ignore: list[str] = []

@@ -97,7 +97,7 @@ app.callback()(_root)
 
 
 def run(words: list[str]) -> int:
-    """Run the command of the program's arguments; return its exit code. Says itself what is wrong with them."""
+    """Run the command of the program's arguments; return its exit code. Prints the error of a wrong argument."""
     try:
         return app(words, prog_name="unitcad", standalone_mode=False) or 0
     except WrongArguments as error:
@@ -106,7 +106,7 @@ def run(words: list[str]) -> int:
 
 
 def _refuse(error: Any, words: list[str]) -> None:
-    """Print an error of Typer's as one line, with the command whose help says more."""
+    """Print an error of Typer's as one line, with the command whose help explains it."""
     context, form = getattr(error, "ctx", None), form_of(words)
     message = error.format_message()
     if context and message == context.get_help() and form == "text":  # a command alone that needs another one after it

@@ -13,7 +13,7 @@ from unitcad.text import listed, number
 
 
 def print_estimate(data: dict[str, Any], details: bool = False) -> None:
-    """Print the two lines of the answer; with `details` how sure it is: models, curve, slopes, what is assumed.
+    """Print the two lines of the answer; with `details` its basis: models, curve, slopes, assumptions.
 
     The range by finite elements, which is only made when it is asked for, is always shown.
     """
@@ -59,7 +59,7 @@ def _print_details(screen: Console, data: dict[str, Any]) -> None:
 
 
 def print_errors(errors: dict[str, Any], models: dict[str, Any]) -> None:
-    """Print the models' errors against the measured table, and by a lab's fit where the models' blocks have one."""
+    """Print the models' errors against the measured table, and by a lab's fit if the models' blocks have one."""
     screen = console()
     screen.print(_errors(errors))
     if fitted := {name: block["fit_error"] for name, block in models.items() if "fit_error" in block}:
@@ -145,7 +145,7 @@ def print_neighbours(data: dict[str, Any]) -> None:
 
 
 def _models(data: dict[str, Any]) -> Table:
-    """Tabulate the edge level and, over that of the control of each of the unit's materials, hierarchical / control."""
+    """Tabulate the edge level, and its ratio to the control of each of the unit's materials."""
     blocks, measured = data["models"], data["measured"] or {}
     measured = measured if measured.get("same_size") else {}
     controls = [one["control"] for one in next(iter(blocks.values()))["hierarchical_over_control"] or []]
@@ -237,7 +237,7 @@ def _choice(chosen: dict[str, Any]) -> str:
 
 
 def _classes(by_class: dict[str, dict[str, float]], order: list[str]) -> Table:
-    """Tabulate what leaving out a whole class costs."""
+    """Tabulate the error of each model if a whole class is left out."""
     table = Table("model", *by_class, title="error on a class that the fit did not have")
     for model in order:
         table.add_row(model, *[f"x {errors[model]:.2f}" for errors in by_class.values()])
@@ -321,7 +321,7 @@ def _readings(rows: list[dict[str, Any]]) -> Table:
 
 
 def _format_range(row: dict[str, Any], key: str, factor: float = 1.0) -> str:
-    """Format a value to three digits, or its range where it has no nominal one."""
+    """Format a value to three digits, or its range if it has no nominal value."""
     low, high = row.get(f"{key}_low"), row.get(f"{key}_high")
     if row[key] is not None:
         return f"{factor * row[key]:.3g}"

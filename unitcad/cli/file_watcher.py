@@ -16,7 +16,7 @@ EVERY_S = 0.25
 def wait_for_saves(specs: Iterable[Path]) -> Iterator[None]:
     """Yield at once, and then after every save of a spec or a file that it names: a design's, a fit, an array's unit.
 
-    A save is told once the file has been still for one look: editors write in several steps.
+    A save counts once the file has not changed for `EVERY_S`: editors write in several steps.
     """
     specs = list(specs)
     while True:
@@ -32,7 +32,7 @@ def wait_for_saves(specs: Iterable[Path]) -> Iterator[None]:
 
 
 def _states(specs: list[Path]) -> dict[Path, tuple[int, int, int] | None]:
-    """Return what tells a save of each file: time, size and inode; None for a file that is not there."""
+    """Return time, size and inode of each file, which a save changes; None for a missing file."""
     found = {}
     for path in [*specs, *(named for spec in specs for named in _files_of(spec))]:
         try:

@@ -37,7 +37,7 @@ def list_(
     ] = "",
     as_json: AsJson = False,
 ) -> None:
-    """List what is shipped, each value with its source and status."""
+    """List the shipped entries, each value with its source and status."""
     kinds = _kinds()
     if not kind:
         print_json({"kinds": list(kinds)}) if as_json else typer.echo("\n".join(kinds))

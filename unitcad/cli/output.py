@@ -34,7 +34,7 @@ Form = Literal["text", "object", "lines"]
 
 
 def form_of(words: Sequence[str]) -> Form:
-    """Return what a command line asks for."""
+    """Return the requested form of the output."""
     if "--json-lines" in words:
         return "lines"
     return "object" if "--json" in words else "text"

@@ -18,7 +18,7 @@ def report(
     code: AllowCode = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write one offline page for what a folder holds. The last line printed is the page."""
+    """Write one offline page for a folder of results. The last line printed is the page."""
 
     allow_code(code)
     with progress(str(folder)) as say:

@@ -1,4 +1,4 @@
-"""Options that several commands share, and what they mean."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ def finite(value: float | None) -> float | None:
 
 
 def with_fit(sets: list[str] | None, fit: Path | None) -> list[str]:
-    """Return what --set and --fit override in a spec."""
+    """Return the overrides of --set and --fit."""
 
     return [*(sets or ()), *([] if fit is None else [f"estimate.fit={json.dumps(str(fit))}"])]
 
 
 def overrides(sets: list[str] | None, formats: str | None) -> list[str]:
-    """Return what --set and --formats override in a spec. Raises Refusal for an unknown format."""
+    """Return the overrides of --set and --formats. Raises Refusal for an unknown format."""
 
     names = listed(formats)
     for name in names or ():
@@ -71,7 +71,7 @@ def overrides(sets: list[str] | None, formats: str | None) -> list[str]:
 
 
 def outputs(only: str | None) -> tuple[str, ...]:
-    """Return what --only asks for; all without it."""
+    """Return the outputs of --only; default: all."""
 
     return OUTPUTS if only is None else tuple(name for name in listed(only) if name)
 

@@ -143,7 +143,7 @@ def _new(finding: Finding, entry: Entry, facts: Facts) -> Bools:
 
 
 def _near(points: Floats, known: Floats, code: str, facts: Facts) -> Bools:
-    """Return whether each point lies near a known one."""
+    """Return whether each point is near a known one."""
     if not len(known):
         return np.zeros(len(points), bool)
     from scipy.spatial import KDTree

@@ -93,7 +93,7 @@ class Product:
     shared: dict[str, str]
 
     def place(self, folder: Path, store: Store) -> None:
-        """Write it into an empty folder. Raises OSError, or MissingContent if the store has lost something."""
+        """Write the result into an empty folder. Raises OSError, or MissingContent if the store lost a content."""
         inside = f"{folder}{os.sep}"  # names as text: a Path costs as much as the link
         for parent in sorted({os.path.dirname(path) for path in (*self.own, *self.shared)} - {""}):
             os.makedirs(inside + parent, exist_ok=True)

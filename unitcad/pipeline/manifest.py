@@ -39,7 +39,7 @@ class BodyFile(TypedDict):
 class PartRecord(TypedDict):
     """A body of unit or tooling; `files` by format, `bbox_mm` the mesh's (x0, y0, z0, x1, y1, z1).
 
-    `solids`: how many it consists of, if more than one.
+    `solids`: their number, if more than one.
     """
 
     name: str

@@ -53,7 +53,7 @@ class Built:
 
 
 class _Changed(Exception):
-    """A folder that contains something else than it did when the work began."""
+    """A folder whose content changed during the work."""
 
 
 def build(

@@ -193,7 +193,7 @@ def _plain_kinds(kind: Any) -> set[type]:
 
 
 def _name(plain: type, kind: Any) -> str:
-    """Name a kind of plain data, with a list's entries and a table's keys: those it requires, else the first ones."""
+    """Name a kind of plain data, with a list's entries and a table's keys: the required ones, or the first ones."""
     table = table_in(kind)
     if plain is list:
         return f"a list{_list_of(kind)}"
@@ -220,7 +220,7 @@ def _list_of(kind: Any) -> str:
 
 
 def _length(kind: Any) -> int:
-    """Return how many entries a list has: as many as are fixed, else one."""
+    """Return the number of entries of a list; one if it is not fixed."""
     tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
     return next((len(entries) for entries in tuples if Ellipsis not in entries), 1)
 

@@ -41,7 +41,7 @@ _MOST_LAYERS = 3
 class MotorSize(Table, frozen=True, kw_only=True, omit_defaults=True):
     """The motor's size and drive; `part` names its catalogue entry, or None. With `fill` Layer 1 reaches it.
 
-    `absent`: a custom design has none, and nothing is drawn for it. The sizes only fill their place.
+    `absent`: a custom design without a motor. Nothing is drawn for it; the sizes are placeholders.
     """
 
     part: str | None
@@ -240,7 +240,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
 
     @classmethod
     def settled(cls, **values: Any) -> Spec:
-        """Return the spec of these values, all of them there, unchecked: only for validation."""
+        """Return the spec of complete values, without checks: only for validation."""
         return type(Struct).__call__(cls, **values)
 
     @property

@@ -15,7 +15,7 @@ _DEEPER = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
 def has_more(text: str, most: int) -> bool:
-    """Tell whether a TOML text has more than `most` keys, tables and list entries."""
+    """Return whether a TOML text has more than `most` keys, tables and list entries."""
     if len(text) <= most:
         return False
     marks = (1 for token in _TOKEN.finditer(text) if token[0] in ("=", ",", "["))

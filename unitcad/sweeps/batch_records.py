@@ -58,7 +58,7 @@ class Failure(Struct, frozen=True):
 
 
 class Summary(Struct):
-    """Outcome of a batch: variants by outcome, geometries, seconds; `stopped` says why it ended early.
+    """Outcome of a batch: variants by outcome, geometries, seconds; `stopped` is the reason of an early end.
 
     `resumed` counts variants that an earlier run finished, and those that equal another one.
     """
@@ -85,7 +85,7 @@ class RefusedVariant(Struct, frozen=True):
 
 
 class Preview(Struct, frozen=True, kw_only=True):
-    """Size of a batch that is not made; `exact` says whether variants, geometries and parts are counts."""
+    """Size of a batch that is not made; `exact`: whether variants, geometries and parts are counts."""
 
     variants: int
     geometries: int

@@ -39,7 +39,7 @@ LONGEST = 1 << 26
 class Journal:
     """The journal of one output folder, open and locked; `damaged` counts the skipped lines.
 
-    `first` is the least index that there may be; `beside` are names that the folder may have from before.
+    `first` is the least possible index; `beside` are names that the folder may already contain.
     Raises UnitcadError for a folder that isn't ours, that has another batch, or in which a batch is running.
     """
 
@@ -252,7 +252,7 @@ def _lock(out: Path, head: BatchHead, beside: Collection[str]) -> FileLock:
 
 
 def _check_free(out: Path, head: BatchHead, beside: Collection[str]) -> None:
-    """Refuse a folder that is not empty and has no journal, unless its table says that it is this batch's."""
+    """Refuse a folder that is not empty and has no journal, unless its table names this batch."""
     if all(path.name == LOCK or path.name in beside for path in out.iterdir()):
         return
     if any(out.glob(SHARDS)):

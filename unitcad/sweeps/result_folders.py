@@ -73,7 +73,7 @@ def make_folders(
     maker: str = _BATCH,
     then: Callable[[Path], object] = lambda folder: None,
 ) -> None:
-    """Make the folders in `out` that are not there, or not whole, of variants that are in a store; `then` gets each.
+    """Make the missing and incomplete folders in `out` of variants in a store; call `then` with each.
 
     Raises UnitcadError for lost contents, which the `maker` makes again, and OSError.
     """

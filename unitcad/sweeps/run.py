@@ -238,7 +238,7 @@ class _Batch:
             self.running[self.executor.submit(tasks.work, self.destination.task(task))] = task
 
     def _next(self) -> tuple[str, list[Job]] | None:
-        """Choose a variant to repeat by itself; else a geometry not yet made, else more of one that is."""
+        """Choose the next task: a variant to repeat, a geometry to make, or more variants of a made one."""
         if self.again:
             key, job = self.again.popleft()
             return key, [job]

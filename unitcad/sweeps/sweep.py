@@ -50,7 +50,7 @@ MOST = 1_000_000
 
 
 class Range(Struct, frozen=True, forbid_unknown_fields=True):
-    """`num` values from `start` to `stop`, both among them."""
+    """`num` values from `start` to `stop`, both included."""
 
     start: Annotated[float, Meta(ge=-1e12, le=1e12)]
     stop: Annotated[float, Meta(ge=-1e12, le=1e12)]

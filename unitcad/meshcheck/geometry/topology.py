@@ -434,9 +434,9 @@ def closed_shells(edges: Edges, shells: Ints, n: int) -> Bools:
 
 
 def signed_volumes(vertices: Floats, faces: Ints, areas: Floats, shells: Ints, n: int) -> Floats:
-    """Return the volume of each of `n` shells, mm3: below zero where its faces look inwards.
+    """Return the volume of each of `n` shells, mm3: negative if its faces look inwards.
 
-    It means nothing where the shell is not closed. Tetrahedra stand on the middle of all vertices, so that a part far
+    The volume of an open shell means nothing. Tetrahedra stand on the middle of all vertices, so that a part far
     from the origin loses no digits.
     """
     corner = faces[:, 0]

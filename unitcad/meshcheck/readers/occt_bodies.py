@@ -94,7 +94,7 @@ def triangles_of(solid: Any, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def measure(path: str) -> Measured | None:
-    """Measure a STEP file in this process; None if it holds no shape."""
+    """Measure a STEP file in this process; None if it contains no shape."""
     reader = STEPControl_Reader()
     if reader.ReadFile(path) != IFSelect_RetDone or reader.TransferRoots() < 1:
         return None

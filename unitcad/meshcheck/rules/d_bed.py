@@ -1,4 +1,4 @@
-"""What stands on the bed: D004 and D005. A mesh stands as it will be printed, z up.
+"""The rules of the bed, D004 and D005. A mesh has its printing position, z up.
 
 The rules for a printer look for what it cannot make, not for what is unusual: a wedge is no thin wall, a ceiling with
 support at both ends is a bridge.
