@@ -20,7 +20,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from unitcad.attenuation.edge.level import model_block
 from unitcad.cache import usage
 from unitcad.estimate_inputs import estimate_input
 from unitcad.sweeps import BatchOptions, estimate_table, run
-from unitcad.sweeps.executors import ProcessExecutor, SerialExecutor
+from unitcad.sweeps.executors import SerialExecutor
 from unitcad.sweeps.sweep import Sweep, from_file
 from unitcad.sweeps.task import VariantOutcome
 
@@ -115,12 +115,11 @@ class Bench:
             return time.perf_counter() - start
 
     @contextlib.contextmanager
-    def _warm(self) -> Iterator[ProcessExecutor]:
-        executor = ProcessExecutor(self.workers)
-        for future in [executor.submit(time.sleep, 1.0) for _ in range(self.workers)]:
-            future.result()
-        yield executor
-        executor.kill()
+    def _warm(self) -> Iterator[ProcessPoolExecutor]:
+        with ProcessPoolExecutor(self.workers) as executor:
+            for future in [executor.submit(time.sleep, 1.0) for _ in range(self.workers)]:
+                future.result()
+            yield executor
 
 
 def ceiling(scratch: Path, rounds: int, variants: int, workers: int, only: tuple[str, ...]) -> dict[str, Any]:

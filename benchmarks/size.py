@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (540_800, 371, 67_400),
-    "core": (272_300, 221, 35_000),
-    "tests": (409_000, 0, 0),
+    "total": (539_300, 371, 67_300),
+    "core": (266_500, 203, 34_300),
+    "tests": (397_500, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900

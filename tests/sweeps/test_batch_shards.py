@@ -185,7 +185,7 @@ def test_a_store_in_which_nobody_may_write_is_refused_at_once(tmp_path, monkeypa
     made(sweep, tmp_path / "out", store=str(tmp_path / "a"))
     closed = tmp_path / "a" / "packs"
     asked = objects.os.access
-    monkeypatch.setattr(objects.os, "access", lambda path, mode: path != closed and asked(path, mode))  # root may all
+    monkeypatch.setattr(objects.os, "access", lambda path, mode: path != closed and asked(path, mode))
     with pytest.raises(UnitcadError, match="a/packs can't be read and written here"):
         made(sweep, tmp_path / "other", store=str(tmp_path / "a"))
     assert not (tmp_path / "other").exists()
