@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (543_700, 388, 67_700),
+    "total": (543_300, 388, 67_600),
     "core": (272_300, 221, 35_000),
-    "tests": (402_900, 0, 0),
+    "tests": (402_600, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900
