@@ -187,7 +187,7 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
     if (length := count / rate) > LONGEST_S:
         raise Refusal(shown, None, f"lasts {length:.4g} s; cut the record to {LONGEST_S:g} s or less")
     samples = samples * factors
-    averaged = max(int(rate / HIGHEST_RATE), 1)
+    averaged = max(min(int(rate / HIGHEST_RATE), count), 1)
     if averaged > 1:
         samples = samples[: count // averaged * averaged].reshape(-1, averaged, samples.shape[1]).mean(axis=1)
     return Signal(samples, rate, averaged, count, missing, off_grid, units)
