@@ -280,6 +280,12 @@ def test_a_line_outside_the_search_is_named(tmp_path):
     assert "strongest line outside" not in said(record(tmp_path, noise(1.0), near))["L111"]
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_record_of_few_samples_has_no_line_and_no_warning(tmp_path, count):
+    assert set(said(record(tmp_path, wave(100, 127.3)[:count]))) == {"L111"}
+
+
 def test_a_record_of_more_than_a_minute_is_refused(tmp_path):
     with pytest.raises(Refusal, match=r"a\.wav: lasts 62 s; cut the record to 60 s or less"):
         record(tmp_path, np.zeros(62 * RATE))

@@ -16,14 +16,12 @@ from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.lab.chains import ChainTable, chains_of
 from unitcad.lab.readers import Quantity, expect_ending, to_si
-from unitcad.lab.unit_files import Cavity, file_of, source_file
+from unitcad.lab.unit_files import File, Name, UnitSource, file_of, source_file
 from unitcad.spec.convert import convert
 from unitcad.spec.raw import Table
 from unitcad.validation.typed_files import load_file
 
-Name = Annotated[str, Meta(min_length=1, max_length=100)]
-Record = Annotated[str, Meta(min_length=1, max_length=1000)]
-Records = Annotated[tuple[Record, ...], Meta(max_length=1000)]
+Records = Annotated[tuple[File, ...], Meta(max_length=1000)]
 Positive = Annotated[float, Meta(ge=1e-12, le=1e12)]
 Column = Annotated[int, Meta(ge=1, le=4096)] | Name
 Rate = Annotated[float, Meta(ge=1, le=1e10)]
@@ -101,13 +99,9 @@ class PointTable(Table, frozen=True, kw_only=True):
     records: Annotated[Records, Meta(description="records at this point")]
 
 
-class UnitTable(Table, frozen=True, kw_only=True):
+class UnitTable(UnitSource, frozen=True, kw_only=True):
     """One unit: its spec or the record of its casting, and its records."""
 
-    name: Annotated[Name, Meta(description="a name of the unit")]
-    spec: Annotated[Name | None, Meta(description="spec file or template of the unit")] = None
-    cast: Annotated[Name | None, Meta(description="cast record of the unit, in place of spec")] = None
-    cavity: Annotated[Cavity | None, Meta(description="cavity of the cast record")] = None
     reference: Annotated[Records, Meta(description="records of the motor alone, without motor_channel")] = ()
     edge: Annotated[Records, Meta(description="records at the unit's edge")] = ()
     point: tuple[PointTable, ...] = ()

@@ -23,13 +23,12 @@ from unitcad.catalogue.entries import Frequency, MaterialEntry
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import estimate_input
 from unitcad.lab.shrunk_fit import BETWEEN_LABS, Campaigns, Judged, Shrunk, gradients, judge, paired, shrunk
-from unitcad.lab.unit_files import Cavity, file_of, measured_walls, source_file, specs_of
+from unitcad.lab.unit_files import File, Name, UnitSource, file_of, measured_walls, source_file, specs_of
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.raw import Table
 from unitcad.validation import from_data
 from unitcad.validation.typed_files import load_file
 
-Name = Annotated[str, Meta(min_length=1, max_length=100)]
 LevelValue = Annotated[float, Meta(ge=1e-6, le=1e3, description="amplitude at the edge over the motor's")]
 _TWO_SIDED = 1.96
 """Half-width of a 95 % interval in standard errors."""
@@ -43,13 +42,9 @@ class LevelTable(Table, frozen=True, kw_only=True):
     high: Annotated[LevelValue | None, Meta(description="upper end of the 95 % interval")] = None
 
 
-class FitUnitTable(Table, frozen=True, kw_only=True):
+class FitUnitTable(UnitSource, frozen=True, kw_only=True):
     """One measured unit: its spec or cast record, and its level or the file with the level."""
 
-    name: Annotated[Name, Meta(description="a name of the unit")]
-    spec: Annotated[str | None, Meta(description="spec file or template of the unit")] = None
-    cast: Annotated[str | None, Meta(description="cast record of the unit, in place of spec")] = None
-    cavity: Annotated[Cavity | None, Meta(description="cavity of the cast record")] = None
     set: Annotated[dict[str, Any], Meta(description="values of the spec to change, by path")] = field(
         default_factory=dict
     )
@@ -57,7 +52,7 @@ class FitUnitTable(Table, frozen=True, kw_only=True):
         None
     )
     level: LevelTable | None = None
-    measured: Annotated[str | None, Meta(description="measured.toml of unitcad measure, in place of level")] = None
+    measured: Annotated[File | None, Meta(description="measured.toml of unitcad measure, in place of level")] = None
 
 
 class FitLabFile(Table, frozen=True, kw_only=True):

@@ -125,9 +125,8 @@ def lines(result: Measured) -> Iterator[str]:
             f"{r.frequency_hz:.2f} Hz over {r.steady_s:.3g} s of {r.length_s:.3g} s, "
             f"drift {r.drift:.2%}, signal to noise {r.snr:.3g}{gain}"
         )
-    for chain in result.chains:
-        if chain.assumed:
-            yield f"  chain {chain.name}, assumed: {chain.assumed_text}"
+    for text in _assumed(result):
+        yield f"  {text}"
 
 
 _STYLE = """:root{color-scheme:light dark;--text:#222;--back:#fff;--edge:#ccc;--error:#a11;--warning:#850}
@@ -149,46 +148,44 @@ def page(result: Measured, charts: dict[str, str], lead: str = "") -> str:
         f"{escape(one.as_dict()['fix'])}</li>"
         for one in result.findings
     )
-    assumed = "".join(
-        f"<p>Chain {escape(chain.name)}, assumed: {escape(chain.assumed_text)}.</p>"
-        for chain in result.chains
-        if chain.assumed
-    )
-    decay = figures = ""
+    figures = {"decay": "", "record": ""}
     for name, svg in charts.items():
-        figure = f"<figure>{re.sub(r'<[?!][^>]*>', '', svg)}</figure>"
-        decay, figures = (decay + figure, figures) if name.startswith("decay") else (decay, figures + figure)
-    levels = [
-        (
-            one.unit, _place(one.distance_mm), one.chain,
-            f"{one.level.value:.3f}", f"{one.level.low:.3f} to {one.level.high:.3f}",
-            " + ".join(map(str, one.level.repeats)), f"{one.frequency_hz:.2f}",
-        )
-        for one in result.levels
-    ]  # fmt: skip
-    table = _table(("unit", "place", "chain", "level", "95 %", "repeats", "Hz"), levels, [""] * len(levels))
+        figures[name.partition("-")[0]] += f"<figure>{re.sub(r'<[?!][^>]*>', '', svg)}</figure>"
+    levels = []
+    for one in result.levels:
+        level = one.level
+        size = f"{level.value:.3f}", f"{level.low:.3f} to {level.high:.3f}", " + ".join(map(str, level.repeats))
+        levels.append((one.unit, _place(one.distance_mm), one.chain, *size, f"{one.frequency_hz:.2f}"))
     gains = [chain.name for chain in result.chains if chain.gain]
-    head = ("unit", "place", "file", "used", "um", "2 u, um", "Hz", "steady, s", "drift", "signal to noise")
-    records, kinds = [], []
+    records = []
     for unit, r in _each_record(result):
-        figures_of = (
+        row = [unit, r.role, r.file, "yes" if r.usable else "no"]
+        row += [
             f"{r.amplitude_um:.4g}", f"{2 * r.u_um:.2g}" if r.usable else "", f"{r.frequency_hz:.2f}",
-            f"{r.steady_s:.3g} of {r.length_s:.3g}", f"{r.drift:.2%}",
-            f"{r.snr:.3g}", *(f"{r.gains[name]:.3f}" for name in gains if name in r.gains),
-        )  # fmt: skip
-        figures_of = figures_of if r.frequency_hz else ("",) * (6 + len(gains))
-        records.append((unit, r.role, r.file, "yes" if r.usable else "no", *figures_of, r.sha256[:12]))
-        kinds.append("" if r.usable else "out")
+            f"{r.steady_s:.3g} of {r.length_s:.3g}", f"{r.drift:.2%}", f"{r.snr:.3g}",
+            *(f"{r.gains[name]:.3f}" for name in gains),
+        ] if r.frequency_hz else [""] * (6 + len(gains))  # fmt: skip
+        records.append((*row, r.sha256[:12]))
+    head = ("unit", "place", "file", "used", "um", "2 u, um", "Hz", "steady, s", "drift", "signal to noise")
     return _document(
         result.campaign.name,
         f"{lead}<p>{escape(result.campaign.note)}</p><h2>Levels</h2>"
-        f"{table if levels else '<p>None: see the findings.</p>'}{assumed}{decay}"
-        f"<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
-        f"<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
-        f"comes from the scatter of the repeats.</p>"
-        f"{_table((*head, *(f'gain of {name}' for name in gains), 'SHA-256'), records, kinds)}"
-        f"<h2>Charts of the records</h2>{figures}",
+        + (_table(("unit", "place", "chain", "level", "95 %", "repeats", "Hz"), levels) if levels else _NO_LEVEL)
+        + "".join(f"<p>{escape(text)}.</p>" for text in _assumed(result))
+        + f"{figures['decay']}<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
+        "<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
+        "comes from the scatter of the repeats.</p>"
+        + _table((*head, *(f"gain of {name}" for name in gains), "SHA-256"), records)
+        + f"<h2>Charts of the records</h2>{figures['record']}",
     )
+
+
+_NO_LEVEL = "<p>None: see the findings.</p>"
+
+
+def _assumed(result: Measured) -> list[str]:
+    """State the assumptions of the chains that have some."""
+    return [f"Chain {chain.name}, assumed: {chain.assumed_text}" for chain in result.chains if chain.assumed]
 
 
 def fault_page(name: str, fault: str, lead: str = "") -> str:
@@ -205,11 +202,12 @@ def _document(name: str, body: str) -> str:
     )
 
 
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], kinds: list[str]) -> str:
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """Return a table; a row of a record that is not used is marked."""
     cells = "".join(f"<th>{escape(word)}</th>" for word in head)
     body = "".join(
-        f'<tr class="{kind}">' + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
-        for row, kind in zip(rows, kinds, strict=True)
+        f'<tr class="{"out" if row[3] == "no" else ""}">{"".join(f"<td>{escape(cell)}</td>" for cell in row)}</tr>'
+        for row in rows
     )
     return f'<div class="wide"><table><tr>{cells}</tr>{body}</table></div>'
 

@@ -187,7 +187,7 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
     if (length := count / rate) > LONGEST_S:
         raise Refusal(shown, None, f"lasts {length:.4g} s; cut the record to {LONGEST_S:g} s or less")
     samples = samples * factors
-    averaged = max(int(rate / HIGHEST_RATE), 1)
+    averaged = max(min(int(rate / HIGHEST_RATE), count), 1)
     if averaged > 1:
         samples = samples[: count // averaged * averaged].reshape(-1, averaged, samples.shape[1]).mean(axis=1)
     return Signal(samples, rate, averaged, count, missing, off_grid, units)
@@ -405,8 +405,8 @@ def measure_record(
             message = f"{gaps} of {signal.count} samples ({gaps / signal.count:.2g} of them) are no numbers"
             severity = "error" if gaps > MOST_MASKED * signal.count else "warning"
             findings.append(finding("L119", where, message, severity))
-    none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, sensors[0].unit, picture, ())
-    none = replace(none, units=signal.units)
+    unit = sensors[0].unit
+    none = RecordResult(shown, sha256(path), role, signal.raw_rate, signal.count, unit, picture, (), signal.units)
     if any(one.code == "L101" for one in findings):
         return replace(none, findings=tuple(findings))
     for each, where in zip(fits, names, strict=True):
@@ -415,7 +415,8 @@ def measure_record(
             return replace(none, findings=(*findings, finding("L111", where, message)))
         if each.lines:
             listed = ", ".join(f"{one.frequency_hz:.2f} Hz" for one in each.lines)
-            message = f"{listed}, of {', '.join(_sizes(each))} of the strongest; run one motor at a time"
+            sizes = ", ".join(f"{one.amplitude / each.lines[0].amplitude:.2f}" for one in each.lines)
+            message = f"{listed}, of {sizes} of the strongest; run one motor at a time"
             lines = tuple(one.frequency_hz for one in each.lines)
             return replace(none, findings=(*findings, finding("L104", where, message)), lines=lines)
     fit, *motors = (each for each in fits if each)
@@ -459,8 +460,6 @@ def measure_record(
             unfit.append(finding("L114", shown, f"{chain.name}: {reason}"))
         elif gain >= LEAST_GAIN:
             by_chain[chain.name] = over * (values[0] / values[1] if motor else values[0])
-    if "line" in by_chain:
-        by_chain["line"] = fit.amplitude * factor if ratio is None else ratio
     findings += unfit
     return replace(
         none,
@@ -479,10 +478,6 @@ def measure_record(
         by_chain=by_chain,
         gains=gains,
     )
-
-
-def _sizes(fit: LineFit) -> list[str]:
-    return [f"{one.amplitude / fit.lines[0].amplitude:.2f}" for one in fit.lines]
 
 
 def displacement(sensor: SensorTable, frequency_hz: float) -> float:

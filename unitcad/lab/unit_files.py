@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -15,22 +15,25 @@ from unitcad.casting.cast_record import CastRecord, CastUnit, read_cast_record
 from unitcad.catalogue import materials
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.spec import Spec, check_plain
+from unitcad.spec.raw import Table
 from unitcad.text import some
 from unitcad.validation import custom_templates, from_data, put, read, templates
 from unitcad.validation.shipped_files import is_path
 
-Cavity = Annotated[int, Meta(ge=1, le=999, description="number of the unit in its cast record, engraved next to it")]
+Name = Annotated[str, Meta(min_length=1, max_length=100)]
+File = Annotated[str, Meta(min_length=1, max_length=1000)]
 
 
-class UnitNames(Protocol):
-    """A table that names the source of a unit: a template or spec file, or a cast record and a cavity of it."""
+class UnitSource(Table, frozen=True, kw_only=True):
+    """A unit by its name, and its source: a template or spec file, or a cast record and a cavity of it."""
 
-    @property
-    def spec(self) -> str | None: ...
-    @property
-    def cast(self) -> str | None: ...
-    @property
-    def cavity(self) -> int | None: ...
+    name: Annotated[Name, Meta(description="a name of the unit")]
+    spec: Annotated[File | None, Meta(description="spec file or template of the unit")] = None
+    cast: Annotated[File | None, Meta(description="cast record of the unit, in place of spec")] = None
+    cavity: Annotated[
+        Annotated[int, Meta(ge=1, le=999)] | None,
+        Meta(description="cavity of the cast record: the number engraved next to the unit"),
+    ] = None
 
 
 def file_of(folder: Path, name: str, field: str) -> Path:
@@ -41,7 +44,7 @@ def file_of(folder: Path, name: str, field: str) -> Path:
     return path
 
 
-def source_file(unit: UnitNames, folder: Path, field: str) -> str | None:
+def source_file(unit: UnitSource, folder: Path, field: str) -> str | None:
     """Return the name of the file that defines a unit; None for a template, or if there is none.
 
     Raises Refusal for a template that is not known, a file that is not there, and a cast record that is not valid or
@@ -64,7 +67,7 @@ def source_file(unit: UnitNames, folder: Path, field: str) -> str | None:
 
 
 def specs_of(
-    unit: UnitNames, folder: Path, field: str, changes: Mapping[str, Any], entries: Mapping[str, Any]
+    unit: UnitSource, folder: Path, field: str, changes: Mapping[str, Any], entries: Mapping[str, Any]
 ) -> tuple[Spec, Spec]:
     """Return a unit's spec as asked, and as built: with the walls that its cast record measured, the mean of places.
 
@@ -113,7 +116,7 @@ def measured_walls(asked: Spec, built: Spec) -> str:
     return "walls as measured, " + ", ".join(f"{layer.wall_mm:.3g}" for layer in built.layers) + " mm"
 
 
-def _cast(unit: UnitNames, folder: Path, field: str) -> tuple[CastRecord, CastUnit | None]:
+def _cast(unit: UnitSource, folder: Path, field: str) -> tuple[CastRecord, CastUnit | None]:
     """Return a cast record and the unit that is meant; None if nobody looked at any."""
     where, name = f"{field}.cast", str(unit.cast)
     path = file_of(folder, name, where)

@@ -372,7 +372,7 @@ def coarse_frequency(x: Floats, rate: float, band: tuple[float, float], mains_hz
 def spectrum(x: Floats, rate: float) -> tuple[Floats, Floats]:
     """Return frequencies in Hz and amplitudes in the signal's unit, by a Hann window, padded to twice the length."""
     window = np.hanning(len(x))
-    size = np.abs(np.fft.rfft((x - x.mean()) * window, _length(len(x)))) * 2 / window.sum()
+    size = np.abs(np.fft.rfft((x - x.mean()) * window, _length(len(x)))) * 2 / max(window.sum(), 1e-300)
     return np.fft.rfftfreq(_length(len(x)), 1 / rate), size
 
 

@@ -193,7 +193,8 @@ class Recording:
         if len(set(counts)) > 1:
             each = some((f"{c.name} {count}" for c, count in zip(chosen, counts, strict=True)))
             raise Refusal("channel", self.path.name, f"its channels have different counts of samples: {each}")
-        table = np.column_stack([np.asarray(channel.samples, float) for channel in chosen])
+        with np.errstate(invalid="ignore"):  # a damaged number may be a NaN that signals
+            table = np.column_stack([np.asarray(channel.samples, float) for channel in chosen])
         size = np.abs(table)
         absurd = (size > _MOST) | ((size > 0) & (size < 1 / _MOST))
         if absurd.any():

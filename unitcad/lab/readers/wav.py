@@ -34,32 +34,28 @@ def read(path: Path, layout: Layout) -> list[Channel]:
 
 def _expect_consistent(path: Path) -> None:
     """Raise Unreadable if the header contradicts itself or the file."""
-    with open(path, "rb") as file:
-        head = file.read(12)
-        if head[:4] not in (b"RIFF", b"RIFX", b"RF64") or head[8:] != b"WAVE":
-            raise Unreadable(str(path), None, "is no WAV file")
-        order = ">" if head[:4] == b"RIFX" else "<"
-        form, length = None, path.stat().st_size
-        stated = struct.unpack(f"{order}I", head[4:8])[0] + 8
-        if head[:4] != b"RF64" and length not in (stated, stated + stated % 2):
-            raise Unreadable(
-                str(path), None, f"states {stated} bytes and has {length}: it was not closed, or is damaged"
-            )
-        while len(chunk := file.read(8)) == 8:
-            name, size = chunk[:4], struct.unpack(f"{order}I", chunk[4:])[0]
-            if name == b"fmt ":
-                form = struct.unpack(f"{order}HHIIHH", file.read(16))
-                size -= 16
-            elif name == b"data" and form:
-                left = length - file.tell()
-                if head[:4] != b"RF64" and size > left:
-                    raise Unreadable(str(path), None, f"states {size} bytes of samples and has {left}")
-                break
-            file.seek(size + size % 2, 1)
+    content = path.read_bytes()
+    kind, length, at = content[:4], len(content), 12
+    if kind not in (b"RIFF", b"RIFX", b"RF64") or content[8:12] != b"WAVE":
+        raise Unreadable(str(path), None, "is no WAV file")
+    order, whole = ">" if kind == b"RIFX" else "<", kind != b"RF64"  # its sizes are elsewhere
+    stated = struct.unpack_from(f"{order}I", content, 4)[0] + 8
+    if whole and length not in (stated, stated + stated % 2):
+        raise Unreadable(str(path), None, f"states {stated} bytes and has {length}: it was not closed, or is damaged")
+    form = None
+    while at + 8 <= length:
+        name, size = struct.unpack_from(f"{order}4sI", content, at)
+        at += 8
+        if name == b"fmt " and size >= 16:
+            form = struct.unpack_from(f"{order}HHIIHH", content, at)
+        elif name == b"data" and form:
+            if whole and size > length - at:
+                raise Unreadable(str(path), None, f"states {size} bytes of samples and has {length - at}")
+            break
+        at += size + size % 2
     if form is None:
         raise Unreadable(str(path), None, "has no format chunk before its samples")
     _, channels, rate, second, frame, bits = form
     if bits % 8 or frame != channels * bits // 8 or second != rate * frame or not frame:
-        raise Unreadable(
-            str(path), None, f"its header contradicts itself: {channels} channels, {bits} bits, {frame} bytes a frame"
-        )
+        limit = f"its header contradicts itself: {channels} channels, {bits} bits, {frame} bytes a frame"
+        raise Unreadable(str(path), None, limit)
