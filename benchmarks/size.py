@@ -16,8 +16,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (539_800, 385, 67_200),
-    "core": (264_900, 203, 34_100),
+    "total": (539_300, 385, 67_200),
+    "core": (264_800, 203, 34_000),
     "tests": (402_800, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
