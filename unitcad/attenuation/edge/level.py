@@ -1,9 +1,8 @@
-"""Which inputs a level reads: d ln level / d ln input at the middle of every range, by central differences.
+"""Each model's account of one variant: edge level, ratio to the controls, margins, spread, and the inputs it reads.
 
-An input is named as in the spec. Each is changed as a designer would: a thicker wall takes from the cavity, not from
-the diameter; a higher motor lifts caps and circuit.
-
-Each model's account of one variant: edge level, ratio to the controls, margins, spread from the inputs' ranges.
+The inputs' slopes are d ln level / d ln input at the middle of every range, by central differences. An input is named
+as in the spec. Each is changed as a designer would: a thicker wall takes from the cavity, not from the diameter; a
+higher motor lifts caps and circuit.
 """
 
 from __future__ import annotations
