@@ -7,6 +7,7 @@ method), solved by mpmath. At omega = 0 the static pair (1, z) e^{-kz}. Nothing 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import mpmath as mp
 
@@ -15,29 +16,29 @@ import mpmath as mp
 class Body:
     """SI; thickness None for the half-space. `tan_delta` scales the shear modulus by 1 + i tan_delta."""
 
-    thickness: object
-    density: object
-    youngs_modulus: object
-    poisson_ratio: object
-    tan_delta: object = 0.0
-    viscosity: object = 0.0
+    thickness: Any
+    density: Any
+    youngs_modulus: Any
+    poisson_ratio: Any
+    tan_delta: Any = 0.0
+    viscosity: Any = 0.0
 
 
-def _moduli(body: Body, omega: mp.mpf) -> tuple[mp.mpc, mp.mpf, mp.mpc]:
+def _moduli(body: Body, omega: Any) -> tuple[Any, Any, Any]:
     nu = mp.mpf(body.poisson_ratio)
     shear = mp.mpf(body.youngs_modulus) / (2 * (1 + nu))
     mu = shear * (1 + 1j * mp.mpf(body.tan_delta)) + 1j * omega * mp.mpf(body.viscosity)
     return mu, (1 - 2 * nu) / (2 * (1 - nu)), mp.mpf(body.density) * omega**2 / mu
 
 
-def _root(squared: mp.mpc) -> mp.mpc:
+def _root(squared: Any) -> Any:
     root = mp.sqrt(squared)
     if mp.re(root) < 0 or (mp.re(root) == 0 and mp.im(root) < 0):
         root = -root
     return root
 
 
-def _waves(body: Body, k: mp.mpc, omega: mp.mpf) -> list[tuple]:
+def _waves(body: Body, k: Any, omega: Any) -> list[tuple]:
     """Two downgoing waves, each a function of depth giving (U, W, t_r, t_z) without and the rate of its exponential."""
     mu, eps, ks2 = _moduli(body, omega)
     if omega == 0:
@@ -59,7 +60,7 @@ def _waves(body: Body, k: mp.mpc, omega: mp.mpf) -> list[tuple]:
     ]
 
 
-def compliance(bodies: list[Body], k: object, omega: object) -> mp.matrix:
+def compliance(bodies: list[Body], k: Any, omega: Any) -> Any:
     """2x2 compliance at the surface of `bodies` (the last one a half-space) at the working precision."""
     k, omega = mp.mpmathify(k), mp.mpf(omega)
     unknowns = 4 * (len(bodies) - 1) + 2
@@ -110,16 +111,16 @@ def compliance(bodies: list[Body], k: object, omega: object) -> mp.matrix:
     return out
 
 
-def norm(matrix: mp.matrix) -> mp.mpf:
+def norm(matrix: Any) -> Any:
     return mp.sqrt(mp.fsum(abs(v) ** 2 for v in matrix))
 
 
-def condition(bodies: list[Body], k: object, omega: object, reference: mp.matrix) -> mp.mpf:
+def condition(bodies: list[Body], k: Any, omega: Any, reference: Any) -> Any:
     """Relative change of the compliance (normwise) per relative change of an input, summed over inputs; at least 1."""
     step = mp.mpf(10) ** -25
     total = mp.mpf(0)
 
-    def add(changed: mp.matrix) -> mp.mpf:
+    def add(changed: Any) -> Any:
         return norm(changed - reference) / norm(reference) / step
 
     total += add(compliance(bodies, mp.mpmathify(k) * (1 + step), omega))

@@ -4,12 +4,16 @@ import json
 import math
 import subprocess
 import sys
+import traceback
+from pathlib import Path
 
 import numpy as np
 import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
+import unitcad
+from unitcad import cli
 from unitcad.attenuation.curve import NO_RATIO
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.estimates import summary
@@ -247,6 +251,22 @@ def test_command_as_json():
     assert [one["variant"]["layers"][0]["wall_mm"] for one in two["estimates"]] == [1.3, 1.3]
     table = json.loads(run("embedded", "--frequency", "100:120:10", "--json").stdout)
     assert [row["frequency_hz"] for row in table["frequencies"]] == [100, 110, 120]
+
+
+def test_few_files_and_frames_lie_between_the_command_and_the_level(monkeypatch):
+    paths = []
+
+    def spy(*arguments):
+        stack = traceback.extract_stack()[:-1]
+        paths.append([frame for frame in stack if frame.filename.startswith(str(Path(unitcad.__file__).parent))])
+        return edge_levels(*arguments)
+
+    monkeypatch.setattr("unitcad.attenuation.edge.level.edge_levels", spy)
+    monkeypatch.setattr(sys, "argv", ["unitcad", "estimate", "encapsulating"])
+    with pytest.raises(SystemExit):
+        cli.main()
+    assert max(len(path) for path in paths) < 12
+    assert max(len({frame.filename for frame in path}) for path in paths) < 8
 
 
 def test_command_for_a_person():

@@ -78,7 +78,7 @@ def _case(seed: int) -> tuple[LayeredMedium, Load, np.ndarray]:
     return LayeredMedium(layers, body), load, np.array([rim, *10 ** rng.uniform(-3.5, -1.3, 4)])
 
 
-@pytest.mark.parametrize("seeds", [range(70), pytest.param(range(70, 210), marks=pytest.mark.long)])
+@pytest.mark.parametrize("seeds", [range(35), pytest.param(range(35, 210), marks=pytest.mark.long)])
 def test_errors_hold_where_only_rounding_is_left_and_stay_as_small(seeds):
     """The closed form of the static half-space, its argument, the compliance that it is taken from."""
     for seed in seeds:

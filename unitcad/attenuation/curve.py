@@ -9,7 +9,6 @@ import numpy as np
 from msgspec.structs import replace
 from scipy import special
 
-from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.level import sensitivities
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
 from unitcad.attenuation.layered import LayeredMedium, Response, components
@@ -253,11 +252,9 @@ def _paper_curves(variant: EstimateInput, r: np.ndarray) -> dict[str, Any]:
     rate = omega * tan_delta / speed
     return {
         "what": "the print's J0(kr) exp(-omega eta r/(E c_s)) with the skin's values; it has no integral over k",
-        "k_per_m": omega / speed,
         "j0": [float(v) for v in bessel / bessel[0]] if bessel[0] > 1e-3 else None,
         "exponential": {
             "loss_modulus": [float(v) for v in np.exp(-rate * (r - r[0]))],
             "kelvin_voigt": [float(v) for v in np.exp(-rate / 2.0 * (r - r[0]))],
         },
-        "readings_of_eta": {name: cf.READINGS[name] for name in ("loss_modulus", "kelvin_voigt")},
     }

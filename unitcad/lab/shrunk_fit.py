@@ -1,13 +1,13 @@
 """Models fitted to two campaigns, the paper's and a lab's, whose constants may differ: shrunk, judged, predictive.
 
-A unit's ln level scatters about its model with the standard deviation sigma (the model_error), and between campaigns
-the logarithms of a model's constants scatter by `between_labs` times the information of a unit of the other campaign.
-The likelihood of a campaign of n units then counts for another one with the weight 1/(n between_labs^2 + 1) a unit: a
-power prior (Ibrahim and Chen, Statistical Science 15, 46, 2000), for a model that is linear in its constants the
-conjugate normal prior centred at the other campaign's own fit. Nine units count as 0.9 of a lab's own if between_labs
-is 1. sigma^2 has the conjugate inverse gamma's estimate, so a prediction is Student-t with units less constants degrees
-of freedom. A unit measured with the standard error u of ln level counts 1/(1 + (u/sigma0)^2), where sigma0 is the
-paper's own sigma.
+A unit's ln level scatters about its model with the standard deviation sigma (the model error). Between campaigns the
+logarithms of a model's constants scatter by `between_labs` times the information of a unit of the other campaign. The
+likelihood of a campaign of n units then counts for another one with the weight 1/(n between_labs^2 + 1) a unit. That is
+a power prior (Ibrahim and Chen, Statistical Science 15, 46, 2000). For a model that is linear in its constants it is
+the conjugate normal prior centred at the other campaign's own fit. Nine units count as 0.9 of a lab's own if
+between_labs is 1. sigma^2 has the conjugate inverse gamma's estimate, so a prediction is Student-t with units less
+constants degrees of freedom. A unit measured with the standard error u of ln level counts 1/(1 + (u/sigma0)^2), sigma0
+being the paper's own sigma.
 """
 
 from __future__ import annotations

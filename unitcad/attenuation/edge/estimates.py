@@ -1,11 +1,7 @@
-"""The answer of an estimate: two lines that are always shown, and the details that say how sure it is. Levels in %.
+"""The estimate of one variant as JSON-ready data, and its answer: two lines that are always shown, and details.
 
 The first line is a measurement of this very unit, if there is one, and the range by the model that leads
 (`models.leader`). The second is the paper's analytic model from the unit's own moduli, with its error.
-
-The part of an estimate for tables and manifests. It loads no solver.
-
-The estimate of one variant as JSON-ready data: models, layered curve, measured values, errors, assumptions.
 """
 
 from __future__ import annotations
@@ -164,7 +160,7 @@ def _class_mean(variant: EstimateInput, group: int, fit: LabFit | None) -> float
 
 
 def _nearest(variant: EstimateInput, fit: LabFit | None) -> dict[str, Any]:
-    """Return the nearest measured unit as `nearest.nearest` does; with a fit, of the lab's own ones."""
+    """Return the nearest measured unit as `measured.nearest` does; with a fit, of the lab's own ones."""
     found = nearest(variant)
     if fit is None:
         return found

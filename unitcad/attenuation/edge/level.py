@@ -1,9 +1,8 @@
-"""Which inputs a level reads: d ln level / d ln input at the middle of every range, by central differences.
+"""Each model's account of one variant: edge level, ratio to the controls, margins, spread, and the inputs it reads.
 
-An input is named as in the spec. Each is changed as a designer would: a thicker wall takes from the cavity, not from
-the diameter; a higher motor lifts caps and circuit.
-
-Each model's account of one variant: edge level, ratio to the controls, margins, spread from the inputs' ranges.
+The inputs' slopes are d ln level / d ln input at the middle of every range, by central differences. An input is named
+as in the spec. Each is changed as a designer would: a thicker wall takes from the cavity, not from the diameter; a
+higher motor lifts caps and circuit.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from unitcad.attenuation.edge.measured import (
     CLASSES,
     FIELDS,
     measured_slopes,
-    measured_table,
     nominal,
     stacked,
     unit_class,
@@ -29,7 +27,7 @@ from unitcad.attenuation.edge.measured import (
 )
 from unitcad.attenuation.edge.models import edge_levels, stored
 from unitcad.attenuation.edge.ranges import LabFit, predictive_block
-from unitcad.attenuation.inputs import EstimateInput, Geometry, Pad, Quantity, SiliconeLayer
+from unitcad.attenuation.inputs import EstimateInput, Pad, Quantity, SiliconeLayer
 
 Levels = Callable[[Sequence[EstimateInput]], Any]
 """The levels of variants that differ in values only, as many numbers."""
@@ -83,10 +81,10 @@ def changed(variant: EstimateInput) -> dict[str, Scaled]:
     by_name["diameter_mm"] = _diameter
     by_name["motor.diameter_mm"] = _motor_diameter
     by_name["motor.thickness_mm"] = _motor_height
-    by_name["motor mass"] = lambda v, f: _with(v, motor_mass=_times(v.geometry.motor_mass, f))
+    by_name["motor mass"] = lambda v, f: _grown(v, motor_mass=_times(v.geometry.motor_mass, f))
     if geometry.pad:
-        by_name["fpcb.pad_diameter_mm"] = _pad_radius
-        by_name["fpcb.thickness_mm"] = _pad_thickness
+        by_name["fpcb.pad_diameter_mm"] = partial(_pad_radius, geometry.pad)
+        by_name["fpcb.thickness_mm"] = partial(_pad_thickness, geometry.pad)
     by_name["estimate.frequency_hz"] = lambda v, f: replace(v, frequency=_times(v.frequency, f))
     for field in _TISSUE:
         by_name[f"tissue {field.replace('_', ' ')}"] = partial(_tissue, field)
@@ -115,54 +113,45 @@ def _tissue(field: str, variant: EstimateInput, factor: float) -> EstimateInput:
     return replace(variant, tissue=tuple(tissue))
 
 
-def _with(variant: EstimateInput, **lengths: Any) -> EstimateInput:
-    return replace(variant, geometry=replace(variant.geometry, **lengths))
+def _grown(variant: EstimateInput, radii: Any = 0.0, tops: Any = 0.0, caps: Any = 0.0, **lengths: Any) -> EstimateInput:
+    """Return the variant with the radii, tops and caps of its layers greater by numbers, and other lengths set."""
+    shapes = variant.geometry.layers
+    more = (np.broadcast_to(one, len(shapes)).tolist() for one in (radii, tops, caps))
+    layers = tuple(
+        replace(shape, outer_radius=shape.outer_radius + r, top=shape.top + top, cap=shape.cap + cap)
+        for shape, r, top, cap in zip(shapes, *more, strict=True)
+    )
+    return replace(variant, geometry=replace(variant.geometry, layers=layers, **lengths))
 
 
-def _cavity(geometry: Geometry, wider: float) -> float:
-    """Return the cavity's radius; if Layer 1 reaches the motor it stays the motor's."""
-    return geometry.cavity_radius + (wider if geometry.gap > 0 else 0.0)
-
-
-def _radii(variant: EstimateInput, wider: Sequence[float], cavity: float) -> EstimateInput:
+def _wider(variant: EstimateInput, radii: Any, cavity: float) -> EstimateInput:
+    """Return the variant with wider layers and cavity; if Layer 1 reaches the motor the cavity stays the motor's."""
     geometry = variant.geometry
-    pairs = zip(geometry.layers, wider, strict=True)
-    layers = tuple(replace(shape, outer_radius=shape.outer_radius + more) for shape, more in pairs)
-    return _with(variant, layers=layers, cavity_radius=_cavity(geometry, cavity))
+    return _grown(variant, radii, cavity_radius=geometry.cavity_radius + (cavity if geometry.gap > 0 else 0.0))
 
 
 def _wall(index: int, variant: EstimateInput, factor: float) -> EstimateInput:
     silicones = list(variant.layers)
     more = silicones[index].thickness * (factor - 1.0)
     silicones[index] = replace(silicones[index], thickness=silicones[index].thickness + more)
-    inside = [-more if i < index else 0.0 for i in range(len(silicones))]
-    return replace(_radii(variant, inside, -more), layers=tuple(silicones))
+    inside = -more * (np.arange(len(silicones)) < index)
+    return replace(_wider(variant, inside, -more), layers=tuple(silicones))
 
 
 def _diameter(variant: EstimateInput, factor: float) -> EstimateInput:
     more = variant.diameter / 2.0 * (factor - 1.0)
-    return replace(_radii(variant, [more] * len(variant.layers), more), diameter=variant.diameter * factor)
-
-
-def _lifted(geometry: Geometry, by: float, first: int = 0, cap: float = 0.0) -> dict[str, Any]:
-    """Return the layers' tops from `first` on `by` higher, the first one's cap thicker by `cap`."""
-    return {
-        "layers": tuple(
-            replace(shape, top=shape.top + by * (i >= first), cap=shape.cap + cap * (i == first))
-            for i, shape in enumerate(geometry.layers)
-        )
-    }
+    return replace(_wider(variant, more, more), diameter=variant.diameter * factor)
 
 
 def _cap(index: int, variant: EstimateInput, factor: float) -> EstimateInput:
-    more = variant.geometry.layers[index].cap * (factor - 1.0)
-    return _with(variant, **_lifted(variant.geometry, more, index, more))
+    more, place = variant.geometry.layers[index].cap * (factor - 1.0), np.arange(len(variant.layers))
+    return _grown(variant, tops=more * (place >= index), caps=more * (place == index))
 
 
 def _motor_diameter(variant: EstimateInput, factor: float) -> EstimateInput:
     geometry = variant.geometry
     radius = geometry.motor_radius * factor
-    return _with(variant, motor_radius=radius, cavity_radius=geometry.cavity_radius if geometry.gap > 0 else radius)
+    return _grown(variant, motor_radius=radius, cavity_radius=geometry.cavity_radius if geometry.gap > 0 else radius)
 
 
 def _motor_height(variant: EstimateInput, factor: float) -> EstimateInput:
@@ -170,25 +159,18 @@ def _motor_height(variant: EstimateInput, factor: float) -> EstimateInput:
     more = geometry.motor_height * (factor - 1.0)
     pad = geometry.pad and Pad(geometry.pad.radius, geometry.pad.low + more, geometry.pad.high + more)
     heights = {"motor_height": geometry.motor_height + more, "core_height": geometry.core_height + more}
-    return _with(variant, **heights, pad=pad, **_lifted(geometry, more))
+    return _grown(variant, tops=more, pad=pad, **heights)
 
 
-def _pad_radius(variant: EstimateInput, factor: float) -> EstimateInput:
-    pad = variant.geometry.pad
-    return _with(variant, pad=pad and replace(pad, radius=pad.radius * factor))
+def _pad_radius(pad: Pad, variant: EstimateInput, factor: float) -> EstimateInput:
+    return _grown(variant, pad=replace(pad, radius=pad.radius * factor))
 
 
-def _pad_thickness(variant: EstimateInput, factor: float) -> EstimateInput:
+def _pad_thickness(pad: Pad, variant: EstimateInput, factor: float) -> EstimateInput:
     """Thicken the circuit; if it is part of the core, under a cap, the layers rise with it."""
-    geometry = variant.geometry
-    pad = geometry.pad
-    if pad is None:
-        return variant
-    more = (pad.high - pad.low) * (factor - 1.0)
-    thicker = replace(pad, high=pad.high + more)
-    if geometry.core_height <= geometry.motor_height:
-        return _with(variant, pad=thicker)
-    return _with(variant, pad=thicker, core_height=geometry.core_height + more, **_lifted(geometry, more))
+    geometry, more = variant.geometry, (pad.high - pad.low) * (factor - 1.0)
+    thicker, lifted = replace(pad, high=pad.high + more), more * (geometry.core_height > geometry.motor_height)
+    return _grown(variant, tops=lifted, pad=thicker, core_height=geometry.core_height + lifted)
 
 
 _MOST_CORNERS = 12
@@ -343,9 +325,6 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
     own: dict[cf.Wave, Any] = {wave: level(units, wave) for wave in (_WAVES if model in _OF_WAVES else _WAVES[:1])}
     edge = spread(variant, own["s"])
     block: dict[str, Any] = {"kind": KINDS[model], "edge_level": {**edge, "unit": "of the motor's amplitude"}}
-    most = float(measured_table().levels.max())
-    if max(edge["value"] or 0.0, edge["high"] or 0.0) > most:
-        block["above_measured"] = most
     if fit:
         block["predictive"] = predictive_block(fit, model, variant, unknown(variant))
     if variant.amplitude is not None:

@@ -1,11 +1,4 @@
-"""Measured units, and how far a unit is from them: the paper's nine levels, their classes, the nearest one. SI.
-
-Measured units as data, their classes, and the catalogue's own table: the paper's nine levels.
-
-Variants at the middle of their inputs' ranges, as the closed forms read them. SI.
-
-How far a unit is from the measured ones: its own measurement if there is one, the nearest, and the differences.
-"""
+"""Measured units, and how far a unit is from them: the paper's nine levels, their classes, the nearest one. SI."""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
-"""How far a model is from measured units: levels, ratios and directions; each unit left out, with range and tests.
+"""The models of the edge level: their fits to measured units, their scores there, and the one that leads.
 
 A fit takes a table and masks (M, units) of the units to fit to, and returns levels (M, units): all that is left out
 here, one unit or two, is one call.
-
-The models of the edge level, their fits to a measured table, their scores there, and the one that leads.
 
 `rule` is s q^n: n counts the passes of borders whose inside is the softer layer. `published` and `corrected` are the
 paper's closed form; its f1 and f2 are not printed, so both have one constant s. `divider` is empirical, with two

@@ -1,13 +1,11 @@
-"""A lab's stored fit: the models' constants, the prediction for a new unit, the lab's own measurements.
+"""The range of a new unit's level, by the paper's nine units or by a lab's stored fit.
 
-A new unit's ln level is Student-t distributed: `scale`^2 = model_error^2 (1 + g' C g), where g is the gradient of the
-model's ln level in the logarithms of its constants, and C their covariance over model_error^2.
+By a lab's fit a new unit's ln level is Student-t distributed: `scale`^2 = model_error^2 (1 + g' C g). g is the gradient
+of the model's ln level in the logarithms of its constants, and C their covariance over model_error^2.
 
-The range of a new unit's level: a Student-t distribution of ln level about the model that leads.
-
-Its scale is the standard deviation of the leading model's left-out residuals (of a lab's fit: the fit's own). It grows
-with everything that no measured unit had, and the residual of measured units that are near enters with half its
-weight, less the farther they are.
+The range is a Student-t distribution of ln level about the model that leads. Its scale is the standard deviation of the
+leading model's left-out residuals (of a lab's fit: the fit's own). It grows with everything that no measured unit had.
+The residual of measured units that are near enters with half its weight, less the farther they are.
 """
 
 from __future__ import annotations
@@ -86,7 +84,7 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A unit's level as the lab measured it, with its 95 % interval; `key` is its `unit_key`.
 
-    `place`: its `nearest.COORDINATES`; `residual`: ln(measured/predicted) by the model that leads.
+    `place`: its `measured.COORDINATES`; `residual`: ln(measured/predicted) by the model that leads.
     """
 
     unit: str

@@ -1,18 +1,15 @@
-"""A meridian plane of rings as rectangles: graded grid lines, void left out, the skin's surface split from the unit.
+"""Finite elements of one angular harmonic of rings: the mesh, its matrices, and the steady response to a force.
 
-z upwards from the skin's surface (the unit's frame), lengths in m.
+The mesh is of rectangles: graded grid lines, void left out, the skin's surface split from the unit; z upwards from the
+skin's surface (the unit's frame), lengths in m.
 
-Elements of one angular harmonic: biquadratic displacement, linear discontinuous pressure eliminated in each element.
+Displacement is biquadratic, pressure linear, discontinuous and eliminated in each element. The pair Q2 / P1 does not
+lock where silicone is nearly incompressible. m = 0: u_r and u_z, the same all round. m = 1: u_r cos(theta), u_theta
+sin(theta), u_z cos(theta), a motion towards theta = 0. Its unknowns are u_z, q = (u_r - u_theta) / 2 and p = (u_r +
+u_theta) / 2, since regularity on the axis is then p = 0 and u_z = 0, with q free. SI.
 
-The pair Q2 / P1 does not lock where silicone is nearly incompressible. m = 0: u_r and u_z, the same all round. m = 1:
-u_r cos(theta), u_theta sin(theta), u_z cos(theta), a motion towards theta = 0. Its unknowns are u_z,
-q = (u_r - u_theta) / 2 and p = (u_r + u_theta) / 2, since regularity on the axis is then p = 0
-and u_z = 0, with q free. SI.
-
-The steady response of a mesh to a force on its rigid motor, or to a traction on bare skin. SI, e^{+i omega t}.
-
-One factorisation serves every load and reading: the motor's motions are prescribed one by one, which leaves a small
-dynamic stiffness to which its mass and turning inertia are added.
+SI, e^{+i omega t}. One factorisation serves every load and reading: the motor's motions are prescribed one by one,
+which leaves a small dynamic stiffness to which its mass and turning inertia are added.
 """
 
 from __future__ import annotations

@@ -1,23 +1,13 @@
-"""Uniform numbers that are spread evenly, the same on any machine for the same seed, name and count.
-
-The unknowns of a unit on its body, and one draw of them. SI.
-
-A unit on its body as rings of material for the finite elements. SI, z upwards from the skin.
+"""A unit on its body by finite elements: its rings, its unknowns, its levels and their range. SI.
 
 The motor is a rigid cylinder, the circuit's pad an elastic plate. The tail and its slot, which are not round, are
 ignored. Touching parts within the unit are bonded.
-
-How much of the motor's motion reaches the edge, by finite elements of unit and body. SI.
 
 A force at the motor's middle drives it: upwards (an axial motor, harmonic 0) or sideways (a flat one, harmonic 1). The
 motor is a rigid cylinder with mass and, about its middle, turning inertia. A level is the amplitude of a reading over
 the amplitude of the motor's middle along the drive, in this unit and on this body. For a force that turns in the plane,
 as a flat ERM's does, every point round the unit has the amplitudes that a sideways force gives at theta = 0 (u_r, u_z)
 and at theta = 90 degrees (u_theta).
-
-The prior predictive range of a unit's levels: seeded draws of everything that is not known. JSON-ready data.
-
-Which inputs the finite elements of a unit see, on the skin and at the unit's own edge, under its motor's drive.
 """
 
 from __future__ import annotations

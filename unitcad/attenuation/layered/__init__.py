@@ -1,6 +1,4 @@
-"""A layered half-space under a load: waves, their propagation through layers, loads, and the Hankel integral.
-
-From wavenumbers to radii: the displacement of a layered medium under a load, with a bound on its error.
+"""A layered half-space under a load: its displacement, with a bound on the error.
 
 An axisymmetric load: u_z(r) = integral of C_zz(k) q(k) J0(kr) k dk, u_r(r) the same with J1. A sideways one, in the
 direction theta = 0, with C_sh of horizontally polarised shear (Cerruti's problem on a homogeneous half-space):
@@ -10,19 +8,15 @@ u_r = cos(theta) (A - B), u_theta = -sin(theta) (A + B), u_z = -cos(theta) Z, wh
 The path is the real axis. It is where damping puts the path: each pole is on the side where it belongs. A path lifted
 into the upper half plane would be smoother, but waves whose energy runs against their phase (backward waves of plates
 and of layers on a stiff base) and the bending of a stiff layer on a soft one have their poles there. Where a body has
-no damping, poles may lie on the axis or too close to it to pass: there the path goes around each of them (`detours`),
+no damping, poles may lie on the axis or too close to it to pass: there the path goes around each of them,
 on the side on which a little loss would leave it. No loss is put into the medium for that, and nothing is extrapolated.
 
 All layers count at every wavenumber: no bound of the waves from a lower layer is known that is both proved and cheaper
 than the layer.
 
-A layered half-space and its displacement under a load.
-
-The response at any number of radii: solved one by one if they are few, otherwise read off one radial curve.
-
-The curve is a cubic spline through solved points. They lie a sixth of the distance to the load's edge apart, where
-the slope is steep, up to half a millimetre, and a millimetre farther out. Waves in soft tissue are 4 mm long or longer
-up to 300 Hz.
+Many radii (`components`) are read off one radial curve. It is a cubic spline through solved points. They lie a sixth of
+the distance to the load's edge apart, where the slope is steep, up to half a millimetre, and a millimetre farther out.
+Waves in soft tissue are 4 mm long or longer up to 300 Hz.
 """
 
 from __future__ import annotations
@@ -74,7 +68,6 @@ __all__ = [
 
 _MOST_PANELS = 2_500  # up to the last pole: a few seconds
 _MOST_ATTEMPTS = 3
-_CLOSER = 4.0  # the rtol of several responses: the largest |u| of one may be less than that of all
 _MOST_WAVENUMBERS = 8_000_000
 """Of one response: nothing is tried again that would take more of them, a quarter of a minute or so."""
 

@@ -12,7 +12,7 @@ motor that drives sideways. Its transform is that of the normal one.
 
 A force that turns in the plane, as a coin ERM's does, is two tangential ones in quadrature: F along theta = 0 and -i F
 along theta = pi/2. Together they move a point at theta by F e^{-i theta} (u_r, i u_theta, u_z), in the amplitudes
-`response.Response` has: the same at every theta. The motion is an ellipse; its mean square over a turn is
+`Response` has: the same at every theta. The motion is an ellipse; its mean square over a turn is
 (|u_r|^2 + |u_theta|^2 + |u_z|^2) |F|^2 / 2.
 """
 

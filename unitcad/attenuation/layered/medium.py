@@ -1,9 +1,7 @@
-"""Viscoelastic laws: how a shear modulus becomes complex at an angular frequency. SI, time factor e^{+i omega t}.
+"""Materials and layers, and a layered half-space: its compliance per wavenumber, exact from statics to k h = 1e12.
 
-Poisson's ratio stays real, so every modulus of a material carries the same phase. With this time factor a passive
-material has a positive imaginary part.
-
-A layered half-space: its surface compliance per wavenumber, exact from statics to k h = 1e12.
+A viscoelastic law makes a shear modulus complex. Poisson's ratio stays real, so every modulus of a material carries the
+same phase. With this time factor a passive material has a positive imaginary part.
 
 The state below an interface is the plane of all (u, t) that the stack can carry there. It is kept as a pair of 2x2
 blocks (U, T), u = U c, t = T c. It is carried upwards through a thick layer by reflection, R -> E R E, with decaying

@@ -1,7 +1,8 @@
-"""Plane-strain waves of one material in the Hankel domain, in 2x2 blocks over many wavenumbers at once.
+"""Waves of one material in the Hankel domain, and a stack's state carried through a layer, at many wavenumbers.
 
-A field is u_r = U(z) J1(kr), u_z = W(z) J0(kr); its traction on a plane z = const, acting on the body below, is
-(-sigma_rz, -sigma_zz). A block is an array of shape (2, 2, n): rows (r, z), columns the two waves, n wavenumbers.
+Plane strain, in 2x2 blocks: a field is u_r = U(z) J1(kr), u_z = W(z) J0(kr); its traction on a plane z = const, acting
+on the body below, is (-sigma_rz, -sigma_zz). A block is an array of shape (2, 2, n): rows (r, z), columns the two
+waves, n wavenumbers.
 
 The two waves going down are P = (k, g_p) e^{-g_p z} and Q = (S - P) / k_s^2, where S = (g_s, k) e^{-g_s z},
 g_p^2 = k^2 - eps k_s^2, g_s^2 = k^2 - k_s^2, k_s^2 = rho omega^2 / mu. P and S become one and the same as omega -> 0;

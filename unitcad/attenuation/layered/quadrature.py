@@ -1,9 +1,7 @@
-"""The path of a Hankel integral in panels: rows of (a, b, base, turn), complex.
+"""The path of a Hankel integral in panels, its detours around poles, and the rule over the panels.
 
-A panel runs from s = a to b, straight in s. The wavenumber is s itself, or, next to a branch point on the axis,
-base + turn s^2, in which the kernel has no root any more.
-
-Detours of the path around single poles that lie on the real axis or next to it.
+A panel is a row (a, b, base, turn), complex. It runs from s = a to b, straight in s. The wavenumber is s itself, or,
+next to a branch point on the axis, base + turn s^2, in which the kernel has no root any more.
 
 If nothing is damped, or only a body that a wave hardly reaches, poles are on the axis or closer to it than any panel.
 Between two wavenumbers with one such pole the path leaves the axis, over two legs on the pole's other side.
@@ -12,11 +10,9 @@ A pole is where the kernel times (t - t_pole) is a polynomial of the panel's t, 
 the last Legendre coefficients of the two agree up to that factor. The side on which it belongs is that of its imaginary
 part, or, where that is lost in rounding, that to which a little more loss moves it.
 
-Gauss and Legendre over the panels of a Hankel integral, with a bound of the error of each.
-
 A panel's kernel is known at a few nodes. Where the Bessel functions swing faster than they can be seen there, the panel
 is cut into pieces, and the kernel's Legendre series is read off at the nodes of each: the kernel, which costs most, is
-sampled as it varies, not as the waves do. The sum of the waves of all pieces at a panel's node is its weight.
+sampled as it varies, not as the waves do.
 """
 
 from __future__ import annotations
