@@ -16,8 +16,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (547_100, 402, 68_200),
-    "core": (273_600, 221, 35_100),
+    "total": (546_700, 402, 68_200),
+    "core": (273_200, 221, 35_000),
     "tests": (410_000, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
