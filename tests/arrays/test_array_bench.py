@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import pytest
 from casting_rules import broken_rules
+from unitcad.casting.written import files
 
 from tests.casting import test_bench_rules as rules
 from tests.casting import test_bench_views as views_of
@@ -94,3 +95,7 @@ def test_the_procedure_says_what_is_on_each_plate() -> None:
     named = ("moulds/moulds-1.3mf with base piece 1", "moulds/moulds-2.3mf with", "cup 2 piece 2")
     places = [first.index(words) for words in named]
     assert all(one < other for one, other in pairwise(places))
+
+
+def test_a_patch_s_sheet_has_no_more_words_than_a_maker_reads() -> None:
+    assert len(files(planned(*PATCH)[1])["casting.md"].split()) <= 1800

@@ -152,7 +152,7 @@ def _judge(name, folder):
     assert manifest["name"] == name
     assert re.fullmatch(r"[a-z0-9-]+(\.[0-9][a-z0-9-]*)*-[0-9a-f]{12}", folder.name)
     tokens = MarkdownIt("commonmark", {"html": True}).enable("table").parse((folder / "casting.md").read_text("utf-8"))
-    fold = {"<details>\n<summary>Figures and sources</summary>\n", "</details>\n"}
+    fold = {"<details>\n<summary>Drawings</summary>\n", "</details>\n"}
     tokens = [token for token in tokens if token.type != "html_block" or token.content not in fold]
     spans = [child for token in tokens for child in token.children or [token]]
     assert not {"html_block", "html_inline", "link_open", "code_inline", "em_open"} & {token.type for token in spans}

@@ -108,7 +108,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         bond = "Its outside" if plan.concentric else f"The face that Layer {n} touches"
         yield BenchStep(
             f"Wipe Layer {n - 1}",
-            f"Wipe it with isopropanol and pour on the same day. {bond} is the bond face: no release "
+            f"Wipe Layer {n - 1} with isopropanol and pour on the same day. {bond} is the bond face: no release "
             "agent on it, ever, no grease, no fingers.",
             picture("bond-face"),
             minutes=2.0 * cells,
@@ -331,12 +331,8 @@ def _tongue_home(moulds: MouldSet, pour: int, the_tongue: str, picture: str) -> 
         )
     bears = ""
     if prop := tongue_prop(moulds):
-        pads = "a pad" if len(prop.pads) == 1 else "a pad on each side"
-        bears = (
-            f" Under {'its' if one else 'their'} free {grip}{'' if one else 's'}, against the cup, put {pads} of "
-            f"stacked card {number(prop.thickness_mm, 3)} mm thick ({number(prop.width_mm, 2)} x "
-            f"{number(prop.length_mm, 2)} mm)."
-        )
+        pads = "the pad of stacked card" if len(prop.pads) == 1 else "a pad of stacked card on each side"
+        bears = f" Under {'its' if one else 'their'} free {grip}{'' if one else 's'}, against the cup, put {pads}."
     return BenchStep(
         "Tongue home",
         f"{stops} Wipe grease out of the bore with a cotton bud.{bears}",
@@ -356,7 +352,7 @@ def mixed(batch: Batch) -> Iterator[BenchStep]:
     yield BenchStep(
         "Weigh",
         f"Weigh {shown(mix.part_a_g)} g of {batch.silicone.name} part A and {shown(mix.part_b_g)} g of part B. Stir "
-        f"both bottles first, weigh B into the cup with A, and note both.{larger}",
+        f"both bottles first, weigh B onto A, and note both.{larger}",
         kind="weigh",
         minutes=WEIGH_MIN,
     )

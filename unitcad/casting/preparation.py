@@ -14,7 +14,6 @@ from unitcad.casting.figures import (
     WEIGH_MIN,
     at_room,
     print_min,
-    window_length,
 )
 from unitcad.casting.steps import BenchStep, duration
 from unitcad.casting.views import level_on, picture_path
@@ -117,7 +116,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     layers = f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
     if resin:
         how.append(
-            f"{takes} resin. {layers}; flat on the plate, no tilt. Compensate the first layers' growth (bottom "
+            f"{takes} resin. {layers}; flat on the plate. Compensate the first layers' growth (bottom "
             "tolerance): it narrows a bore."
         )
     else:
@@ -185,11 +184,10 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
         length = plan.layout.cup[0] - min(abs(c.x) for c in plan.layout.cells) + GRIP_GAP + GRIP_LENGTH
         yield BenchStep(
             "Cut the tongues",
-            f"Cut {'one tongue' if len(cut) == 1 else f'{len(cut)} tongues'} from film or steel "
-            f"{number(dims.exit.height, 3)} mm thick: a strip {number(dims.exit.width, 3)} mm wide and "
-            f"{number(length, 2)} mm long. Cut one end hollow to a radius of {number(dims.ledge_radius, 3)} mm: half a "
-            "punched or drilled hole fits the core's ledge. No burr. Fold tape over the last "
-            f"{number(GRIP_LENGTH, 2)} mm of the other end: this tab is what you pull by, with fingers or flat pliers.",
+            f"Cut {'one tongue' if len(cut) == 1 else f'{len(cut)} tongues'} from film or steel, "
+            f"{number(dims.exit.height, 3)} mm thick, {number(dims.exit.width, 3)} mm wide and {number(length, 2)} mm "
+            f"long, without burr. Cut one end hollow to the ledge's radius of {number(dims.ledge_radius, 3)} mm. Fold "
+            f"tape over the last {number(GRIP_LENGTH, 2)} mm of the other end: this tab is what you pull by.",
             picture_path("cut-tongue"),
             minutes=5.0 * len(cut),
             required_tools=("flat pliers",),
@@ -207,9 +205,9 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
         )
     elif standing and leaf:
         fits = (
-            "Press each cup onto the plinth once by hand, dry; its cut corner lets it on one way only. Its "
-            f"{len(standing)} ribs stand on leaves {number(leaf, 2)} mm thick, which bend and centre it. A leaf broken "
-            "off: print it again."
+            "Press each cup onto the plinth once by hand; its cut corner lets it on one way only. Its "
+            f"{len(standing)} ribs stand on leaves {number(leaf, 2)} mm thick, which bend and centre it. "
+            "A leaf broken off: print it again."
         )
     elif standing:
         fits = (
@@ -233,8 +231,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
             "Filament in",
             "Bend each piece of filament by a right angle, warm from hot water, one leg "
             f"{number(dims.core_height - moulds.plate[0] + SPARE, 2)} mm long.{between} Push that leg up through the "
-            "core until the bent end lies in the groove under the plate. Trim it flush with the core's top with a "
-            "knife.",
+            "core until the bent end lies in the groove under the plate. Trim it flush with the core's top.",
             picture_path("filament"),
             minutes=3.0 * cells,
             required_tools=("sharp knife",),
@@ -266,8 +263,8 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         return
     yield BenchStep(
         "Wash",
-        "Wash the pieces in isopropanol until nothing feels slippery to a gloved finger, rinse holes and corners, and "
-        "let them dry until no spot is dark.",
+        "Wash the pieces in isopropanol, holes too, until nothing feels slippery to a gloved finger. Let "
+        "them dry until no spot is dark.",
         kind="rest",
         minutes=15.0,
         wait_min=30.0,
@@ -276,23 +273,21 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     exit = moulds.plan.dimensions.exit
     if exit and tunnels(moulds):
         steps = [step for step in moulds.plan.steps if step.windows]
-        lengths = [window_length(moulds, step) for step in steps]
-        low, high = number(min(lengths), 2), number(max(lengths), 2)
         windows = [window_section(moulds.spec, exit, step.rim) for step in steps]
         height = number(min(high - low for _, low, high in windows), 2)
         yield BenchStep(
             "Clear the windows",
             f"Clear the windows of {listed(spaced(step.cup) for step in steps)} before the post-cure: resin stays in a "
-            f"slot {height} mm high and {low if low == high else f'{low} to {high}'} mm long. Rinse each with a "
-            "syringe of isopropanol, and push a strip of the tongue's film through until it slides freely.",
+            f"slot {height} mm high. Rinse each with a syringe of isopropanol. Push the tongue's film through until it "
+            "slides freely.",
             picture_path("clear-windows"),
             minutes=5.0 * len(steps),
             required_tools=("isopropanol and lint-free wipes", "rinsing syringe"),
         )
     yield BenchStep(
         "Post-cure, bake",
-        "Resin keeps many platinum silicones from curing: post-cure, bake in an oven (60 degC for "
-        f"{number(BAKE_H, 2)} h, assumed), and let the pieces cool.",
+        "Resin keeps many platinum silicones from curing: post-cure, bake at 60 degC for "
+        f"{number(BAKE_H, 2)} h (assumed).",
         kind="cure",
         minutes=10.0,
         wait_min=60 * BAKE_H,
@@ -301,9 +296,9 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     drops = {each.name: at_room(float(each.cure_h), moulds.spec.casting.room_c) for each in silicones}
     yield BenchStep(
         "Test the cure",
-        "Cure a drop of each silicone on a spot of the base that is no cavity, for its whole cure "
+        "Cure a drop of each silicone on the base, off the cavity, for its whole cure "
         f"({', '.join(f'{name} {number(hours, 2)} h' for name, hours in drops.items())}). If its underside is tacky, "
-        "coat the pieces with acrylic varnish (assumed) or print in another resin, and test again.",
+        "coat the pieces with acrylic varnish (assumed) or change the resin, and test again.",
         kind="cure",
         minutes=WEIGH_MIN + MIXING_MIN,
         wait_min=60 * max(drops.values()),

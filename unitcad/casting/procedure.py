@@ -175,7 +175,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         eccentricity=eccentricity(moulds),
         without_ribs=eccentricity(moulds, with_ribs=False),
         walls=walls(moulds) if plan.concentric else (),
-        warnings=tuple(warnings(spec)) if moulds.makes == "unit" else (),
+        warnings=tuple(warnings(spec, estimate=False)) if moulds.makes == "unit" else (),
         troubles=troubles(moulds),
         makes=moulds.makes,
         bill=bill(moulds, batches, every, after),

@@ -106,9 +106,6 @@ def to_markdown(procedure: Procedure) -> str:
     out = "units and sheet are out of their moulds" if made == "sheet" else f"{made} is out of the mould"
     lines.append(f"The {out} **{total}** after the print, with {bench} at the bench (assumed).")
     lines.append(f"Faults: {TROUBLES}.\n")
-    if procedure.assembly:
-        more = procedure.time_line[-1].end_min - procedure.earliest_finish_min
-        lines[-1:-1] = [f"{procedure.last}: {duration(more)} more."]
     lines += [*_stretches(procedure.time_line), ""]
     if printing.sizes:
         section("0. Measure first", _measuring(procedure))
@@ -125,7 +122,7 @@ def to_markdown(procedure: Procedure) -> str:
     if procedure.assembly:
         steps(procedure.last, procedure.assembly)
     section("Measure on the first part", (f"- {markdown(text)}" for text in procedure.measure))
-    lines += ["bench.html saves what was weighed and measured as a cast record.", "", *_appendix(procedure)]
+    lines += ["bench.html saves your figures as a cast record.", "", *_appendix(procedure)]
     return "\n".join(lines) + "\n"
 
 
@@ -137,7 +134,7 @@ def _measuring(procedure: Procedure) -> Iterator[str]:
         for size in printing.sizes
     )
     differ = f"If calipers differ by more than {number(MEASURED_MM, 2)} mm"
-    yield f"\n{differ}, build again here with your figures before you print."
+    yield f"\n{differ}, build again here with your figures."
     sets = " ".join(f"--set {key}={number(size.value_mm, 3)}" for size in printing.sizes for key in size.keys)
     yield f"\n```sh\nunitcad build {printing.source} {sets}\n```"
 
@@ -166,44 +163,22 @@ def _listed_items(items: Iterable[Item]) -> Iterator[str]:
 
 
 def _stretches(line: Sequence[Phase]) -> Iterator[str]:
-    """Yield a line for each stretch at the bench: when it begins, how long it takes, the wait after it, its phases."""
+    """Yield a line for each stretch at the bench: its begin, its phases, its length; the wait after the last."""
     names, begins, bench = list[str](), 0.0, 0.0
     for i, phase in enumerate(line, 1):
         begins = begins if names else phase.start_min
         names, bench = [*names, phase.name], bench + phase.bench_min
         if phase.wait_min or i == len(line):
-            wait = f", then wait {duration(phase.wait_min)}" if phase.wait_min else ""
+            wait = f", then wait {duration(phase.wait_min)}" if phase.wait_min and i == len(line) else ""
             yield f"- after {duration(begins)}: {', '.join(names)}, {duration(bench)}{wait}"
             names, bench = [], 0.0
 
 
-_SAID = frozenset(
-    (
-        *("volume of one layer", "volume of this pour", "to mix", "part A", "part B", "mixing", "degassing", "vacuum"),
-        *("pouring and striking off", "degassing container, at least", "depth of this pour", "in the cavities, net"),
-        *("scale's error on a part, net", "scale's error on a part, mixed"),
-    )
-)
-"""Figures that steps and bill have, or that follow from others; casting.json has all."""
-
-
 def _appendix(procedure: Procedure) -> Iterator[str]:
-    """Yield figures by their source, with the values of all pours, behind a fold."""
-    sources: dict[str, dict[tuple[str, str], list[str]]] = {}
-    walls = [figure for figure in procedure.walls if figure.name.startswith("cups")][-1:]
-    of_pours = ((figure, number(figure.value, 3)) for pour in procedure.pours for figure in pour.figures)
-    for figure, value in (*of_pours, *((figure, f"{figure.value:.2f}") for figure in walls)):
-        if figure.name not in _SAID and not figure.name.startswith(("rise", "weep")):
-            sources.setdefault(figure.source, {}).setdefault((figure.name, figure.unit), []).append(value)
-    yield from ("<details>", "<summary>Figures and sources</summary>", "")
-    sections = (f"![pour {pour.index} in section]({pour.drawing})" for pour in procedure.pours)
+    """Yield the drawings of the pours, and the heights that whole layers change, behind a fold."""
+    yield from ("<details>", "<summary>Drawings</summary>", "")
+    sections = (f"![pour {pour.index}]({pour.drawing})" for pour in procedure.pours)
     yield from (" ".join(sections), "")
-    for source, named in sources.items():
-        figures = (
-            f"{markdown(name)} {listed(dict.fromkeys(each))}{unit and f' {unit}'}"
-            for (name, unit), each in named.items()
-        )
-        yield f"- {'; '.join(figures)} ({markdown(source)})"
     for o in procedure.off_grid:
         height, by = number(o.height_mm, 3), number(o.moved_mm, 2)
         yield f"- {spaced(o.piece)}, {o.edge}: {height} mm, which whole layers move by {by} mm"
@@ -212,7 +187,7 @@ def _appendix(procedure: Procedure) -> Iterator[str]:
     heights = (f"{h.what} {number(h.printed_mm, 3)} for {number(h.asked_mm, 3)}" for h in inside)
     if inside:
         yield f"- in whole layers, mm: {', '.join(heights)}"
-    yield from ("", "All figures: casting.json.", "", "</details>")
+    yield from ("", "All figures and their sources: casting.json.", "", "</details>")
 
 
 def step_section(moulds: MouldSet, step: Step) -> str:

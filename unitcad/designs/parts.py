@@ -39,15 +39,12 @@ def motor_hold(spec: Spec, dims: Dimensions) -> str:
     lip = " The lip keeps it in." if dims.mouth_radius else ""
     if spec.motor.fill:
         return f"Layer 1 encloses the motor.{lip}"
-    return f"A ring of air of {number(dims.air_ring, 3)} mm stays round the motor (motor.fill = true closes it).{lip}"
+    return f"A ring of air of {number(dims.air_ring, 3)} mm stays round the motor.{lip}"
 
 
 def bond(what: str, where: str) -> str:
     """Write how the motor is fixed: the same words in every design."""
-    return (
-        f"Coat {what} thinly with {ADHESIVE} where it touches {where}: cast silicone bonds poorly to metal and "
-        "polyimide."
-    )
+    return f"Coat {what} thinly with {ADHESIVE} where it touches {where}: cast silicone does not bond to it."
 
 
 def circuit(fpcb: Circuit, pad: Pad, dims: Dimensions) -> Shape:

@@ -19,9 +19,12 @@ GRAVITY, MOTOR_G_CM3 = 9.80665, 5.0
 """Density of a motor whose mass no one states (assumed: coin motors have 4 to 6.5)."""
 
 
-def warnings(spec: Spec) -> list[str]:
-    """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's."""
-    leads = [*_leads(spec), *_roof(spec), *_not_estimated(spec), *_circuit_stock(spec)]
+def warnings(spec: Spec, estimate: bool = True) -> list[str]:
+    """Return the warnings of a spec: layers thinner than their silicone's casting floor, leads, play, the design's.
+
+    Without `estimate` those are left out that concern only the estimate.
+    """
+    leads = [*_leads(spec), *_roof(spec), *(_not_estimated(spec) if estimate else ()), *_circuit_stock(spec)]
     return [*_thin_layers(spec), *leads, *_play(spec), *_design(spec)]
 
 
