@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 from casting_rules import broken_rules
-from unitcad.casting.written import files
+from unitcad.casting.procedure_text import files
 
 from tests.casting import test_bench_rules as rules
 from tests.casting import test_bench_views as views_of
