@@ -25,7 +25,7 @@ from pathlib import Path
 
 from meshes import torus, write_stl
 
-from unitcad.accuracy.timing import timing
+from unitcad.accuracy.measurements import timing
 
 PAIRS = (
     ("topology", "trimesh is_volume", " (4 wanted at 1,000,000)"),

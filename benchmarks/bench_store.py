@@ -23,8 +23,8 @@ from bench_nodes import sweep_text
 
 from unitcad.cache import shared_store
 from unitcad.sweeps import BatchOptions, load_sweep
+from unitcad.sweeps.batch_command import merge
 from unitcad.sweeps.executors import SerialExecutor
-from unitcad.sweeps.merging import merge
 from unitcad.sweeps.run import run
 from unitcad.sweeps.shards import Shard, shard_folders
 from unitcad.sweeps.task import outcomes

@@ -20,7 +20,7 @@ from unitcad.shape import (
     turned,
     union,
 )
-from unitcad.shape.body import Body
+from unitcad.shape.tree import Body
 
 LEADLESS = str(Path(__file__).with_name("leadless.toml"))
 """A spec of a closed cavity without circuit and wires."""

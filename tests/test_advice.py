@@ -10,7 +10,7 @@ import pytest
 from tests.sample_bodies import LEADLESS
 from unitcad.catalogue import materials
 from unitcad.validation import load, templates, warnings
-from unitcad.validation.advice import MOTOR_G_CM3, roof
+from unitcad.validation.defaults import MOTOR_G_CM3, roof
 
 ONE = ("single-encapsulating",)
 

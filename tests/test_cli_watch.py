@@ -18,7 +18,7 @@ import pytest
 from typer.testing import CliRunner
 
 from unitcad.cli import app
-from unitcad.cli.file_watcher import wait_for_saves
+from unitcad.cli.build_command import wait_for_saves
 from unitcad.errors import WrongArgument
 from unitcad.validation import templates
 

@@ -1,6 +1,6 @@
 """The table of inputs under `estimate --details`: what reads none of them is said of the level alone."""
 
-from unitcad.cli.estimate_tables import _inputs
+from unitcad.cli.estimate_command import _inputs
 
 
 def test_the_bodys_inputs_are_said_to_change_the_curve():

@@ -13,7 +13,7 @@ from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Revolve, Union, cylinder, moved, polygon, turned
-from unitcad.shape.body import Body
+from unitcad.shape.tree import Body
 from unitcad.validation import templates
 
 occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)

@@ -11,7 +11,7 @@ from sample_bodies import base, cup, layers, tube
 from unitcad.export import svg
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, moved
-from unitcad.shape.body import Body
+from unitcad.shape.tree import Body
 from unitcad.validation import templates
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sample_bodies import all_bodies
 
-from unitcad.export import printing, threemf
+from unitcad.export import printing
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.meshcheck import check_file
 from unitcad.moulds.mould_set import MouldSet
@@ -21,7 +21,7 @@ CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 @pytest.fixture(scope="module")
 def parts():
     return [
-        threemf.MeshPart(
+        printing.MeshPart(
             body.name, body.colour, *printing.print_ready(*arrays(realise(body.shape, 48)), body.upside_down)
         )
         for body in all_bodies()
@@ -47,7 +47,7 @@ def placed_boxes(root: ElementTree.Element) -> list[tuple[np.ndarray, np.ndarray
 
 
 def test_read_back_equals_written(parts):
-    root = model(threemf.content(parts))
+    root = model(printing.content(parts))
     assert root.get("unit") == "millimeter"
     objects = list(root.iter(f"{CORE}object"))
     bases = list(root.iter(f"{CORE}base"))
@@ -64,25 +64,25 @@ def test_read_back_equals_written(parts):
 
 @given(st.lists(st.tuples(st.floats(0.1, 150), st.floats(0.1, 150)), min_size=1, max_size=12))
 def test_layout_never_overlaps(footprints):
-    corners = threemf.layout(footprints, (220, 220))
+    corners = printing.layout(footprints, (220, 220))
     for i, ((x, y), (w, d)) in enumerate(zip(corners, footprints, strict=True)):
         assert x >= 0
         assert x + w <= 220 + 1e-9
         for (ox, oy), (ow, od) in zip(corners[:i], footprints[:i], strict=True):
-            assert max(x - ox - ow, ox - x - w, y - oy - od, oy - y - d) >= threemf.GAP_MM - 1e-9
+            assert max(x - ox - ow, ox - x - w, y - oy - od, oy - y - d) >= printing.GAP_MM - 1e-9
 
 
 def test_same_bytes_and_fixed_dates(parts):
-    data = threemf.content(parts)
-    assert threemf.content(parts) == data
+    data = printing.content(parts)
+    assert printing.content(parts) == data
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         assert archive.namelist()[0] == "[Content_Types].xml"
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
 
 
 def test_names_are_escaped(parts):
-    odd = threemf.MeshPart('a<b>"&', (0, 0.5, 1), parts[-1].vertices, parts[-1].faces)
-    node = next(model(threemf.content([odd])).iter(f"{CORE}object"))
+    odd = printing.MeshPart('a<b>"&', (0, 0.5, 1), parts[-1].vertices, parts[-1].faces)
+    node = next(model(printing.content([odd])).iter(f"{CORE}object"))
     assert node.get("name") == 'a<b>"&'
 
 
@@ -116,5 +116,5 @@ def test_copies_share_a_mesh_and_each_has_an_item(tmp_path):
     assert sorted(built) == pytest.approx(sorted(moulds.mesh(body).volume() for body in bodies), rel=1e-5)
     boxes = placed_boxes(root)
     for i, (low, high) in enumerate(boxes):
-        assert all(np.maximum(low - b, a - high)[:2].max() >= threemf.GAP_MM - 1e-5 for a, b in boxes[:i])
+        assert all(np.maximum(low - b, a - high)[:2].max() >= printing.GAP_MM - 1e-5 for a, b in boxes[:i])
     assert not check_file(path).findings

@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 from unitcad.cli import app
 from unitcad.errors import Refusal
-from unitcad.spec.toml_lines import line_of
+from unitcad.spec.toml import line_of
 from unitcad.validation import load, put, read, templates
-from unitcad.validation.dotted import ABSENT, at
+from unitcad.validation.plain_data import ABSENT, at
 
 BAD = """\
 name = "bad"

@@ -12,7 +12,7 @@ import pytest
 
 from unitcad.rooms import file_kinds
 from unitcad.validation import templates
-from unitcad.validation.shipped_files import shipped_of
+from unitcad.validation.load import shipped_of
 
 BUILT = [sorted(templates()), *(sorted(shipped_of(kind)) for kind in file_kinds() if kind.subject)]
 QUICK = ["encapsulating", *(names[0] for names in BUILT[1:])]

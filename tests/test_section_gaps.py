@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from manifold3d import CrossSection, Manifold
 
-from unitcad.geometry.outline_gaps import between_outlines
-from unitcad.geometry.segments import between_convex
-from unitcad.kernels.sections import gap
+from unitcad.geometry.segments import between_convex, between_outlines
+from unitcad.kernels.mesh import gap
 
 
 def square(half: float, x: float = 0.0, y: float = 0.0) -> np.ndarray:

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.spec.toml import MOST, parse_toml
-from unitcad.spec.toml_lines import line_of
+from unitcad.spec.toml import MOST, line_of, parse_toml
 from unitcad.validation import load
 
 TEXT = '''\

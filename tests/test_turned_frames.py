@@ -21,14 +21,13 @@ from unitcad.checks import balance, draw, overlap
 from unitcad.checks.draw import blocked
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
-from unitcad.moulds.congruence import cropped
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.pieces import base_piece
+from unitcad.moulds.pieces import CAST, Removal, base_piece
 from unitcad.moulds.plan import Step
-from unitcad.moulds.removal import CAST, Removal
+from unitcad.moulds.surroundings import cropped
 from unitcad.shape import Common, Shape, box, cut, cylinder, exact_volume, moved, ring, rotated, union
-from unitcad.shape.body import Body
 from unitcad.shape.column import Column, Standing
+from unitcad.shape.tree import Body
 from unitcad.validation import load
 
 SEGMENTS, TOP = 48, 6.0

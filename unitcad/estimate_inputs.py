@@ -19,7 +19,7 @@ from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials,
 from unitcad.designs import design_of, dimensions, no_estimate
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
-from unitcad.validation.fit_text import lab_fit
+from unitcad.validation.defaults import lab_fit
 
 _MOTOR_DENSITY = (4000.0, 5000.0, 6500.0)  # kg/m3: low, value, high
 FEM = "fem"

@@ -16,7 +16,7 @@ from benchmarks.accuracy.level_scores import score_tables
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Cell, Plot, Promise, Result, Say, Summary, Table, stars
 from benchmarks.accuracy.unexplained import NineLevels, unexplained
-from unitcad.accuracy.timing import Timing, interleaved, timing
+from unitcad.accuracy.measurements import Timing, interleaved, timing
 from unitcad.attenuation.edge.measured import CONTROL, MeasuredTable, measured_table
 from unitcad.attenuation.edge.models import (
     COMPARED,

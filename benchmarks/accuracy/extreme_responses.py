@@ -16,7 +16,7 @@ from benchmarks.accuracy.hankel import DISC, OMEGA, RADII
 from benchmarks.accuracy.journal import journalled
 from benchmarks.accuracy.result import Cell, Plot, Promise, Table, shown
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
-from unitcad.accuracy.worker_jobs import in_order
+from unitcad.accuracy.survey import in_order
 from unitcad.attenuation.layered import Damping, HalfSpace, KelvinVoigt, Layer, LayeredMedium, LossFactor
 from unitcad.errors import UnitcadError
 

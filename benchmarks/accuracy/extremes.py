@@ -11,10 +11,9 @@ from typing import Any
 from benchmarks.accuracy.journal import journalled
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table
-from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUSED, Outcome, outcome
+from unitcad.accuracy.measurements import timing
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
-from unitcad.accuracy.timing import timing
-from unitcad.accuracy.worker_jobs import in_order
+from unitcad.accuracy.survey import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUSED, Outcome, in_order, outcome
 from unitcad.designs import shipped
 from unitcad.validation import default_template, override, read
 

@@ -14,7 +14,7 @@ from benchmarks.accuracy import hankel_cost, hankel_frontier
 from benchmarks.accuracy import hankel_peers as peers
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
-from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved
+from unitcad.accuracy.measurements import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.estimate_inputs import estimate_input

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.accuracy import ball_reference
 from benchmarks.accuracy.result import Cell, Plot, Promise, Say, Table, shown
-from unitcad.accuracy.timing import PROCESSOR, Timing, interleaved
+from unitcad.accuracy.measurements import PROCESSOR, Timing, interleaved
 from unitcad.attenuation.layered import Direction, LayeredMedium, Load, Point, Response, UniformDisc
 
 LOADS: dict[str, Load] = {

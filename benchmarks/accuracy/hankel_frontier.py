@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.accuracy import hankel_peers as peers
 from benchmarks.accuracy.result import Table
-from unitcad.accuracy.timing import Timing, interleaved
+from unitcad.accuracy.measurements import Timing, interleaved
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 TOLERANCES = (0.1, 0.03, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Cell, Promise, Result, Say, Summary, Table
-from unitcad.accuracy.skipped import EVERYTHING, REQUESTS, time_requests
-from unitcad.accuracy.timing import Timing
+from unitcad.accuracy.measurements import EVERYTHING, REQUESTS, Timing, time_requests
 from unitcad.pipeline.make import Subject
 from unitcad.validation import default_template, load, templates
 

@@ -19,7 +19,7 @@ from benchmarks.accuracy.synthetic_records import (
     Synthetic,
     synthetic,
 )
-from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE
+from unitcad.accuracy.measurements import PROCESSOR, PROCESSOR_NOTE
 from unitcad.lab.chains import ChainTable, bandpass
 from unitcad.lab.chains.line import Mains, fit_line
 from unitcad.lab.measuring import level

@@ -16,7 +16,7 @@ from pathlib import Path
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.measures import mesh_volume
 from benchmarks.accuracy.result import Promise, Result, Say, Summary, Table, shown
-from unitcad.accuracy.timing import Timing, interleaved, timing
+from unitcad.accuracy.measurements import Timing, interleaved, timing
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.variant import Variant
 from unitcad.validation import default_template, load

@@ -11,7 +11,7 @@ from benchmarks.accuracy.elements import amplitude, pressed_skin
 from benchmarks.accuracy.fem_search import DRIVES, READINGS, drawn_levels, searches, unit_spec
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
-from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, interleaved
+from unitcad.accuracy.measurements import PROCESSOR, PROCESSOR_NOTE, interleaved
 from unitcad.attenuation.fem.unit import Draw, Drive, Setting, drawn, motion
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered import UniformDisc

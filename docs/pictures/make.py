@@ -26,9 +26,9 @@ from running import serving  # noqa: E402
 
 from unitcad import Variant  # noqa: E402
 from unitcad.arrays.array_file import load_array  # noqa: E402
-from unitcad.arrays.crosstalk_maps import crosstalk_files  # noqa: E402
+from unitcad.arrays.array_page import pictures as patch_pictures  # noqa: E402
+from unitcad.arrays.crosstalk import crosstalk_files  # noqa: E402
 from unitcad.arrays.patch import patch_moulds  # noqa: E402
-from unitcad.arrays.patch_pictures import pictures as patch_pictures  # noqa: E402
 from unitcad.cache import MemoryStore  # noqa: E402
 from unitcad.lab.phantom import load_phantom, phantom_set  # noqa: E402
 from unitcad.lab.phantom_command import box_picture  # noqa: E402

@@ -13,9 +13,17 @@ from typer.testing import CliRunner
 from benchmarks.accuracy import ball_reference
 from unitcad.accuracy import survey
 from unitcad.accuracy.amplification import amplifications, extremes
-from unitcad.accuracy.meshes import mesh_rows, tolerances_of
-from unitcad.accuracy.responses import COMPONENTS, REFERENCE, RTOLS, compare, respond, response_rows
-from unitcad.accuracy.skipped import skipped_rows
+from unitcad.accuracy.measurements import (
+    COMPONENTS,
+    REFERENCE,
+    RTOLS,
+    compare,
+    mesh_rows,
+    respond,
+    response_rows,
+    skipped_rows,
+    tolerances_of,
+)
 from unitcad.attenuation.inputs import Quantity, body
 from unitcad.attenuation.layered import LayeredMedium, Response
 from unitcad.attenuation.layered.loads import UniformDisc

@@ -26,7 +26,7 @@ from benchmarks.accuracy.result import (
     kept,
     shown,
 )
-from unitcad.accuracy.timing import PROCESSOR, interleaved, timing
+from unitcad.accuracy.measurements import PROCESSOR, interleaved, timing
 from unitcad.errors import Refusal, UnitcadError
 
 RESULT = Result(

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from benchmarks.accuracy import extremes
 from benchmarks.accuracy.runner import JOURNALS
-from unitcad.accuracy.outcomes import (
+from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, Seeded, random_spec, seeded_spec
+from unitcad.accuracy.survey import (
     BUILT,
     GOOD,
     REFUSED,
@@ -23,7 +24,6 @@ from unitcad.accuracy.outcomes import (
     put_in,
     refusal_of,
 )
-from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, Seeded, random_spec, seeded_spec
 from unitcad.checks import check_moulds
 from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet

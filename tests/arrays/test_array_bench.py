@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import pytest
 from casting_rules import broken_rules
-from unitcad.casting.procedure_text import files
 
 from tests.casting import test_bench_rules as rules
 from tests.casting import test_bench_views as views_of
@@ -17,10 +16,10 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import back_sheet_procedure, curved_procedure
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.casting.drawings import ARROW, GREASE
-from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.preparation import printing
 from unitcad.casting.procedure import Procedure
-from unitcad.casting.views import picture_path, views
+from unitcad.casting.procedure_text import files
+from unitcad.casting.views import BenchPictures, picture_path, views
 from unitcad.designs import layer_colour
 
 PATCH, BAND = ("forearm-patch",), ("wrist-band",)

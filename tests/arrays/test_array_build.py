@@ -18,8 +18,8 @@ from casting_rules import broken_rules
 from tests.report.test_glb import chunks
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_hash, load_array
+from unitcad.arrays.array_page import patch_glb
 from unitcad.arrays.array_procedure import pocket_procedure
-from unitcad.arrays.array_view import patch_glb
 from unitcad.arrays.arrayed import unit_folders
 from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.cache import MemoryStore

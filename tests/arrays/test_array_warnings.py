@@ -10,8 +10,7 @@ import pytest
 
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.array_page import write_array_page
-from unitcad.arrays.circuit.circuit_files import has_circuit
-from unitcad.arrays.circuit.wiring import GAP_MM, TRACK_MM, crowded_tracks, width_needed
+from unitcad.arrays.circuit import GAP_MM, TRACK_MM, crowded_tracks, has_circuit, width_needed
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks.gap import play_missing
 from unitcad.moulds.cup import groove_depth_of

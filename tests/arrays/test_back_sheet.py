@@ -14,7 +14,7 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
-from unitcad.moulds.removal import Removal
+from unitcad.moulds.pieces import Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, union
 
 Change = Callable[[Shape], Shape]

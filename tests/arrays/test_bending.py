@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_page import FINEST, picture_names, wrapped
+from unitcad.arrays.array_page import bent as bent_mesh
 from unitcad.arrays.crosstalk import pairs
-from unitcad.arrays.limb import bending
 from unitcad.arrays.patch import patch_moulds
-from unitcad.arrays.patch_pictures import FINEST, picture_names, wrapped
-from unitcad.arrays.patch_pictures import bent as bent_mesh
+from unitcad.arrays.sheet import bending
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
 from unitcad.shape import box

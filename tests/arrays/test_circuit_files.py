@@ -13,9 +13,16 @@ import pytest
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.circuit.circuit_files import circuit_dxf, circuit_svg, kicad_board, pad_table
-from unitcad.arrays.circuit.outline import circuit_body, outline
-from unitcad.arrays.circuit.wiring import Wiring, wiring
+from unitcad.arrays.circuit import (
+    Wiring,
+    circuit_body,
+    circuit_dxf,
+    circuit_svg,
+    kicad_board,
+    outline,
+    pad_table,
+    wiring,
+)
 from unitcad.errors import Missing, Refusal
 from unitcad.shape import Profile, exact_volume, mm
 from unitcad.shape.profile import arc_centre, points, sides

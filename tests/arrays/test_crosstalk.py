@@ -11,9 +11,16 @@ import pytest
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.circuit.outline import outline
-from unitcad.arrays.crosstalk import MOST_LOADED, crosstalk, crosstalk_csv, crosstalk_lines, pairs
-from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
+from unitcad.arrays.circuit import outline
+from unitcad.arrays.crosstalk import (
+    MOST_LOADED,
+    crosstalk,
+    crosstalk_csv,
+    crosstalk_lines,
+    heat_map_svg,
+    pairs,
+    patch_map_svg,
+)
 from unitcad.attenuation import UniformDisc
 from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.inputs import body

@@ -16,7 +16,7 @@ from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.casting.procedure import Procedure
 from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
-from unitcad.moulds.removal import CAST, Removal
+from unitcad.moulds.pieces import CAST, Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
 
 Change = Callable[[Shape], Shape]

@@ -6,10 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.circuit.circuit_files import circuit_files, has_circuit
-from unitcad.arrays.circuit.outline import outline
-from unitcad.arrays.crosstalk import crosstalk, crosstalk_lines, ratios
-from unitcad.arrays.crosstalk_maps import crosstalk_files, extras
+from unitcad.arrays.circuit import circuit_files, has_circuit, outline
+from unitcad.arrays.crosstalk import crosstalk, crosstalk_files, crosstalk_lines, extras, ratios
 from unitcad.cli import app
 from unitcad.errors import Refusal
 

@@ -10,8 +10,8 @@ from functools import cache
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import draw, overlap
+from unitcad.moulds.pieces import CAST, Removal, Way
 from unitcad.moulds.plan import Step
-from unitcad.moulds.removal import CAST, Removal, Way
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated
 
 UP, DOWN = (0, 0, 1), (0, 0, -1)

@@ -8,8 +8,8 @@ from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.arrays.piece_seams import Strip, on_pieces
 from unitcad.kernels.mesh import realise
-from unitcad.moulds.dovetails import straight
-from unitcad.moulds.labels import set_label
+from unitcad.moulds.cuts import straight
+from unitcad.moulds.pieces import set_label
 from unitcad.shape import box, union
 from unitcad.shape.lettering import engraving, seen
 

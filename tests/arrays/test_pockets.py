@@ -9,7 +9,7 @@ import pytest
 
 from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.construction import constructions
+from unitcad.arrays.constructions import constructions
 from unitcad.arrays.patch import patch_moulds
 from unitcad.checks import check_moulds, overlap
 from unitcad.errors import Refusal

@@ -12,17 +12,16 @@ import pytest
 
 from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_page import taken_apart
 from unitcad.arrays.array_procedure import back_sheet_procedure
 from unitcad.arrays.constructions.back_sheet import drawing_of
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
-from unitcad.arrays.patch_pictures import taken_apart
 from unitcad.arrays.piece_seams import weep
 from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import between_convex, to_segment
 from unitcad.kernels.mesh import bounds, realise
-from unitcad.moulds.cuts import BESIDE
-from unitcad.moulds.dovetails import Split, split, straight
+from unitcad.moulds.cuts import BESIDE, Split, split, straight
 from unitcad.moulds.pieces import base_piece
 from unitcad.shape import Shape, box, cut, moved
 

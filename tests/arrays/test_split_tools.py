@@ -17,8 +17,7 @@ from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds, mould_checks
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
-from unitcad.moulds.cuts import Feature, Sized, in_gaps, seams
-from unitcad.moulds.dovetails import FLANK_DEG, LARGE, ROUND, Seam, split, straight
+from unitcad.moulds.cuts import FLANK_DEG, LARGE, ROUND, Feature, Seam, Sized, in_gaps, seams, split, straight
 from unitcad.moulds.pieces import base_piece
 from unitcad.pipeline.plan import file_stem
 from unitcad.shape import Common, Shape, box, cut, moved, union

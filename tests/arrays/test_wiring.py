@@ -8,8 +8,7 @@ import pytest
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.circuit.outline import _arc_sides
-from unitcad.arrays.circuit.wiring import LEAST_BEND, wiring
+from unitcad.arrays.circuit import LEAST_BEND, _arc_sides, wiring
 from unitcad.errors import Refusal
 
 NINE = {

@@ -12,9 +12,8 @@ import pytest
 from PIL import Image
 
 from unitcad.casting.drawings import ARROW, BAND, CARD, TAPE, tongue_prop
-from unitcad.casting.pictures import SIZE, pictures
 from unitcad.casting.procedure import Procedure, procedure
-from unitcad.casting.views import View, picture_path, views
+from unitcad.casting.views import SIZE, View, picture_path, pictures, views
 from unitcad.export.raster import Layer, Surface, aim, finish, render
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet

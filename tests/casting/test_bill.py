@@ -8,9 +8,9 @@ import pytest
 
 from tests.sample_bodies import LEADLESS
 from unitcad.casting.bill import plural
-from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.procedure_text import to_markdown
+from unitcad.casting.views import BenchPictures
 from unitcad.catalogue import materials
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import assumed_lengths

@@ -24,7 +24,7 @@ from unitcad.lab.phantom import PhantomTable, load_phantom, modulus_by_table, ph
 from unitcad.shape import box, cylinder, exact_volume, moved, union
 from unitcad.spec import convert
 from unitcad.validation import load
-from unitcad.validation.shipped_files import shipped_files
+from unitcad.validation.load import shipped_files
 
 DATA = Path(__file__).parent / "data" / "phantom-material-database" / "phantoms_table.csv"
 LAYERS = [

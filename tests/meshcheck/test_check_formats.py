@@ -18,10 +18,10 @@ from shapes import box, stl, text_stl
 
 from unitcad.errors import Refusal
 from unitcad.meshcheck import FileReport, Options, check_file, check_mesh, output
+from unitcad.meshcheck.builds import check_surface, in_file
 from unitcad.meshcheck.file_checks import check_files
 from unitcad.meshcheck.findings import SEVERITIES, Finding, Location, merge
 from unitcad.meshcheck.geometry.mesh import Mesh, Source
-from unitcad.meshcheck.one_mesh import check_surface, in_file
 from unitcad.meshcheck.output import FORMATS, render
 from unitcad.meshcheck.rules.f_file import Deadline
 from unitcad.meshcheck.rules.registry import FAMILIES, check_prefixes, explain, rules

@@ -13,8 +13,8 @@ from manifold3d import Manifold, OpType
 from tests.sample_bodies import LEADLESS
 from unitcad.checks import check_moulds, draw, groove_walls
 from unitcad.kernels.mesh import realise, shells
-from unitcad.moulds.congruence import column_round
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.surroundings import column_round
 from unitcad.shape import Shape, box, cut, union
 
 BED = ("moulds.bed_x_mm=1000", "moulds.bed_y_mm=1000")

@@ -15,8 +15,8 @@ from unitcad.errors import Refusal
 from unitcad.kernels.mesh import thick_pieces
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, cut, cylinder, ring
-from unitcad.shape.body import Body
 from unitcad.shape.profile import FACETS
+from unitcad.shape.tree import Body
 from unitcad.validation import load
 
 BODIES = Path(__file__).parent / "bodies"

@@ -11,9 +11,9 @@ from faulty_sets import broken, set_of, with_fault, without
 
 from unitcad.checks import balance, check_moulds, mould_checks
 from unitcad.errors import Refusal
-from unitcad.moulds import trapped_air
+from unitcad.moulds import lid
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.removal import CAST, Removal
+from unitcad.moulds.pieces import CAST, Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, ring, union
 from unitcad.shape.tree import Common, Revolve
 from unitcad.validation import from_data, templates
@@ -239,7 +239,7 @@ def test_air_under_a_tongue_is_the_formulas() -> None:
     """The widest tail that the ledge leaves: C400 measures what lengths say; on thin walls it is refused."""
     moulds = set_of("encapsulating", "fpcb.tail_width_mm=6.3", "output.tolerance_mm=0.001")
     measured = [f.value for f in check_moulds(moulds) if f.code == "C400"]
-    expected = [trapped_air.under_tongue(moulds.dimensions, moulds.dimensions.exit, layer) for layer in range(2)]
+    expected = [lid.under_tongue(moulds.dimensions, moulds.dimensions.exit, layer) for layer in range(2)]
     assert measured == pytest.approx(expected, rel=0.01)
     with pytest.raises(Refusal) as refused:
         set_of("encapsulating", "fpcb.tail_width_mm=6.3", "layers.0.wall_mm=0.6", "layers.1.wall_mm=1.9")

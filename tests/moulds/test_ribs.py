@@ -15,9 +15,8 @@ from unitcad.catalogue import printers
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.moulds.base import tapered
-from unitcad.moulds.cup import skirt_end
+from unitcad.moulds.cup import rib_shapes, ribs, skirt_end, slot_shapes
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.ribs import rib_shapes, ribs, slot_shapes
 from unitcad.shape import Common, Shape, box, cut, union
 from unitcad.validation import templates
 

@@ -16,7 +16,7 @@ from unitcad.cli import app
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import build
 from unitcad.report import page, read_results, write_report
-from unitcad.report.pool import REFERENCE, Pool
+from unitcad.report.html_page import REFERENCE, Pool
 from unitcad.report.viewer_models import model
 from unitcad.validation import load, templates
 

@@ -24,7 +24,7 @@ from unitcad.cache import MemoryStore
 from unitcad.cli import app
 from unitcad.cli.output import say_error
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.export import chart, threemf
+from unitcad.export import chart, printing
 from unitcad.pipeline.write import build
 from unitcad.report import write_report
 from unitcad.spec import to_toml
@@ -197,7 +197,7 @@ def test_a_bodys_name_is_text_in_meshes_and_drawings(name):
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     with zipfile.ZipFile(
-        io.BytesIO(threemf.content([threemf.MeshPart(name, (0.1, 0.2, 0.3), vertices, faces)]))
+        io.BytesIO(printing.content([printing.MeshPart(name, (0.1, 0.2, 0.3), vertices, faces)]))
     ) as made:
         model = ElementTree.fromstring(made.read("3D/3dmodel.model"))
     objects = [element.get("name") for element in model.iter() if element.tag.endswith("}object")]

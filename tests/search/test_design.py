@@ -19,12 +19,10 @@ from unitcad.casting.procedure import procedure
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.search import design_files, explanation, proposals
+from unitcad.search import design_files, proposals
 from unitcad.search.candidates import Candidates, candidates, grid, sequences_of, spec_data
 from unitcad.search.design_files import front
-from unitcad.search.explanation import explain
-from unitcad.search.proposals import Inversion, invert, name_of
-from unitcad.search.ranking import EQUAL, kinds
+from unitcad.search.proposals import EQUAL, Inversion, explain, invert, kinds, name_of
 from unitcad.search.target_file import Target, load_target, target_of
 from unitcad.validation import from_data, load
 
@@ -249,7 +247,7 @@ def test_a_candidate_whose_moulds_fail_is_out_with_its_code(monkeypatch: pytest.
     def judged(spec: Any) -> tuple[int, list[str]]:
         return 9, ["C300 layer1: 0.1 against 0.2 mm"] if spec.layers[0].wall_mm == 1.25 else []
 
-    for module in (proposals, explanation):
+    for module in (proposals, proposals):
         monkeypatch.setattr(module, "castability", judged)
     made = invert(_target())
     assert all(one["walls_mm"][0] != 1.25 for one in made.data["proposals"])

@@ -16,7 +16,7 @@ from unitcad.estimate_inputs import estimate_input
 from unitcad.search.candidates import candidates
 from unitcad.search.proposals import leads_block
 from unitcad.search.target_file import load_target, target_of
-from unitcad.validation.shipped_files import shipped_files
+from unitcad.validation.load import shipped_files
 
 
 @pytest.mark.parametrize(

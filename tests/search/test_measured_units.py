@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from unitcad.search.design_text import is_first_other, level_line
+from unitcad.search.design_files import is_first_other, level_line
 from unitcad.search.proposals import invert
 from unitcad.search.target_file import load_target, target_of
 

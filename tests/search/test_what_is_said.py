@@ -13,10 +13,8 @@ import pytest
 from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.errors import Refusal, UnknownKey
 from unitcad.estimate_inputs import estimate_input, estimate_spec
-from unitcad.search.design_files import contents, ranking
-from unitcad.search.design_text import explanation_lines, head_lines, lines, title
-from unitcad.search.explanation import explain
-from unitcad.search.proposals import Inversion, invert
+from unitcad.search.design_files import contents, explanation_lines, head_lines, lines, ranking, title
+from unitcad.search.proposals import Inversion, explain, invert
 from unitcad.search.target_file import load_target, target_of
 from unitcad.spec import to_data, to_toml
 from unitcad.validation import from_data, load

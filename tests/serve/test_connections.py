@@ -13,9 +13,8 @@ pytest.importorskip("uvicorn", reason="the extra serve is not installed")
 import uvicorn
 
 from unitcad.errors import UnitcadError
-from unitcad.serve.addresses import hosts, means
-from unitcad.serve.connections import Connection
-from unitcad.serve.server import serve
+from unitcad.serve.request_guard import hosts, means
+from unitcad.serve.server import Connection, serve
 from unitcad.validation import templates
 
 HALF = b"GET / HTTP/1.1\r\n"

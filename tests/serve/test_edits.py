@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.serve.edits import edited
+from unitcad.serve.form import edited
 from unitcad.serve.messages import Edit
 from unitcad.validation import put, templates
-from unitcad.validation.dotted import drop
+from unitcad.validation.plain_data import drop
 
 NAMES = [
     "diameter_mm", "layers.0.wall_mm", "layers.1.material", "motor.fill", "fpcb.tail_width_mm", "moulds.plate_mm",

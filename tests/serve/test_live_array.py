@@ -14,9 +14,8 @@ from live import Live
 from running import serving
 
 from unitcad.arrays.array_file import array_templates, load_array
-from unitcad.arrays.array_view import patch_glb
-from unitcad.arrays.crosstalk import crosstalk
-from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
+from unitcad.arrays.array_page import patch_glb
+from unitcad.arrays.crosstalk import crosstalk, heat_map_svg, patch_map_svg
 from unitcad.arrays.patch import patch_moulds, patch_parts
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal

@@ -16,8 +16,7 @@ import pytest
 from batching import bytes_of, command, environment, ring_sweep, unitcad
 
 from unitcad.errors import UnitcadError
-from unitcad.sweeps.cluster import Certificates
-from unitcad.sweeps.executors import Workers
+from unitcad.sweeps.executors import Certificates, Workers
 
 pytest.importorskip("distributed")
 
@@ -124,7 +123,7 @@ def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening, 
         address = f"tcp://127.0.0.1:{mute.getsockname()[1]}"
         sweep = ring_sweep(tmp_path / "s")
         code = (
-            "import sys, time, unitcad.sweeps.cluster, unitcad.cli.command_line; from unitcad.cli import main\n"
+            "import sys, time, unitcad.sweeps.executors, unitcad.cli.command_line; from unitcad.cli import main\n"
             "import distributed; start = time.monotonic()\n"
             "try: main()\n"
             "finally: print(time.monotonic() - start)\n"
@@ -144,7 +143,7 @@ def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening, 
 )
 def test_an_answer_that_is_no_schedulers(sent):
     from unitcad.errors import UnitcadError
-    from unitcad.sweeps.cluster import dask_executor
+    from unitcad.sweeps.executors import dask_executor
 
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
@@ -166,7 +165,7 @@ def test_a_cluster_is_reached_from_where_an_event_loop_runs(cluster):
     """As in a notebook's cell; in a process of its own, since a client's threads live on."""
     cell = (
         "import asyncio\n"
-        "from unitcad.sweeps.cluster import dask_executor\n"
+        "from unitcad.sweeps.executors import dask_executor\n"
         "async def cell():\n"
         f"    print(dask_executor({cluster.address!r})[1])\n"
         "asyncio.run(cell())\n"

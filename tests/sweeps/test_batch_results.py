@@ -14,7 +14,7 @@ from unitcad.spec import to_toml
 from unitcad.sweeps import BatchOptions, load_sweep, run
 from unitcad.sweeps.executors import SerialExecutor
 from unitcad.validation import from_data, load, read
-from unitcad.validation.shipped_files import shipped_files
+from unitcad.validation.load import shipped_files
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 
@@ -149,7 +149,7 @@ def test_the_bar_on_a_terminal_shows_rate_reused_failed(monkeypatch):
     import sys
 
     from unitcad.sweeps import Summary
-    from unitcad.sweeps.batch_progress import watching
+    from unitcad.sweeps.batch_command import watching
 
     class Terminal(io.StringIO):
         def isatty(self):
@@ -255,7 +255,7 @@ def test_the_schema_holds_the_specs_and_sweeps_that_are_shipped():
 
 
 def test_init_writes_a_spec_that_names_every_key(tmp_path):
-    from unitcad.sweeps.paths import known_paths
+    from unitcad.sweeps.sweep import known_paths
 
     done = unitcad("init", "my-unit", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -12,9 +12,8 @@ from msgspec.structs import replace
 from unitcad.cache import digest
 from unitcad.errors import UnitcadError
 from unitcad.sweeps import BatchOptions, load_sweep, run
-from unitcad.sweeps.batch_records import BatchHead, JournalEntry
 from unitcad.sweeps.executors import SerialExecutor
-from unitcad.sweeps.journal import Journal
+from unitcad.sweeps.journal import BatchHead, Journal, JournalEntry
 
 
 def _flipped(file):

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from batching import bytes_of, calls, command, environment, ring_sweep, rows, unitcad
 
-from unitcad.cache import DiskStore, objects, shared_store
+from unitcad.cache import DiskStore, shared_store
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.report import write_report
-from unitcad.report.batch_table import read_parquet
+from unitcad.report.read_results import read_parquet
 from unitcad.sweeps import BatchOptions, load_sweep, record_packs, result_folders, results
 from unitcad.sweeps.batch_call import make
-from unitcad.sweeps.batch_records import BatchHead, JournalEntry
+from unitcad.sweeps.batch_command import merge
 from unitcad.sweeps.executors import Workers
-from unitcad.sweeps.merging import merge
+from unitcad.sweeps.journal import BatchHead, JournalEntry
 from unitcad.sweeps.result_folders import export_variants
 from unitcad.sweeps.results import write_results
 from unitcad.sweeps.shards import Shard, shard_folders, shard_of
@@ -184,8 +184,8 @@ def test_a_store_in_which_nobody_may_write_is_refused_at_once(tmp_path, monkeypa
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0])
     made(sweep, tmp_path / "out", store=str(tmp_path / "a"))
     closed = tmp_path / "a" / "packs"
-    asked = objects.os.access
-    monkeypatch.setattr(objects.os, "access", lambda path, mode: path != closed and asked(path, mode))
+    asked = shared_store.os.access
+    monkeypatch.setattr(shared_store.os, "access", lambda path, mode: path != closed and asked(path, mode))
     with pytest.raises(UnitcadError, match="a/packs can't be read and written here"):
         made(sweep, tmp_path / "other", store=str(tmp_path / "a"))
     assert not (tmp_path / "other").exists()
@@ -326,7 +326,7 @@ def test_a_column_of_several_kinds_is_text(tmp_path):
 
 def test_without_the_extra_parquet_is_refused_and_tables_are_as_before(tmp_path, monkeypatch):
     monkeypatch.setattr(results, "can_write", lambda: False)
-    monkeypatch.setattr("unitcad.sweeps.parquet_table.can_write", lambda: False)
+    monkeypatch.setattr("unitcad.sweeps.results.can_write", lambda: False)
     monkeypatch.setattr(results, "MOST_ROWS", 1)
     head, entries = BatchHead(batch="a", name="b"), [JournalEntry(index=0, status="ok")]
     write_results(tmp_path, ["index"], lambda: entries, head, None, None, 1)

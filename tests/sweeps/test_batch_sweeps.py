@@ -13,11 +13,10 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline.plan import build_key
 from unitcad.pipeline.subjects import subject
 from unitcad.sweeps import load_sweep
-from unitcad.sweeps.paths import known_paths
 from unitcad.sweeps.run import counted
-from unitcad.sweeps.sweep import Range, from_file
+from unitcad.sweeps.sweep import Range, from_file, known_paths
 from unitcad.validation import load, read
-from unitcad.validation.shipped_files import shipped_files
+from unitcad.validation.load import shipped_files
 
 SOFT, STIFF = "ecoflex-00-10", "dragon-skin-30"
 

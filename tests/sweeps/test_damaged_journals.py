@@ -10,8 +10,7 @@ from msgspec import to_builtins
 from msgspec.structs import replace
 
 from unitcad.errors import UnitcadError
-from unitcad.sweeps.batch_records import BatchHead, JournalEntry
-from unitcad.sweeps.journal import JOURNAL, Journal
+from unitcad.sweeps.journal import JOURNAL, BatchHead, Journal, JournalEntry
 
 HEAD = BatchHead(batch="0123456789abcdef", name="rings")
 CODE = "0.1.0+abc"

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from unitcad import cli
-from unitcad.validation.shipped_files import shipped_files
+from unitcad.validation.load import shipped_files
 
 UNIT = 'name = "unit"\ndesign = "encapsulating"\ndiameter_mm = 14\n'
 LAYER = '[[layers]]\nmaterial = "{}"\nwall_mm = 1.25\ncap_mm = 1.25\n'

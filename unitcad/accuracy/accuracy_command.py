@@ -11,12 +11,9 @@ import typer
 from rich.table import Table
 
 from unitcad.accuracy.amplification import amplifications, extremes
-from unitcad.accuracy.meshes import mesh_rows
-from unitcad.accuracy.responses import response_rows
-from unitcad.accuracy.skipped import skipped_rows
+from unitcad.accuracy.measurements import mesh_rows, response_rows, skipped_rows
 from unitcad.accuracy.survey import survey_media, survey_specs
-from unitcad.cli.output import console, print_json, progress
-from unitcad.cli.shared_options import AsJson, Sets
+from unitcad.cli.output import AsJson, Sets, console, print_json, progress
 from unitcad.designs import design_of
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.accuracy.responses import REFERENCE, respond
+from unitcad.accuracy.measurements import REFERENCE, respond
 from unitcad.attenuation.edge.level import changed, ends
 from unitcad.attenuation.edge.measured import stacked
 from unitcad.attenuation.edge.models import edge_levels, stored

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from unitcad import notebook
-from unitcad.arguments import path, texts
+from unitcad import text
+from unitcad.errors import path, texts
 from unitcad.pipeline.subjects import load_subject
 from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.write import PAGE, Built, held
@@ -64,20 +64,20 @@ class BuildResult(Built):
         return {part["name"]: part["volume_mm3"] for part in self.manifest["parts"]}
 
     def __repr__(self) -> str:
-        folder = notebook.shortened(self.folder.name, 80)
+        folder = text.shortened(self.folder.name, 80)
         return f"BuildResult({folder}: {', '.join(f'{count} {noun}' for noun, count in self._counts)})"
 
     def _repr_html_(self) -> str:
         rows = [(part["name"], part["made"], part["material"], part["volume_mm3"]) for part in self.manifest["parts"]]
-        bodies = notebook.table(("body", "made", "material", "volume, mm³"), rows, str(self.folder))
+        bodies = text.table(("body", "made", "material", "volume, mm³"), rows, str(self.folder))
         broken = [
             (finding["code"], finding["where"], finding["value"], finding["limit"])
             for finding in self.manifest["mould_checks"]
             if not finding["ok"]
         ]
-        checks = notebook.table(("mould check", "place", "value", "limit"), broken, "broken") if broken else ""
-        drawn = notebook.drawing(Variant(self.spec).section(), f"section of {self.spec.name}")
-        return drawn + bodies + checks + notebook.table((), self._counts)
+        checks = text.table(("mould check", "place", "value", "limit"), broken, "broken") if broken else ""
+        drawn = text.drawing(Variant(self.spec).section(), f"section of {self.spec.name}")
+        return drawn + bodies + checks + text.table((), self._counts)
 
     @property
     def _counts(self) -> list[tuple[str, int]]:

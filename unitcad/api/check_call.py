@@ -8,10 +8,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from unitcad import notebook
-from unitcad.arguments import check_number, path, texts
+from unitcad import text
 from unitcad.catalogue import Printer, choose, printers
-from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.errors import UnitcadError, WrongArgument, check_number, path, texts
 from unitcad.meshcheck.file_checks import check_files, expand
 from unitcad.meshcheck.findings import FileReport, Finding
 from unitcad.meshcheck.rules.f_file import Limits
@@ -81,7 +80,7 @@ class CheckResult:
             if not report.findings:
                 rows.append((report.path, report.verdict, "", ""))
             rows += [(report.path, finding.severity, finding.code, finding.message) for finding in report.findings]
-        return notebook.table(("file", "verdict", "code", "finding"), rows)
+        return text.table(("file", "verdict", "code", "finding"), rows)
 
 
 def check(

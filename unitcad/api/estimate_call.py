@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from unitcad import notebook
-from unitcad.arguments import texts
+from unitcad import text
 from unitcad.attenuation.edge.estimates import summary
+from unitcad.errors import texts
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.spec.raw import Model
 from unitcad.validation import Changes, Source, load
@@ -69,15 +69,15 @@ class EdgeEstimate:
         return float(summary(self.data)["frequency_hz"])
 
     def __repr__(self) -> str:
-        levels = ", ".join(f"{model} {notebook.shown(level)}" for model, level in self.edge.items())
-        name = notebook.shortened(str(self.data["variant"]["name"]), 40)
+        levels = ", ".join(f"{model} {text.shown(level)}" for model, level in self.edge.items())
+        name = text.shortened(str(self.data["variant"]["name"]), 40)
         return f"EdgeEstimate({name!r}: {self.frequency_hz:g} Hz; edge over motor: {levels})"
 
     def _repr_html_(self) -> str:
         rows = [(model, level, self.table_error[model]) for model, level in self.edge.items()]
         head = ("model", "edge over motor", "error against the measured table, factor")
-        measured = f"; measured {notebook.shown(self.measured)}" if self.measured is not None else ""
-        return notebook.table(head, rows, f"{self.data['variant']['name']}, {self.frequency_hz:g} Hz{measured}")
+        measured = f"; measured {text.shown(self.measured)}" if self.measured is not None else ""
+        return text.table(head, rows, f"{self.data['variant']['name']}, {self.frequency_hz:g} Hz{measured}")
 
 
 def estimate(

@@ -17,8 +17,8 @@ import msgspec
 
 from unitcad.arrays.array import Array, Placed, Sheet
 from unitcad.arrays.array_tables import AskedArray, PlaceTable
-from unitcad.arrays.circuit.outline import outline
-from unitcad.arrays.construction import Construction, construction_of
+from unitcad.arrays.circuit import outline
+from unitcad.arrays.constructions import Construction, construction_of
 from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
 from unitcad.arrays.layouts.ring import RingTable
 from unitcad.arrays.offers import offered
@@ -30,18 +30,15 @@ from unitcad.files import read_text
 from unitcad.moulds.plan import Plan
 from unitcad.shape import mm
 from unitcad.spec import Spec, convert, read_toml, to_data
-from unitcad.spec.custom_code import with_source
+from unitcad.spec.design_files import with_source
 from unitcad.spec.fields import fields_of
 from unitcad.spec.raw import RawSpec
-from unitcad.spec.toml import text_of
-from unitcad.spec.toml_lines import line_of
+from unitcad.spec.toml import line_of, text_of
 from unitcad.text import listed
 from unitcad.validation import custom_templates, default_template, from_data, templates
-from unitcad.validation.dotted import ABSENT, at
-from unitcad.validation.load import changed, override
-from unitcad.validation.shipped_files import named_file, shipped_files
+from unitcad.validation.load import changed, named_file, override, shipped_files
+from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of
 from unitcad.validation.suggestions import every_fault, numbers
-from unitcad.validation.tables import Changes, changes_of
 
 
 def array_templates() -> dict[str, Path]:

@@ -31,27 +31,24 @@ from unitcad.arrays.array_file import (
     to_toml,
     with_formats,
 )
-from unitcad.arrays.array_page import ARRAY_FILE, ArrayManifest, write_array_page
+from unitcad.arrays.array_page import ARRAY_FILE, ArrayManifest, patch_glb, picture_names, pictures, write_array_page
 from unitcad.arrays.array_procedure import array_procedure
-from unitcad.arrays.array_view import patch_glb
-from unitcad.arrays.circuit.circuit_files import has_circuit
-from unitcad.arrays.circuit.wiring import crowded_tracks
-from unitcad.arrays.construction import construction_of
-from unitcad.arrays.crosstalk_maps import extras
+from unitcad.arrays.circuit import crowded_tracks, has_circuit
+from unitcad.arrays.constructions import construction_of
+from unitcad.arrays.crosstalk import extras
 from unitcad.arrays.estimate_arrays import array_summary, estimate_arrays
-from unitcad.arrays.limb import bending_record
 from unitcad.arrays.offers import offered
 from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_parts
-from unitcad.arrays.patch_pictures import picture_names, pictures
+from unitcad.arrays.sheet import bending_record
 from unitcad.arrays.tails import covered_tails, covered_tails_warning
 from unitcad.cache import Store, digest
-from unitcad.casting.pictures import pictures as bench_pictures
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.procedure import procedure as unit_procedure
 from unitcad.casting.procedure_text import files as written
 from unitcad.casting.procedure_text import step_section
 from unitcad.casting.steps import pour_warnings
 from unitcad.casting.views import picture_path, views
+from unitcad.casting.views import pictures as bench_pictures
 from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
 from unitcad.errors import Refusal

@@ -14,11 +14,10 @@ from rich.text import Text
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.construction import construction_of
-from unitcad.arrays.crosstalk import BAND_HZ, crosstalk, crosstalk_lines, ratio_line, ratios
-from unitcad.arrays.crosstalk_maps import CROSSTALK
+from unitcad.arrays.constructions import construction_of
+from unitcad.arrays.crosstalk import BAND_HZ, CROSSTALK, crosstalk, crosstalk_lines, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
-from unitcad.cli.build_summary import assumed_line, to_open
+from unitcad.cli.build_command import assumed_line, to_open
 from unitcad.cli.output import console, print_json, progress
 from unitcad.errors import Refusal
 from unitcad.meshcheck.findings import counted

@@ -12,12 +12,11 @@ from msgspec.structs import replace
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_of, expanded, makeable_array, sound_array, to_toml
+from unitcad.arrays.array_page import patch_model, tools_model
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.array_tables import AskedArray, CircuitTable, LimbTable, SheetTable
-from unitcad.arrays.array_view import patch_model, tools_model
 from unitcad.arrays.arrayed import unit_folders
-from unitcad.arrays.crosstalk import crosstalk, crosstalk_lines
-from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
+from unitcad.arrays.crosstalk import crosstalk, crosstalk_lines, heat_map_svg, patch_map_svg
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.procedure import Procedure
@@ -30,11 +29,10 @@ from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
 from unitcad.serve.messages import Answer, Field, Group, Trusted
 from unitcad.serve.unit_answers import has_code as unit_holds_code
 from unitcad.serve.unit_answers import unit_procedure
-from unitcad.spec.custom_code import files_named
-from unitcad.spec.toml import from_json, to_json
-from unitcad.spec.toml_lines import line_of
+from unitcad.spec.design_files import files_named
+from unitcad.spec.toml import from_json, line_of, to_json
 from unitcad.validation import templates
-from unitcad.validation.dotted import at
+from unitcad.validation.plain_data import at
 from unitcad.validation.suggestions import every_fault
 
 as_toml = to_toml

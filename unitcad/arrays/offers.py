@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from unitcad.errors import Refusal, shown
-from unitcad.validation.dotted import at
+from unitcad.validation.plain_data import at
 from unitcad.validation.suggestions import (
     Judge,
     bare,

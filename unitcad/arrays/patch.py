@@ -13,11 +13,10 @@ from msgspec import structs
 
 from unitcad.arrays.array import Array, Placed
 from unitcad.arrays.array_file import made_plan, makeable_array, sound_array
-from unitcad.arrays.circuit.circuit_files import has_circuit
-from unitcad.arrays.circuit.outline import laid_circuit
-from unitcad.arrays.construction import Construction, construction_of
-from unitcad.arrays.limb import at_place
+from unitcad.arrays.circuit import has_circuit, laid_circuit
+from unitcad.arrays.constructions import Construction, construction_of
 from unitcad.arrays.offers import offered, with_other_ways
+from unitcad.arrays.sheet import at_place
 from unitcad.designs import Dimensions, unit_bodies
 from unitcad.designs.design import Fitting
 from unitcad.errors import Refusal
@@ -25,7 +24,7 @@ from unitcad.kernels.mesh import segment_count
 from unitcad.moulds.mould_set import MouldSet, geometric
 from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import Shape, cut, cylinder, moved, rotated
-from unitcad.shape.body import Body
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec, to_json, with_formats
 from unitcad.spec.resolved import CastLayer
 

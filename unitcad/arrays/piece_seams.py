@@ -11,9 +11,8 @@ from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.checks.seam import WEEP
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point, nearer, to_segment
-from unitcad.moulds.cuts import BESIDE, Feature, Place, Sized, in_gaps
-from unitcad.moulds.dovetails import FAR, LARGE, Axis, Interval, Seam, length, seen
-from unitcad.moulds.labels import row, row_width
+from unitcad.moulds.cuts import BESIDE, FAR, LARGE, Axis, Feature, Interval, Place, Seam, Sized, in_gaps, length, seen
+from unitcad.moulds.pieces import row, row_width
 from unitcad.shape import Shape, mm, moved, turned
 from unitcad.shape.lettering import HEIGHT
 from unitcad.spec import Spec

@@ -1,18 +1,24 @@
-"""The sheet of an array: its outline, its lengths on the bed, and outlines with rounded corners."""
+"""The sheet of an array: its outline, its lengths on the bed; the frame of its limb, and the strain when it bends."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
 
 from unitcad import catalogue
-from unitcad.arrays.array import Box, Sheet
+from unitcad.arrays.array import Array, Box, Placed, Sheet
 from unitcad.arrays.array_tables import AskedArray
-from unitcad.arrays.construction import Construction
+from unitcad.arrays.constructions import Construction
 from unitcad.arrays.layouts import Point
 from unitcad.designs.limits import down, up
+from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
-from unitcad.shape import Profile, mm
+from unitcad.geometry.segments import Point as PlanePoint
+from unitcad.moulds.cuts import Feature
+from unitcad.shape import Extrude, Profile, Shape, cut, cylinder, mm, moved, polygon, ring, rotated, turned
 from unitcad.spec import Spec
 
 _QUARTER = math.tan(math.pi / 8)
@@ -229,3 +235,216 @@ def _of_layout(asked: AskedArray, axis: int, span: float) -> tuple[str, float, f
         if not isinstance(pitch, int | float):
             pitch, field = pitch[axis], f"{field}.{axis}"
     return field, pitch, span / pitch
+
+
+LENGTH = 1000.0
+"""Of a cylinder about the limb's axis, on either side, mm: longer than any bed."""
+
+
+def angle_deg(array: Array, x: float) -> float:
+    """Return the angle about the limb's axis of a place of the flat frame (mm), from the top, clockwise along y."""
+    return math.degrees(x / (array.middle_radius_mm or math.inf))
+
+
+def axis(array: Array, x: float) -> tuple[float, float, float]:
+    """Return the direction away from the limb at a place of the flat frame (mm)."""
+    turn = math.radians(angle_deg(array, x))
+    return math.sin(turn), 0.0, math.cos(turn)
+
+
+def bent(array: Array, shape: Shape, x: float, y: float = 0.0) -> Shape:
+    """Return a shape drawn about the z axis at a place of the flat frame (mm)."""
+    radius = array.radius_mm or 0.0
+    return moved(rotated(moved(shape, 0.0, y, radius), "y", angle_deg(array, x)), z=-radius)
+
+
+def at_place(array: Array, shape: Shape, place: Placed) -> Shape:
+    """Return a shape drawn about the z axis at its place in the frame of the casting."""
+    if array.cast == "curved":
+        return bent(array, shape, place.x, place.y)
+    return moved(shape, place.x, place.y)
+
+
+def barrel(array: Array, radius: float) -> Shape:
+    """Return the cylinder of a radius about the limb's axis (mm)."""
+    return moved(turned(cylinder(radius, -LENGTH, LENGTH), "x", 1), z=-(array.radius_mm or 0.0))
+
+
+def slice_of(array: Array, first: float, last: float) -> Shape:
+    """Draw all between two places of the flat frame (mm), planes through the limb's axis."""
+    reach = 2 * array.back_radius_mm
+    turns = (math.radians(angle_deg(array, x)) for x in (last, first))
+    corners = ((reach * math.sin(turn), reach * math.cos(turn)) for turn in turns)
+    drawn = Extrude(polygon((0, 0), *corners), -LENGTH, LENGTH)
+    return moved(turned(drawn, "x", 1), z=-(array.radius_mm or 0.0))
+
+
+def inside_of_end(array: Array, *, left: bool) -> Shape:
+    """Draw all on the sheet's side of its left or right end: a plane through the axis, with round corners."""
+    sheet = array.sheet
+    x0, y0, x1, y1 = sheet.outline
+    r, far, quarter = sheet.corner_mm, 3 * array.back_radius_mm, math.tan(math.pi / 8)
+    corners = [(-far, y0, 0.0), (-r, y0, quarter), (0.0, y0 + r, 0.0), (0.0, y1 - r, quarter)]
+    if mm(y0 + r) == mm(y1 - r):  # two corners that meet
+        del corners[2]
+    corners += [(-r, y1, 0.0), (-far, y1, 0.0)]
+    if left:
+        # Turned by half about the middle of the end.
+        corners = [(-x, y0 + y1 - y, bulge) for x, y, bulge in corners]
+    return bent(array, Extrude(Profile(tuple(corners)), -far, far), x0 if left else x1)
+
+
+def strap_slot(array: Array, slot: Box, beyond: float) -> Shape:
+    """Draw a strap slot's hole through the sheet, square to the limb in its middle, and `beyond` it by so much (mm)."""
+    (x0, y0, x1, y1), sheet = slot, array.sheet
+    half = (x1 - x0) / 2
+    return bent(
+        array,
+        Extrude(slot_profile((-half, y0, half, y1)), sheet.low - sheet.thickness_mm - beyond, sheet.high + beyond),
+        (x0 + x1) / 2,
+    )
+
+
+@dataclass(frozen=True)
+class Bending:
+    """An array bent round its limb; lengths in mm, strains as shares (1 is 100 %).
+
+    middle_radius  of the sheet's middle, which keeps its length; the ring round the limb is closed at 2 pi times it
+    ends           from one end of the sheet to the other, round the limb, along its middle
+    strain         of the sheet's two faces if it bends equally everywhere
+    strain_between the same if the units stay flat and only the sheet between them bends; None if units touch all the
+    way sagitta        from the limb's skin to a unit's, at the edge of a unit that stays flat and touches in its middle
+    """
+
+    radius: float
+    middle_radius: float
+    closed: float
+    ends: float
+    strain: float
+    strain_between: float | None
+    sagitta: float
+
+    @property
+    def most(self) -> float:
+        """The larger of the two strains."""
+        return max(self.strain, self.strain_between or 0.0)
+
+
+def bending(array: Array) -> Bending | None:
+    """Return how an array bends round its limb; None if it is worn flat."""
+    radius, middle = array.radius_mm, array.middle_radius_mm
+    if radius is None or middle is None:
+        return None
+    sheet, widest = array.sheet, max(place.radius for place in array.places)
+    strain, free = sheet.thickness_mm / 2 / middle, _free(array)
+    return Bending(
+        radius=radius,
+        middle_radius=middle,
+        closed=2 * math.pi * middle,
+        ends=2 * math.pi * middle - (sheet.outline[2] - sheet.outline[0]),
+        strain=strain,
+        strain_between=strain / free if free else None,
+        sagitta=radius - math.sqrt(radius**2 - widest**2) if widest < radius else radius,
+    )
+
+
+def bent_stretches(array: Array) -> tuple[tuple[str, float], ...]:
+    """Return the layers of a plan that stretch as the array is bent, or laid flat, and their strains in percent."""
+    bent = bending(array)
+    if not bent:
+        return ()
+    where = f"sheet bent round {bent.radius:g} mm" if array.cast == "flat" else "sheet laid flat for its circuit"
+    return ((where, 100 * bent.most),)
+
+
+def bending_record(array: Array) -> dict[str, float | None] | None:
+    """Return the same as JSON data, lengths in mm."""
+    bent = bending(array)
+    if bent is None:
+        return None
+    return {
+        "middle_radius_mm": round(bent.middle_radius, 3),
+        "closed_length_mm": round(bent.closed, 2),
+        "between_ends_mm": round(bent.ends, 2),
+        "strain": round(bent.strain, 4),
+        "strain_units_flat": None if bent.strain_between is None else round(bent.strain_between, 4),
+        "sagitta_mm": round(bent.sagitta, 3),
+    }
+
+
+def _free(array: Array) -> float:
+    """Return the share of the way round, from the first unit's middle to the last one's, that no unit covers."""
+    spans = sorted((place.x - place.radius, place.x + place.radius) for place in array.places)
+    first, last = min(p.x for p in array.places), max(p.x for p in array.places)
+    if last <= first:
+        return 1.0
+    free, reached = 0.0, first
+    for low, high in spans:
+        free += max(0.0, min(low, last) - reached)
+        reached = max(reached, high)
+    return free / (last - first)
+
+
+TURN = 720
+"""Sectors of a turn that a groove has or lacks."""
+RINGS = 12
+"""Circles on which a sector is compared with the stops."""
+
+
+def stopped_ring(
+    centre: PlanePoint, radii: tuple[float, float], heights: tuple[float, float], stops: Sequence[Feature]
+) -> Shape | None:
+    """Draw a groove between two radii and two heights (mm), without the sectors that meet a stop; None if all do."""
+    inner, outer = radii
+    kept = ~_meets(centre, radii, stops)
+    least = math.ceil(TURN * (outer - inner) / (2 * math.pi * inner))
+    for start, end in _runs(kept):
+        if end - start < min(least, TURN):  # shorter than it is wide
+            kept[np.arange(start, end) % TURN] = False
+    if not kept.any():
+        return None
+    low, high = heights
+    gone = [_sector(start, end, 2 * outer, low - BEYOND, high + BEYOND) for start, end in _runs(~kept)]
+    return moved(cut(ring(inner, outer, low, high), gone), *centre)
+
+
+def _meets(centre: PlanePoint, radii: tuple[float, float], stops: Sequence[Feature]) -> np.ndarray:
+    """Return which sectors meet a stop (TURN): a point of them is in it, or nearly."""
+    angles = (np.arange(TURN) + 0.5) * (2 * math.pi / TURN)
+    across = np.linspace(*radii, RINGS)
+    slack = math.hypot(radii[1] * math.pi / TURN, (across[1] - across[0]) / 2)
+    x = centre[0] + np.multiply.outer(np.cos(angles), across)
+    y = centre[1] + np.multiply.outer(np.sin(angles), across)
+    met = np.zeros(TURN, bool)
+    for corners, radius in stops:
+        if len(corners) == 1:
+            (x0, y0), *_ = corners
+            inside = np.hypot(x - x0, y - y0) <= radius + slack
+        else:
+            # Counter-clockwise: the inside is on the left of every side.
+            ends = [*corners[1:], corners[0]]
+            beyond = [
+                ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / math.hypot(bx - ax, by - ay)
+                for (ax, ay), (bx, by) in zip(corners, ends, strict=True)
+            ]
+            inside = np.min(beyond, axis=0) >= -radius - slack
+        met |= inside.any(axis=1)
+    return met
+
+
+def _runs(marked: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Yield the runs of marked sectors, from and to, counted on past a turn."""
+    if marked.all():
+        yield 0, TURN
+        return
+    first = int(np.flatnonzero(~marked)[0])
+    turned = np.concatenate([[False], np.roll(marked, -first), [False]])
+    changes = np.flatnonzero(turned[1:] != turned[:-1])
+    yield from ((first + int(start), first + int(end)) for start, end in changes.reshape(-1, 2))
+
+
+def _sector(start: int, end: int, radius: float, low: float, high: float) -> Shape:
+    """Draw a sector that reaches beyond a radius, mm."""
+    quarters = math.ceil((end - start) / (TURN // 6))
+    angles = np.linspace(start, end, quarters + 1) * (2 * math.pi / TURN)
+    return Extrude(polygon((0.0, 0.0), *((radius * math.cos(a), radius * math.sin(a)) for a in angles)), low, high)

@@ -9,7 +9,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from unitcad.arrays.array import Array, Box, Placed, Sheet
-from unitcad.arrays.construction import construction_of
+from unitcad.arrays.constructions import construction_of
 from unitcad.arrays.layouts import Point
 from unitcad.designs import dimensions
 from unitcad.designs.dimensions import WIRE_GAP

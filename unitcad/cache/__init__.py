@@ -14,10 +14,8 @@ all who share a folder:
     <root>/tmp/                   files being written
 """
 
-from unitcad.cache.collect import DEFAULT_LIMIT_MB, Usage, collect, usage
-from unitcad.cache.disk import DiskStore, default_root, free, held
-from unitcad.cache.objects import absolute
-from unitcad.cache.shared_store import SharedStore
+from unitcad.cache.disk import DEFAULT_LIMIT_MB, DiskStore, Usage, collect, default_root, free, held, usage
+from unitcad.cache.shared_store import SharedStore, absolute
 from unitcad.cache.store import Bundle, Entry, MemoryStore, MissingContent, Store, digest
 
 __all__ = [

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 from unitcad.casting.drawings import side_places, tape_places, tongue_prop
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, AfterPours, Batch
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep
-from unitcad.export.threemf import layout
+from unitcad.export.printing import layout
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape.body import Body
 from unitcad.shape.column import extent
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec, motor_of
 from unitcad.text import cell, number
 

@@ -21,14 +21,14 @@ from pathlib import Path
 
 from unitcad import files
 from unitcad.catalogue import Printer
-from unitcad.designs.rib_leaves import LEAF_WIDTH, farthest_push, leaf_mm, least_skirt
-from unitcad.export import printing, threemf
+from unitcad.designs.limits import LEAF_WIDTH, farthest_push, leaf_mm, least_skirt
+from unitcad.export import printing
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.moulds.ribs import ROOT, SLOPE, SQUARE, drawn, leaf_slots, placed
+from unitcad.moulds.cup import ROOT, SLOPE, SQUARE, drawn, leaf_slots, placed
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, turned, union
-from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
+from unitcad.shape.tree import Body
 from unitcad.text import number
 
 SHARES = (0.5, 0.75, 1.0, 1.25, 1.5)
@@ -228,9 +228,9 @@ def write(printer: Printer, out: Path) -> Path:
         if body.made == "printed":
             ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
             files.write(folder / f"{body.name}.stl", printing.stl(*ready, body.name))
-            parts.append(threemf.MeshPart(body.name, body.colour, *ready))
+            parts.append(printing.MeshPart(body.name, body.colour, *ready))
     bed = float(printer.bed_x_mm), float(printer.bed_y_mm)
-    files.write(folder / "coupon.3mf", threemf.content(parts, bed))
+    files.write(folder / "coupon.3mf", printing.content(parts, bed))
     files.write(folder / "coupon.md", coupon.markdown().encode())
     return folder
 

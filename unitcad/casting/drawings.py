@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from unitcad.designs import layer_colour
-from unitcad.designs.tooling import Cell
-from unitcad.moulds.base import PRY_HALF_WIDTH, outline, plate_top
+from unitcad.designs.parts import Cell
+from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH, PRY_HALF_WIDTH, outline, plate_top
 from unitcad.moulds.cup import skirt_end, window_section
-from unitcad.moulds.dovetails import Axis, Interval
+from unitcad.moulds.cuts import Axis, Interval
 from unitcad.moulds.layout import CORNER_RADIUS, MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
 from unitcad.shape import Extrude, Revolve, Shape, box, cut, moved, polygon, rotated, turned, union
 
 ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0.38), (0.80, 0.86, 0.90)

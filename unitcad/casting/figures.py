@@ -11,15 +11,13 @@ import numpy as np
 
 from unitcad.catalogue import Material, Value
 from unitcad.designs.dimensions import Outline
-from unitcad.designs.limits import filament_groove
-from unitcad.designs.rib_leaves import leaf_mm
+from unitcad.designs.limits import filament_groove, leaf_mm
 from unitcad.moulds.base import plate_bottom, pry_floor
-from unitcad.moulds.cup import window_section
+from unitcad.moulds.cup import Rib, ribs, window_section
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.lid import skirt_end
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.moulds.ribs import Rib, ribs
 from unitcad.shape import exact_volume
 from unitcad.spec import Spec, printer_of
 from unitcad.text import number

@@ -34,10 +34,10 @@ from unitcad.casting.views import fed_through, picture_path
 from unitcad.catalogue import Material
 from unitcad.designs.design import Fitting
 from unitcad.designs.parts import ADHESIVE, bond
+from unitcad.moulds.cup import ribs
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.pieces import CAST
 from unitcad.moulds.plan import Step
-from unitcad.moulds.removal import CAST
-from unitcad.moulds.ribs import ribs
 from unitcad.spec import Spec
 from unitcad.text import listed, number, spaced
 

@@ -18,14 +18,13 @@ from unitcad.casting.figures import (
 from unitcad.casting.steps import BenchStep, duration
 from unitcad.casting.views import level_on, picture_path
 from unitcad.catalogue import Material
-from unitcad.designs.rib_leaves import leaf_mm
-from unitcad.moulds.cup import window_section
-from unitcad.moulds.dovetails import Split
+from unitcad.designs.limits import leaf_mm
+from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH
+from unitcad.moulds.cup import ribs, window_section
+from unitcad.moulds.cuts import Split
 from unitcad.moulds.layout import BLADE_HEIGHT
+from unitcad.moulds.lid import DENT, TILT_DEG
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.ribs import ribs
-from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
-from unitcad.moulds.trapped_air import DENT, TILT_DEG
 from unitcad.shape.lettering import seen
 from unitcad.spec import MOTOR_SIZES, printer_of
 from unitcad.text import listed, number, spaced

@@ -28,6 +28,7 @@ from unitcad.catalogue.entries import (
     FREQUENCIES_HZ,
     Material,
     MaterialEntry,
+    Measurements,
     Motor,
     MotorEntry,
     Printer,
@@ -38,7 +39,6 @@ from unitcad.catalogue.entries import (
     kinds_of,
     required_of,
 )
-from unitcad.catalogue.measured import Measurements
 from unitcad.errors import Refusal, unknown_name
 
 __all__ = [

@@ -15,11 +15,11 @@ import numpy as np
 from manifold3d import Manifold
 
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_most, each_cavity
-from unitcad.geometry.components import components
+from unitcad.geometry.arrays import components
 from unitcad.kernels.mesh import arrays
 from unitcad.moulds.cavities import Cavity
+from unitcad.moulds.lid import TILT_DEG, deepest
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.trapped_air import TILT_DEG, deepest
 from unitcad.shape.profile import GRID_PER_MM
 
 ATTITUDES = ((0.0, 0.0), (TILT_DEG, 0.0), (TILT_DEG, 90.0), (TILT_DEG, 180.0), (TILT_DEG, 270.0))

@@ -12,8 +12,8 @@ from unitcad.checks.finding import MouldCheck, MouldFinding, at_most, each_cavit
 from unitcad.designs.dimensions import growth
 from unitcad.kernels.mesh import realise, thick_pieces
 from unitcad.moulds.cavities import BALANCE, Cavity
+from unitcad.moulds.lid import films
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.skin_tray import films
 from unitcad.shape import cylinder, moved
 from unitcad.shape.column import extent
 

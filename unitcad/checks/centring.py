@@ -15,12 +15,12 @@ from itertools import pairwise
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
+from unitcad.checks.cup_features import thickest_leaf
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_least, at_most
-from unitcad.checks.leaves import thickest_leaf
-from unitcad.designs.rib_leaves import MOST_STRAIN, farthest_push, leaf_mm, leaf_strain
-from unitcad.kernels.sections import thick_parts
+from unitcad.designs.limits import MOST_STRAIN, farthest_push, leaf_mm, leaf_strain
+from unitcad.kernels.mesh import thick_parts
+from unitcad.moulds.cup import SQUARE, ribs
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.ribs import SQUARE, ribs
 from unitcad.shape.profile import GRID_PER_MM
 from unitcad.spec import printer_of
 

@@ -24,8 +24,8 @@ from unitcad.geometry.boxes import Frame, boxes_of, frame_of, meeting_between, m
 from unitcad.kernels.mesh import arrays, thick_pieces
 from unitcad.moulds.cavities import boxes_meet, united
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.pieces import CAST, Removal, Way
 from unitcad.moulds.plan import Step
-from unitcad.moulds.removal import CAST, Removal, Way
 
 BLOCKED = 1e-5
 """Largest area of facing faces, mm2: rounding of faces that only touch along an edge."""

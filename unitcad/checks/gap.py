@@ -19,10 +19,10 @@ from manifold3d import CrossSection, Manifold
 
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_least
 from unitcad.kernels.mesh import arrays
-from unitcad.kernels.sections import gap as gap_between
+from unitcad.kernels.mesh import gap as gap_between
 from unitcad.moulds.cavities import united
+from unitcad.moulds.cup import PIN_RADIUS, Pins
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.pins import PIN_RADIUS, Pins
 from unitcad.shape import cylinder, moved
 from unitcad.shape.profile import GRID_PER_MM
 from unitcad.spec.resolved import Moulds

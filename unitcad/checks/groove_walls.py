@@ -13,13 +13,13 @@ import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold, OpType
 from scipy.spatial import KDTree
 
+from unitcad.checks.cup_features import GRID, hollows, wall_limit
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_least
-from unitcad.checks.hollows import GRID, hollows, wall_limit
 from unitcad.kernels.mesh import shells, thick_pieces
-from unitcad.moulds.congruence import Congruence, cropped, once_each, reaching
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
+from unitcad.moulds.surroundings import Congruence, cropped, once_each, reaching
 from unitcad.shape.column import Column
 
 SLACK = 0.1

@@ -16,11 +16,11 @@ from manifold3d import Manifold
 
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
 from unitcad.kernels.mesh import thick_pieces
-from unitcad.moulds.congruence import MARGIN, column_round
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
+from unitcad.moulds.surroundings import MARGIN, column_round
 from unitcad.shape import Shape, union
-from unitcad.spec.custom_code import is_body_file, is_custom
+from unitcad.spec.design_files import is_body_file, is_custom
 from unitcad.text import number
 
 POCKET = 0.05

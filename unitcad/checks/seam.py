@@ -20,7 +20,7 @@ from unitcad.checks.gap import least_play, too_tight
 from unitcad.checks.overlap import OVERLAP
 from unitcad.kernels.mesh import arrays, thick_pieces
 from unitcad.moulds.cavities import united
-from unitcad.moulds.dovetails import Split
+from unitcad.moulds.cuts import Split
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.profile import GRID_PER_MM

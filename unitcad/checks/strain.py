@@ -18,14 +18,13 @@ from manifold3d import CrossSection, Manifold
 from unitcad import catalogue
 from unitcad.checks.draw import upright
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_most
-from unitcad.designs.stretch import allowed_strain, lip_strain, tail_strain
-from unitcad.kernels.mesh import arrays
-from unitcad.kernels.sections import thick_parts
+from unitcad.designs.limits import allowed_strain, lip_strain, tail_strain
+from unitcad.kernels.mesh import arrays, thick_parts
 from unitcad.moulds.cavities import united
-from unitcad.moulds.congruence import once_each
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.pieces import CAST, Way
 from unitcad.moulds.plan import Step
-from unitcad.moulds.removal import CAST, Way
+from unitcad.moulds.surroundings import once_each
 from unitcad.shape import Shape
 from unitcad.spec import Spec
 

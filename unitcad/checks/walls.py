@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from manifold3d import Manifold
 
+from unitcad.checks.cup_features import GRID, hollows, wall_limit
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_least
-from unitcad.checks.hollows import GRID, hollows, wall_limit
 from unitcad.moulds.mould_set import MouldSet
 
 SHOWN = 2.0

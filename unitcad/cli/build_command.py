@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import shlex
 import sys
-from collections.abc import Iterator
+import time
+import tomllib
+from collections.abc import Container, Iterable, Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -11,10 +15,8 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.build_summary import summary
-from unitcad.cli.file_watcher import wait_for_saves
-from unitcad.cli.output import print_json, progress, say_error, warn
-from unitcad.cli.shared_options import (
+from unitcad.casting.steps import casting_summary
+from unitcad.cli.output import (
     AllowCode,
     AsJson,
     Fit,
@@ -24,23 +26,133 @@ from unitcad.cli.shared_options import (
     Sets,
     allow_code,
     expect_commas,
-    listed,
+    names_in,
     outputs,
     overrides,
+    print_json,
+    progress,
+    say_error,
+    warn,
     with_fit,
 )
+from unitcad.designs import widths
 from unitcad.errors import UnitcadError, WrongArgument, install_command
+from unitcad.meshcheck.findings import counted
 from unitcad.pipeline import step_helper
 from unitcad.pipeline.make import Subject
-from unitcad.pipeline.manifest import NO_KERNEL, Manifest
-from unitcad.pipeline.slicing import check_slicing, slice_tools
+from unitcad.pipeline.manifest import NO_KERNEL, Manifest, PartRecord, row
 from unitcad.pipeline.subjects import Compound, load_subject
-from unitcad.pipeline.write import PAGE, Built, held
+from unitcad.pipeline.write import BENCH, PAGE, Built, check_slicing, held, slice_tools
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
-from unitcad.spec import read_toml
+from unitcad.spec import Spec, assumed_lengths, read_toml, said_of
+from unitcad.spec.design_files import files_named
+from unitcad.text import listed, number
 from unitcad.validation import confirm_known, every_template
 from unitcad.validation.suggestions import numbers
+
+EVERY_S = 0.25
+"""Seconds between two looks at the files."""
+
+
+def wait_for_saves(specs: Iterable[Path]) -> Iterator[None]:
+    """Yield at once, and then after every save of a spec or a file that it names: a design's, a fit, an array's unit.
+
+    A save counts once the file has not changed for `EVERY_S`: editors write in several steps.
+    """
+    specs = list(specs)
+    while True:
+        seen = _states(specs)
+        yield
+        while (now := _states(specs)) == seen:
+            time.sleep(EVERY_S)
+        while True:
+            time.sleep(EVERY_S)
+            if (later := _states(specs)) == now:
+                break
+            now = later
+
+
+def _states(specs: list[Path]) -> dict[Path, tuple[int, int, int] | None]:
+    """Return time, size and inode of each file, which a save changes; None for a missing file."""
+    found = {}
+    for path in [*specs, *(named for spec in specs for named in _files_of(spec))]:
+        try:
+            state = path.stat()
+            found[path] = state.st_mtime_ns, state.st_size, state.st_ino
+        except OSError:
+            found[path] = None
+    return found
+
+
+def _files_of(spec: Path) -> Iterator[Path]:
+    """Yield the files that a spec or an array names; none for a text that can't be read."""
+    try:
+        data = tomllib.loads(spec.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return
+    named = files_named(data)
+    design = named.pop("design", "")
+    unit = data.get("unit")
+    for text in (design.rpartition(".py:")[0] + ".py" if ".py:" in design else design, *named.values(), unit):
+        if isinstance(text, str) and text.rpartition(".")[2] in ("py", "toml", "stl", "3mf", "step", "stp"):
+            yield spec.parent / text
+
+
+def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[str]:
+    """Yield a line each: size and mass, times, grams, checks, the edge level, the page. Skipped outputs have no line.
+
+    A length that is `given`, by its path, counts as measured.
+    """
+    manifest = built.manifest
+    columns = row(spec, manifest)
+    parts = [part for part in manifest["parts"] if part["role"] == "unit"]
+    if parts:
+        high, alone = _height(parts), _height([part for part in parts if part["made"] != "bought"])
+        circuit = f" with its circuit, {alone} without" if alone != high and spec.fpcb else ""
+        mass = columns.get("silicone_mass_g")
+        silicone = f", {number(mass, 3)} g of silicone" if isinstance(mass, float) else ""
+        cells = json.loads((built.folder / "casting.json").read_bytes())["cells"] if manifest["casting"] else 1
+        each = f"{cells} units, each " if cells > 1 else ""
+        yield f"{each}{_across(spec, manifest['parts'])} mm across, {high} mm high{circuit}{silicone}"
+    yield from assumed_line(spec, given)
+    if manifest["casting"]:
+        yield from casting_summary(json.loads((built.folder / "casting.json").read_bytes()))
+    checks, check = manifest["mould_checks"], manifest["check"]
+    if checks:
+        passed = sum(entry["ok"] for entry in checks)
+        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
+        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
+    if level := manifest["estimate"]:
+        yield from level["lines"]
+    yield from to_open(built.folder)
+
+
+def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:
+    """Yield a line of the lengths that nobody measured, if there are any; `path`: of the spec in its file."""
+    assumed = {key: how for key, how in assumed_lengths(spec).items() if path + key not in given}
+    if assumed:
+        lengths = listed(f"{path}{said_of(spec, key)} ({how})" for key, how in assumed.items())
+        yours = f"; build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
+        yield f"measure first; assumed: {lengths}{yours}"
+
+
+def to_open(folder: Path) -> Iterator[str]:
+    """Yield a line for each page of a result's folder."""
+    for name, use in ((BENCH, " to cast"), (PAGE, "")):
+        if (folder / name).is_file():
+            yield f"open {shlex.quote(str(folder / name))}{use}"
+
+
+def _height(parts: list[PartRecord]) -> str:
+    boxes = [part["bbox_mm"] for part in parts]
+    return number(max((box[5] for box in boxes), default=0.0) - min((box[2] for box in boxes), default=0.0), 3)
+
+
+def _across(spec: Spec, parts: list[PartRecord]) -> str:
+    """Return a unit's width without motor, circuit and wires, as text: "14", or "30 x 20"."""
+    boxes = [part["bbox_mm"] for part in parts if part["role"] == "unit" and part["made"] != "bought"]
+    return " x ".join(number(width, 3) for width in widths(spec, boxes))
 
 
 def build(
@@ -106,8 +218,8 @@ def _build_all(
 ) -> bool:
     """Build the specs and print the results; return whether every check passed."""
 
-    outputs_asked = {"unit", "moulds"} if only is None else set(listed(only))
-    if outputs_asked & {"unit", "moulds"} and (formats is None or "step" in listed(formats)):
+    outputs_asked = {"unit", "moulds"} if only is None else set(names_in(only))
+    if outputs_asked & {"unit", "moulds"} and (formats is None or "step" in names_in(formats)):
         step_helper.start()  # first: it loads its modules while this process loads its own
     paged = only is None if page is None else page
     changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)

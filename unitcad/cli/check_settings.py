@@ -9,13 +9,33 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct, field
 
 from unitcad import files
-from unitcad.cli.check_table import Settings
 from unitcad.errors import Refusal, UnitcadError, unknown_key
 from unitcad.files import seen_from
 from unitcad.spec.toml import parse_toml
+
+
+class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename="kebab"):
+    """Keys of a settings file, by the options' names; None or empty for a missing key."""
+
+    select: list[str] = []
+    ignore: list[str] = []
+    per_file_ignores: dict[str, list[str]] = {}
+    fail_on: Literal["error", "warning"] | None = None
+    printer: str | None = None
+    unit: str | None = None
+    strict: bool | None = None
+    exclude: list[str] = []
+    strict_3mf: bool | None = field(default=None, name="3mf-strict")
+    max_faces: Annotated[int, Meta(ge=1)] | None = None
+    timeout: Annotated[float, Meta(ge=0.001)] | None = None
+    memory: Annotated[int, Meta(ge=200)] | None = None
+    baseline: str | None = None
+
 
 NAMES = ("unitcad.toml", "pyproject.toml")
 
@@ -133,7 +153,7 @@ def _read(path: Path) -> Configuration | None:
                     raise unknown_key(".".join([*above, key]), data[key], [last])
         if last not in data:
             return None
-        from unitcad.cli.check_table import Settings
+        from unitcad.cli.check_settings import Settings
         from unitcad.spec.convert import convert
 
         settings = convert(_mapping(table, data[last]), Settings, table)

@@ -13,12 +13,12 @@ from unitcad.designs import parts
 from unitcad.designs.custom import custom
 from unitcad.designs.design import Design
 from unitcad.designs.dimensions import Dimensions
-from unitcad.designs.tooling import Tooling
+from unitcad.designs.parts import Tooling
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.shape import cylinder
-from unitcad.shape.body import Body
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec
-from unitcad.spec.custom_code import is_custom
+from unitcad.spec.design_files import is_custom
 from unitcad.spec.raw import RawSpec
 
 __all__ = [

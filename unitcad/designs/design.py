@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from unitcad.designs.dimensions import Dimensions
-from unitcad.designs.tooling import Tooling
+from unitcad.designs.parts import Tooling
 from unitcad.shape import Shape
 from unitcad.spec import Spec
 from unitcad.spec.raw import RawSpec

@@ -23,8 +23,8 @@ from unitcad.designs.dimensions import (
     slot_exit,
     wire_exit,
 )
+from unitcad.designs.limits import allowed_strain, pad_strain, tail_strain, widest_tail_end
 from unitcad.designs.parts import ADHESIVE, bond, motor_hold, slots
-from unitcad.designs.stretch import allowed_strain, pad_strain, tail_strain, widest_tail_end
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec

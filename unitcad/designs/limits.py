@@ -1,20 +1,77 @@
-"""The limits that concentric designs share: everything refused that no kernel would notice.
-
-Each refusal names the field, its value, the limit and the nearest accepted value: that value, put in, meets this limit.
-"""
+"""The limits that concentric designs share: stretch, rib leaves, and all that no kernel would notice."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from unitcad import catalogue
+from unitcad.catalogue import Material, Printer
 from unitcad.designs.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, Exit
-from unitcad.designs.rib_leaves import farthest_push, leaf_mm, least_skirt
 from unitcad.errors import Refusal
 from unitcad.spec import Spec, printer_of
 from unitcad.spec.raw import LEAST_LEDGE, FpcbTable, WiresTable
 from unitcad.spec.resolved import Circuit
+
+
+def allowed_strain(spec: Spec, known: Mapping[str, Material]) -> float:
+    """Return the margin's part of the least elongation at break among the layers (1 = 100 %)."""
+    least = min(float(known[layer.material].elongation_pct) for layer in spec.layers)
+    return spec.casting.strain_margin * least / 100
+
+
+def lip_strain(dims: Dimensions) -> float:
+    """Return the strain of a lip's mouth as motor and pad are pushed through it: radius over radius, less one."""
+    passing = max(dims.motor_radius, dims.pad.radius if dims.pad else 0.0)
+    return passing / dims.mouth_radius - 1
+
+
+def tail_strain(fpcb: Circuit, slot: Exit) -> float:
+    """Return the strain of the slot's edge as the tail's free end passes: perimeter over perimeter, less one, or 0."""
+    return max(0.0, 2 * (fpcb.tail_end_width_mm + fpcb.thickness_mm) / _round(slot) - 1)
+
+
+def pad_strain(fpcb: Circuit, slot: Exit) -> float:
+    """Return the strain of the slot's edge if the circuit's own pad had to pass, as a chain's next pad would."""
+    return max(0.0, 2 * (fpcb.pad_diameter_mm + fpcb.thickness_mm) / _round(slot) - 1)
+
+
+def widest_tail_end(fpcb: Circuit, slot: Exit, strain: float) -> float:
+    """Return the widest free end of a tail, mm, that stretches the slot by no more than `strain`."""
+    return _round(slot) * (1 + strain) / 2 - fpcb.thickness_mm
+
+
+def _round(slot: Exit) -> float:
+    """Return the slot's perimeter, mm."""
+    return 2 * (slot.width + slot.height)
+
+
+MOST_STRAIN = 0.012
+"""Largest strain at a leaf's root (assumed: about half of strength over modulus of standard resins)."""
+LEAF_WIDTH = 2.5
+CREST = 0.8
+"""Distance from the skirt's lower end up to the contact of a rib on a leaf with the plinth, mm."""
+
+
+def leaf_mm(printer: Printer) -> float:
+    """Return how thick a leaf is, and how wide the slot round it, mm: the least wall; 0 for ribs that are crushed."""
+    return float(printer.least_wall_mm) if printer.technology.value == "sla" else 0.0
+
+
+def leaf_strain(thickness: float, pushed: float, arm: float) -> float:
+    """Return the strain at the root of a leaf that is pushed aside by `pushed` at `arm` below it, mm."""
+    return 1.5 * thickness * pushed / arm**2
+
+
+def farthest_push(interference: float, play: float, clearance: float) -> float:
+    """Return how far a rib is pushed back if the gap is printed narrower by the printer's play, mm."""
+    return interference + min(play, clearance)
+
+
+def least_skirt(thickness: float, pushed: float) -> float:
+    """Return the height of a skirt, mm, whose leaves are strained by no more than `MOST_STRAIN`."""
+    return math.sqrt(1.5 * thickness * pushed / MOST_STRAIN) + CREST
+
 
 TAIL_SHARE = 0.7
 """Half the tail's width over the core's radius, at most: beyond it the ledge has no shoulders."""

@@ -1,15 +1,12 @@
-"""Parts that designs share: motor, circuit or wires, and the slot that lets the tail out.
-
-z
-|   .--------- pad, radius pad.radius ---------.========== tail ===  pad.low to pad.high
-|      .------- motor, radius motor_radius ----.
-0------'---------------------------------------'------------------- skin
-"""
+"""Parts and tooling that designs share: motor, circuit or wires, the slot of the tail, blank tools and their cells."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Outline, Pad
 from unitcad.shape import Revolve, Shape, box, cut, cylinder, moved, polygon, turned, union
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 from unitcad.spec.resolved import Circuit, Wires
 from unitcad.text import number
@@ -77,3 +74,52 @@ def slots(dims: Dimensions) -> list[Shape]:
     low, high = dims.exit.low, dims.exit.high
     high += BEYOND if high >= dims.heights[0] else 0.0
     return [strip(dims, side, dims.outer_radius + BEYOND, dims.exit.width / 2, low, high) for side in dims.sides]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cavity: its centre, the sides (+1, -1 along x) of its tails, and its number among several ("")."""
+
+    x: float
+    y: float
+    sides: tuple[int, ...]
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Cells and half sizes along x and y (mm): `plinth` at z = 0, `cup` and `plate` outside; `key` is a leg."""
+
+    cells: tuple[Cell, ...]
+    key: float
+    pitch: float
+    plinth: tuple[float, float]
+    cup: tuple[float, float]
+    plate: tuple[float, float]
+    label_height: float
+
+
+@dataclass(frozen=True)
+class Tooling:
+    """The tools of all pours, without labels, and the other seals.
+
+    dimensions   the lengths that the tools are drawn to; `heights` are the rims of the pours
+    layout       cells and plates; the labels go into the plates' corners
+    tools        in the order in which a person needs them: "base", and "cup1", "cup2" ... with their pour as `step`; a
+                 tool without `step`, except a blade, is part of every pour
+    seals        for each pour, space without tool that silicone is kept from
+    channels     for each pour under a lid, the silicone in sprue and vents, as many a cell; () if all pours are open
+    grooves      for each pour, whether its cup has an overflow groove; () if all have one
+    concentric   whether the tools are those of rings: then the dimensions define every hole and gap in them
+    """
+
+    dimensions: Dimensions
+    layout: Layout
+    tools: tuple[Body, ...]
+    seals: tuple[tuple[Shape, ...], ...]
+    channels: tuple[tuple[Shape, ...], ...] = ()
+    grooves: tuple[bool, ...] = ()
+    concentric: bool = False
+
+    def __repr__(self) -> str:
+        return f"Tooling({', '.join(tool.name for tool in self.tools)})"

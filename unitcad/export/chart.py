@@ -93,9 +93,9 @@ def chart(
 
 def page(width: float, height: float, parts: Sequence[str]) -> str:
     """Return a drawing as an SVG document on white."""
-    size = f'width="{number(width)}" height="{number(height)}"'
+    size = f'width="{coord(width)}" height="{coord(height)}"'
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(width)} {number(height)}" {size} '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {coord(width)} {coord(height)}" {size} '
         f'font-family="sans-serif" font-size="12">\n<rect {size} fill="#ffffff"/>'
     )
     return "\n".join([head, *parts, "</svg>", ""])
@@ -155,7 +155,7 @@ def round_step(span: float, count: int = 6) -> float:
     return next(unit * k for k in (1, 2, 5, 10) if unit * k >= rough)
 
 
-def number(value: float, digits: int = 2) -> str:
+def coord(value: float, digits: int = 2) -> str:
     """Format a coordinate: so many decimals at most, no trailing zeros, no minus zero."""
     return f"{round(value, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".")
 

@@ -19,7 +19,7 @@ from manifold3d import CrossSection, Manifold
 
 from unitcad.errors import missing_extra
 from unitcad.export import svg
-from unitcad.export.chart import number
+from unitcad.export.chart import coord
 from unitcad.export.svg import Measure, Region, Side
 from unitcad.kernels.mesh import arrays
 
@@ -214,7 +214,7 @@ def across(
             z0, left = min(feet.values(), key=lambda foot: abs(centre - half - foot[1]))
             if half > SAME_MM > abs(centre - half - left):
                 sign = "Ø" if round_at(half, centre, max(z0, z1) + LEAST_EDGE_MM / 2) else ""
-                found.append(Measure(f"{sign}{number(right - left, 2)}", left, right, "below", len(found), min(z0, z1)))
+                found.append(Measure(f"{sign}{coord(right - left, 2)}", left, right, "below", len(found), min(z0, z1)))
     return found
 
 
@@ -227,7 +227,7 @@ def windows(loops: Sequence[Loop], width_at: Callable[[float, float], float]) ->
         walls = sorted(sorted((a[1], b[1])) for a, b in _sides(loops) if abs(a[0] - edge) + abs(b[0] - edge) < SAME_MM)
         for (_, low), (high, _) in pairwise(walls):
             if high - low > SAME_MM:
-                text = f"{number(width_at(edge, (low + high) / 2), 2)} x {number(high - low, 2)}"
+                text = f"{coord(width_at(edge, (low + high) / 2), 2)} x {coord(high - low, 2)}"
                 found.append(Measure(text, low, high, side, 2 if side == "left" else 0, edge))
     return found
 
@@ -242,9 +242,9 @@ def upright(loops: Sequence[Loop]) -> list[Measure]:
     heights = sorted({*ends, *(z for z, length in levels.items() if length >= LEAST_EDGE_MM)})
     heights = [z for i, z in enumerate(heights) if not i or z - heights[i - 1] > SAME_MM]
     left = min(x for loop in loops for x, _ in loop)
-    steps = [Measure(number(b - a, 2), a, b, "left", 0, left) for a, b in pairwise(heights)]
+    steps = [Measure(coord(b - a, 2), a, b, "left", 0, left) for a, b in pairwise(heights)]
     if len(heights) > 2:
-        steps.append(Measure(number(heights[-1] - heights[0], 2), heights[0], heights[-1], "left", 1, left))
+        steps.append(Measure(coord(heights[-1] - heights[0], 2), heights[0], heights[-1], "left", 1, left))
     return steps
 
 

@@ -21,8 +21,8 @@ import numpy as np
 from PIL import Image
 
 from unitcad import files
-from unitcad.export import raster, threemf
-from unitcad.export.chart import number, round_step, text
+from unitcad.export import printing, raster
+from unitcad.export.chart import coord, round_step, text
 from unitcad.export.raster import Colour, Surface
 from unitcad.meshcheck.findings import SEVERITIES, FileReport, Finding, Location
 from unitcad.meshcheck.geometry.mesh import LARGEST, Mesh, weld_exact
@@ -135,23 +135,23 @@ def coloured(report: FileReport) -> bytes:
         sound = (a != b) & (b != c) & (c != a)  # 3MF has no triangle with a vertex twice
         palette = (PART, *(COLOURS[severity] for severity in SEVERITIES))
         name = " ".join(filter(None, (Path(report.path).name, mesh.name)))
-        parts.append(threemf.MeshPart(printable(name), PART, mesh.vertices, mesh.faces[sound], palette, paint[sound]))
-    return threemf.content(parts)
+        parts.append(printing.MeshPart(printable(name), PART, mesh.vertices, mesh.faces[sound], palette, paint[sound]))
+    return printing.content(parts)
 
 
 def draw(report: FileReport, finding: Finding, scenes: Sequence[Scene | None]) -> str | None:
     """Draw a finding as SVG; None if nothing of it can be drawn."""
     places = [place for place in finding.locations if place.mesh is not None and scenes[place.mesh]]
-    number = places[0].mesh if places else next(i for i, scene in enumerate(scenes) if scene)
-    assert number is not None
-    scene = scenes[number]
+    coord = places[0].mesh if places else next(i for i, scene in enumerate(scenes) if scene)
+    assert coord is not None
+    scene = scenes[coord]
     assert scene is not None
-    here = [place for place in places if place.mesh == number]
+    here = [place for place in places if place.mesh == coord]
     colour = COLOURS[finding.severity]
     title = f"{Path(report.path).name}: {finding.code} {rules()[finding.code].title} ({finding.severity})"
     if not here:
         return _page(title, finding, [_View(scene, Marks(), _DIRECTIONS[0], None, colour)], None)
-    marks = marks_of(finding.code, report.meshes[number], here)
+    marks = marks_of(finding.code, report.meshes[coord], here)
     middle, reach = _near(scene, marks)
     towards, cut = _direction(scene, marks, middle, reach)
     views = [
@@ -247,14 +247,14 @@ class _View:
         self.pixels = Image.fromarray(pixels).convert("RGB").reduce(raster.SHARPER)
         self.depth = depth[:: raster.SHARPER, :: raster.SHARPER]
         self.sides = np.ptp(scene.vertices, axis=0)
-        self.colour = xml_attribute(threemf.colour_hex(colour))
+        self.colour = xml_attribute(printing.colour_hex(colour))
 
     def svg(self, left: float, top: float) -> list[str]:
         """Draw the view with its marks, its upper left corner at (`left`, `top`)."""
         width, height = SIZE
         data = base64.b64encode(raster.encode_png(self.pixels)).decode()
         return [
-            f'<svg x="{number(left)}" y="{number(top)}" width="{width}" height="{height}">',
+            f'<svg x="{coord(left)}" y="{coord(top)}" width="{width}" height="{height}">',
             f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/>',
             *self._segments(),
             *self._points(),
@@ -270,7 +270,7 @@ class _View:
         drawn = []
         for lines, kind in ((self.marks.segments[~clear], "mark hidden"), (self.marks.segments[clear], "mark")):
             ends = self.view.project(lines)[:, :2].reshape(-1, 4).tolist()
-            path = "".join(f"M{number(x0)} {number(y0)}L{number(x1)} {number(y1)}" for x0, y0, x1, y1 in ends)
+            path = "".join(f"M{coord(x0)} {coord(y0)}L{coord(x1)} {coord(y1)}" for x0, y0, x1, y1 in ends)
             if path:
                 drawn.append(f'<path class="halo" d="{path}"/>')
                 drawn.append(f'<path class="{kind}" stroke={self.colour} d="{path}"/>')
@@ -278,7 +278,7 @@ class _View:
 
     def _points(self) -> list[str]:
         at = self.view.project(self.marks.points)[:, :2].tolist()
-        return [f'<circle class="point" r="5" fill={self.colour} cx="{number(x)}" cy="{number(y)}"/>' for x, y in at]
+        return [f'<circle class="point" r="5" fill={self.colour} cx="{coord(x)}" cy="{coord(y)}"/>' for x, y in at]
 
     def _where(self) -> list[str]:
         """Draw, in the whole view, a circle round the part in the near view."""
@@ -286,14 +286,14 @@ class _View:
             return []
         middle, reach = self.frame
         x, y, _ = self.view.project(middle)[0].tolist()
-        ring = f'cx="{number(x)}" cy="{number(y)}" r="{number(max(reach * self.view.scale, 16.0))}"'
+        ring = f'cx="{coord(x)}" cy="{coord(y)}" r="{coord(max(reach * self.view.scale, 16.0))}"'
         return [f'<circle class="ring halo" {ring}/>', f'<circle class="ring" {ring}/>']
 
     def _scale(self) -> list[str]:
         """Draw a bar of a round length."""
         length = round_step(0.1 * SIZE[0] / self.view.scale, 1)
         end, y = SIZE[0] - 16.0, SIZE[1] - 16.0
-        start = number(end - length * self.view.scale)
+        start = coord(end - length * self.view.scale)
         bar = f"M{start} {y - 4}v8M{start} {y}H{end}M{end} {y - 4}v8"
         label = text(end - length * self.view.scale / 2, y - 10, f"{length:g} mm", "middle")
         return ['<g class="scale">', f'<path class="halo" d="{bar}"/>', f'<path class="bar" d="{bar}"/>', label, "</g>"]
@@ -303,7 +303,7 @@ class _View:
         drawn = ['<g class="scale">']
         left, top = 40.0, SIZE[1] - 40.0
         for name, right, up in zip("xyz", self.view.right.tolist(), self.view.up.tolist(), strict=True):
-            drawn.append(f'<path class="bar" d="M{left} {top}l{number(24 * right)} {number(-24 * up)}"/>')
+            drawn.append(f'<path class="bar" d="M{left} {top}l{coord(24 * right)} {coord(-24 * up)}"/>')
             drawn.append(text(left + 32 * right, top - 32 * up + 4, name, "middle"))
         return [*drawn, "</g>"]
 
@@ -330,10 +330,10 @@ def _page(title: str, finding: Finding, views: Sequence[_View], place: Location 
     for i, view in enumerate(views):
         left = _MARGIN + i * (SIZE[0] + _MARGIN)
         marks += [*view.svg(left, top), text(left, top + SIZE[1] + 20, _caption(view, finding, place))]
-    size = f'width="{number(width)}" height="{number(height)}"'
+    size = f'width="{coord(width)}" height="{coord(height)}"'
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" {size} '
-        f'viewBox="0 0 {number(width)} {number(height)}">'
+        f'viewBox="0 0 {coord(width)} {coord(height)}">'
         f"<title>{xml_text(title)}</title><style>{_STYLE}</style>"
         f'<rect {size} fill="#fff"/>'
     )

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
 import manifold3d
 import numpy as np
 
 from unitcad.errors import UnitcadError
 from unitcad.geometry.arrays import unique_rows
+from unitcad.text import xml_attribute, xml_text
 
 ROUNDS = 6
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -102,3 +109,166 @@ def stl(vertices: np.ndarray, faces: np.ndarray, name: str) -> bytes:
     facets["corners"] = corners
     header = f"unitcad, mm: {name}".encode("ascii", "replace")[:80].ljust(80)
     return header + len(faces).to_bytes(4, "little") + facets.tobytes()
+
+
+GAP_MM = 5.0
+_CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+_SLIC3R = "http://schemas.slic3r.org/3mf/2017/06"
+_SETTINGS = "Metadata/Slic3r_PE_model.config"
+
+_CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+ <Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+ <Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
+ <Default Extension="config" ContentType="application/xml"/>
+</Types>
+"""
+_RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+ <Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
+</Relationships>
+"""
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """A named mesh in print attitude: vertices (n, 3) float32 in mm, faces (m, 3), colour as three numbers 0 to 1.
+
+    Faces of several colours have a `palette`, of which `paint` (m,) is each face's index. `copies`: the names of
+    several that are alike; the mesh is in the file once, and each has an item of the build, its name as part number.
+    """
+
+    name: str
+    colour: tuple[float, float, float]
+    vertices: np.ndarray
+    faces: np.ndarray
+    palette: tuple[tuple[float, float, float], ...] = ()
+    paint: np.ndarray | None = None
+    copies: tuple[str, ...] = ()
+
+
+def content(
+    parts: Sequence[MeshPart],
+    bed_mm: tuple[float, float] = (220.0, 220.0),
+    settings: Mapping[str, str] = MappingProxyType({}),
+    description: str = "",
+) -> bytes:
+    """Return the bytes of a package with `parts` in their order, in rows along x within the bed's width, GAP_MM apart.
+
+    `settings` of each part, by PrusaSlicer's names, are in its own file of object settings: the user's printer and
+    filament stay as they are. `description` has them in words for other programs. Dates, order and compression are
+    fixed.
+    """
+    entries = {
+        "[Content_Types].xml": _CONTENT_TYPES,
+        "_rels/.rels": _RELATIONSHIPS,
+        "3D/3dmodel.model": _model(parts, bed_mm, settings, description),
+    }
+    if settings:
+        entries[_SETTINGS] = _object_settings(parts, settings)
+    package = io.BytesIO()
+    with zipfile.ZipFile(package, "w") as archive:
+        for name, text in entries.items():
+            entry = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+            entry.create_system = 3
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, text.encode(), compresslevel=6)
+    return package.getvalue()
+
+
+def layout(footprints: Sequence[tuple[float, float]], bed_mm: tuple[float, float]) -> list[tuple[float, float]]:
+    """Return the place of each footprint's (x, y) lower left corner (mm), about the bed's middle.
+
+    In rows along x, a new one at the end of the bed's width. Pieces that do not fit run over its far edges; nothing
+    overlaps.
+    """
+    corners: list[tuple[float, float]] = []
+    x = y = row_depth = reach = 0.0
+    for width, depth in footprints:
+        if x > 0 and x + width > bed_mm[0]:
+            x, y, row_depth = 0.0, y + row_depth + GAP_MM, 0.0
+        corners.append((x, y))
+        reach, row_depth = max(reach, x + width), max(row_depth, depth)
+        x += width + GAP_MM
+    dx, dy = max(0.0, (bed_mm[0] - reach) / 2), max(0.0, (bed_mm[1] - y - row_depth) / 2)
+    return [(x + dx, y + dy) for x, y in corners]
+
+
+def colour_hex(colour: tuple[float, float, float]) -> str:
+    """Return #RRGGBB of three numbers 0 to 1."""
+    return "#" + "".join(f"{round(channel * 255):02X}" for channel in colour)
+
+
+def _object_settings(parts: Sequence[MeshPart], settings: Mapping[str, str]) -> str:
+    """Write PrusaSlicer's settings of each object. It wants the range of facets of the one volume in each."""
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<config>"]
+    for index, part in enumerate(parts):
+        lines.append(f'<object id="{index + 2}" instances_count="{len(part.copies) or 1}">')
+        for key, value in {"name": part.name, **settings}.items():
+            lines.append(f'<metadata type="object" key="{key}" value={xml_attribute(value)}/>')
+        lines.append(f'<volume firstid="0" lastid="{len(part.faces) - 1}">')
+        lines += [f'<metadata type="volume" key="name" value={xml_attribute(part.name)}/>', "</volume>", "</object>"]
+    return "\n".join([*lines, "</config>", ""])
+
+
+def _model(
+    parts: Sequence[MeshPart], bed_mm: tuple[float, float], settings: Mapping[str, str], description: str
+) -> str:
+    low = [part.vertices.min(axis=0).astype(float) for part in parts]
+    size = [part.vertices.max(axis=0).astype(float) - least for part, least in zip(parts, low, strict=True)]
+    built = [(index, copy) for index, part in enumerate(parts) for copy in part.copies or ("",)]
+    places = layout([(float(size[index][0]), float(size[index][1])) for index, _ in built], bed_mm)
+    vendor = f' xmlns:slic3rpe="{_SLIC3R}"' if settings else ""
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE}"{vendor}>',
+        '<metadata name="Application">unitcad</metadata>',
+        # Without it PrusaSlicer makes an object of each copy, and gives only the first one its settings.
+        *(['<metadata name="slic3rpe:Version3mf">1</metadata>'] if settings else []),
+        *([f'<metadata name="Description">{xml_text(description)}</metadata>'] if description else []),
+        "<resources>",
+        '<basematerials id="1">',
+        *(
+            f"<base name={xml_attribute(part.name)} displaycolor={xml_attribute(colour_hex(colour))}/>"
+            for part in parts
+            for colour in part.palette or (part.colour,)
+        ),
+        "</basematerials>",
+    ]
+    base = 0
+    for index, part in enumerate(parts):
+        lines += [
+            f'<object id="{index + 2}" type="model" name={xml_attribute(part.name)} pid="1" pindex="{base}">',
+            "<mesh>",
+            "<vertices>",
+            *_rows('<vertex x="%s" y="%s" z="%s"/>', np.asarray(part.vertices, np.float32).astype(str)),
+            "</vertices>",
+            "<triangles>",
+            *_triangles(part, base),
+            "</triangles>",
+            "</mesh>",
+            "</object>",
+        ]
+        base += len(part.palette) or 1
+    lines += ["</resources>", "<build>"]
+    for (index, copy), (x, y) in zip(built, places, strict=True):
+        move = " ".join(f"{value + 0.0:.6f}" for value in (x, y, 0.0) - low[index])
+        named = f" partnumber={xml_attribute(copy)}" if copy else ""
+        lines.append(f'<item objectid="{index + 2}" transform="1 0 0 0 1 0 0 0 1 {move}"{named}/>')
+    return "\n".join([*lines, "</build>", "</model>", ""])
+
+
+def _triangles(part: MeshPart, base: int) -> list[str]:
+    """Write the faces; those of another colour than the palette's first one name theirs."""
+    if part.paint is None:
+        return _rows('<triangle v1="%s" v2="%s" v3="%s"/>', part.faces)
+    return [
+        f'<triangle v1="{a}" v2="{b}" v3="{c}"/>'
+        if not colour
+        else f'<triangle v1="{a}" v2="{b}" v3="{c}" pid="1" p1="{base + colour}"/>'
+        for (a, b, c), colour in zip(part.faces.tolist(), part.paint.tolist(), strict=True)
+    ]
+
+
+def _rows(form: str, table: np.ndarray) -> list[str]:
+    return [form % tuple(row) for row in table.tolist()]

@@ -12,11 +12,11 @@ import numpy as np
 from manifold3d import CrossSection
 
 from unitcad.designs import Dimensions
-from unitcad.export.chart import number
-from unitcad.export.threemf import colour_hex
+from unitcad.export.chart import coord
+from unitcad.export.printing import colour_hex
 from unitcad.kernels.mesh import realise
-from unitcad.shape.body import Body
 from unitcad.shape.profile import GRID_PER_MM
+from unitcad.shape.tree import Body
 from unitcad.text import xml_attribute, xml_text
 
 Side = Literal["below", "left", "right"]
@@ -37,7 +37,7 @@ LABEL_GAP_PX, EDGE_PX = 14.0, 6.0
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0]])
 """Turns (x, y, z) to (x, z, -y): the plane of the section becomes the one that manifold3d slices in."""
 _STYLE = (
-    f"text{{font:{number(TEXT_PX)}px Helvetica,Arial,sans-serif;fill:#111}}"
+    f"text{{font:{coord(TEXT_PX)}px Helvetica,Arial,sans-serif;fill:#111}}"
     "path{stroke:#111;stroke-width:.8;stroke-linejoin:round}"
     ".dimension{stroke:#111;stroke-width:.7}.extension{stroke:#777;stroke-width:.5}.arrow{fill:#111}"
     ".leader{stroke:#333;stroke-width:.6}.dot{fill:#111}.axis{stroke:#555;stroke-width:.6;stroke-dasharray:12 3 2 3}"
@@ -124,7 +124,7 @@ def section(
     marks += page.labels(labels) if labels else []
     if title:
         marks.append(_text(title, (page.width / 2, TEXT_PX)))
-    width, height = number(page.width), number(page.height)
+    width, height = coord(page.width), coord(page.height)
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" width="{width}" height="{height}" '
         f'viewBox="0 0 {width} {height}"><title>{xml_text(title or "section")}</title><style>{_STYLE}</style>'
@@ -238,7 +238,7 @@ class _Page:
     def region(self, region: Region) -> str:
         """Draw a filled region with holes, titled."""
         loops = [[self.at(point) for point in loop] for loop in region.loops]
-        path = "".join("M" + "L".join(f"{number(x)} {number(y)}" for x, y in loop) + "Z" for loop in loops)
+        path = "".join("M" + "L".join(f"{coord(x)} {coord(y)}" for x, y in loop) + "Z" for loop in loops)
         fill = xml_attribute(colour_hex(region.colour))
         return f'<path d="{path}" fill={fill} fill-rule="evenodd"><title>{xml_text(region.name)}</title></path>'
 
@@ -297,14 +297,14 @@ class _Page:
         marks = []
         for note, (x, y), middle in zip(notes, anchors, middles, strict=True):
             marks.append(_line((middle, row + TEXT_PX * 0.7), (x, y), "leader"))
-            marks.append(f'<circle class="dot" cx="{number(x)}" cy="{number(y)}" r="2.2"/>')
+            marks.append(f'<circle class="dot" cx="{coord(x)}" cy="{coord(y)}" r="2.2"/>')
             marks.append(_text(note.text, (middle, row)))
         return marks
 
 
 def _mm(value: float) -> str:
     """Format a length as a drawing shows it: three decimals at most."""
-    return number(value, 3)
+    return coord(value, 3)
 
 
 def text_width(text: str) -> float:
@@ -352,13 +352,13 @@ def within(
 
 def _line(start: Point, end: Point, kind: str) -> str:
     (x1, y1), (x2, y2) = start, end
-    return f'<line class="{kind}" x1="{number(x1)}" y1="{number(y1)}" x2="{number(x2)}" y2="{number(y2)}"/>'
+    return f'<line class="{kind}" x1="{coord(x1)}" y1="{coord(y1)}" x2="{coord(x2)}" y2="{coord(y2)}"/>'
 
 
 def _text(content: str, at: Point, anchor: str = "middle") -> str:
     """Draw a line of text, its middle at the height of `at`."""
     x, y = at
-    return f'<text x="{number(x)}" y="{number(y + 0.35 * TEXT_PX)}" text-anchor="{anchor}">{xml_text(content)}</text>'
+    return f'<text x="{coord(x)}" y="{coord(y + 0.35 * TEXT_PX)}" text-anchor="{anchor}">{xml_text(content)}</text>'
 
 
 def _dimension(start: Point, end: Point) -> list[str]:
@@ -375,7 +375,7 @@ def _dimension(start: Point, end: Point) -> list[str]:
             marks.append(_line(tip, (tip[0] + unit[0] * way * 2, tip[1] + unit[1] * way * 2), "dimension"))
         across = (-unit[1] * ARROW_PX * 0.25, unit[0] * ARROW_PX * 0.25)
         corners = (tip, (back[0] + across[0], back[1] + across[1]), (back[0] - across[0], back[1] - across[1]))
-        marks.append(f'<polygon class="arrow" points="{" ".join(f"{number(x)},{number(y)}" for x, y in corners)}"/>')
+        marks.append(f'<polygon class="arrow" points="{" ".join(f"{coord(x)},{coord(y)}" for x, y in corners)}"/>')
     return marks
 
 

@@ -9,10 +9,9 @@ from importlib.util import find_spec
 
 from unitcad.errors import UnitcadError, pip_install
 from unitcad.kernels import brep, occt
-from unitcad.kernels.ocp import loading
+from unitcad.kernels.occt import loading
 from unitcad.shape import Shape
-from unitcad.shape.body import Body
-from unitcad.shape.tree import Turn
+from unitcad.shape.tree import Body, Turn
 
 with loading("build123d"):
     import build123d as b3d

@@ -6,10 +6,9 @@ import sys
 from collections.abc import Sequence
 
 from unitcad.kernels import brep, occt
-from unitcad.kernels.ocp import loading
+from unitcad.kernels.occt import loading
 from unitcad.shape import Shape
-from unitcad.shape.body import Body
-from unitcad.shape.tree import Turn
+from unitcad.shape.tree import Body, Turn
 
 with loading("cadquery"):
     import cadquery as cq

@@ -9,10 +9,11 @@ from typing import Any
 
 import manifold3d
 import numpy as np
-from manifold3d import CrossSection, Manifold
+from manifold3d import CrossSection, JoinType, Manifold
 
 from unitcad.errors import UnitcadError
-from unitcad.geometry.components import components
+from unitcad.geometry.arrays import components
+from unitcad.geometry.segments import between_outlines
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import FACETS, GRID_PER_MM, Profile, points
 from unitcad.shape.tree import by_quarters
@@ -300,3 +301,40 @@ def _taper(below: np.ndarray, above: np.ndarray, z0: float, z1: float) -> Manifo
     sides = np.vstack([np.column_stack([i, j, j + n]), np.column_stack([i, j + n, i + n])])
     mesh = manifold3d.Mesh64(np.vstack([floor, roof]), np.vstack([cap_below, cap_above, sides]).astype(np.uint64))
     return Manifold(mesh)
+
+
+FINENESS = 1e-3
+"""Accuracy of the widest circle's diameter, mm."""
+
+
+def widest(section: CrossSection) -> tuple[float, tuple[float, float]]:
+    """Return the diameter of the largest circle that fits into a section, and a centre for it (mm).
+
+    By bisection over inward offsets, mitred, so that a corner does not count as a rounded one. 0 for an empty section.
+    """
+    if section.is_empty():
+        return 0.0, (0.0, 0.0)
+    x0, y0, x1, y1 = section.bounds()
+    low, high, kept = 0.0, min(x1 - x0, y1 - y0) / 2, section
+    while high - low > FINENESS / 4:
+        middle = (low + high) / 2
+        inner = section.offset(-middle, JoinType.Miter)
+        if inner.is_empty():
+            high = middle
+        else:
+            low, kept = middle, inner
+    # Any corner of the last offset is that deep; the mean of its corners would not, were it a ring.
+    corner = min(tuple(map(float, point)) for loop in kept.to_polygons() for point in loop)
+    return 2 * low, (corner[0], corner[1])
+
+
+def thick_parts(section: CrossSection, least: float = FACETS) -> list[CrossSection]:
+    """Return the connected parts of a section that are wider than the films of facets or rounding between two faces."""
+    return [part for part in section.decompose() if not part.offset(-least / 2, JoinType.Miter).is_empty()]
+
+
+def gap(one: CrossSection, other: CrossSection, most: float) -> float:
+    """Return the least distance between two sections, neither empty, mm: 0 if they overlap, `most` at most."""
+    if not (one ^ other).is_empty():
+        return 0.0
+    return between_outlines(one.to_polygons(), other.to_polygons(), most)

@@ -19,7 +19,7 @@ from unitcad.lab.readers import Quantity, expect_ending, to_si
 from unitcad.lab.unit_files import File, Name, UnitSource, file_of, source_file
 from unitcad.spec.convert import convert
 from unitcad.spec.raw import Table
-from unitcad.validation.typed_files import load_file
+from unitcad.validation.load import load_file
 
 Records = Annotated[tuple[File, ...], Meta(max_length=1000)]
 Positive = Annotated[float, Meta(ge=1e-12, le=1e12)]

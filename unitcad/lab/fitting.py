@@ -27,7 +27,7 @@ from unitcad.lab.unit_files import File, Name, UnitSource, file_of, measured_wal
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.raw import Table
 from unitcad.validation import from_data
-from unitcad.validation.typed_files import load_file
+from unitcad.validation.load import load_file
 
 LevelValue = Annotated[float, Meta(ge=1e-6, le=1e3, description="amplitude at the edge over the motor's")]
 _TWO_SIDED = 1.96

@@ -27,10 +27,10 @@ from unitcad.estimate_inputs import tissue_layer
 from unitcad.kernels.mesh import bounds, realise
 from unitcad.moulds.pieces import bar
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union
-from unitcad.shape.body import Body
+from unitcad.shape.tree import Body
 from unitcad.spec import convert
 from unitcad.text import some
-from unitcad.validation.typed_files import load_file
+from unitcad.validation.load import load_file
 
 LEAST_LAYER = 0.5
 _LAYER_NAME = "small letters a to z, digits and -, the first a letter"

@@ -19,9 +19,8 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import Item, to_csv
 from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room, bubble_rise_s
 from unitcad.catalogue import printers
-from unitcad.cli.output import console, print_json, progress, warn
-from unitcad.cli.shared_options import AsJson
-from unitcad.export import printing, svg, threemf
+from unitcad.cli.output import AsJson, console, print_json, progress, warn
+from unitcad.export import printing, svg
 from unitcad.export.chart import Series, chart
 from unitcad.export.printing import print_ready
 from unitcad.export.raster import Surface, draw
@@ -38,7 +37,7 @@ from unitcad.lab.phantom import (
     tissue_table,
 )
 from unitcad.meshcheck import Options, check_file
-from unitcad.shape.body import Body
+from unitcad.shape.tree import Body
 from unitcad.text import markdown, toml, toml_key
 
 NEAR_LAYER = 0.02
@@ -373,9 +372,9 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
         stage(body.name)
         ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
         found[f"moulds/{body.name}.stl"] = printing.stl(*ready, body.name)
-        parts.append(threemf.MeshPart(body.name, body.colour, *ready))
+        parts.append(printing.MeshPart(body.name, body.colour, *ready))
     bed = float(phantom.printer.bed_x_mm), float(phantom.printer.bed_y_mm)
-    found["moulds/moulds.3mf"] = threemf.content(parts, bed)
+    found["moulds/moulds.3mf"] = printing.content(parts, bed)
     stage("pages")
     # The box filled, cut through the pegs of one side and, of the lid, nothing: frames, layers and plate.
     shown = [body for body in phantom.tools if body.kind in ("base", "frame") or body.made == "cut"]

@@ -18,7 +18,7 @@ from unitcad.spec import Spec, check_plain
 from unitcad.spec.raw import Table
 from unitcad.text import some
 from unitcad.validation import custom_templates, from_data, put, read, templates
-from unitcad.validation.shipped_files import is_path
+from unitcad.validation.load import is_path
 
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 File = Annotated[str, Meta(min_length=1, max_length=1000)]

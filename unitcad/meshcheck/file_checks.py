@@ -22,10 +22,9 @@ import numpy as np
 from unitcad.files import no_such_file
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
-from unitcad.meshcheck.builds import check_3mf, check_step
+from unitcad.meshcheck.builds import check_3mf, check_on_bed, check_step, check_surface
 from unitcad.meshcheck.findings import Facts, FileReport, Finding, detailed, ending, merge
 from unitcad.meshcheck.geometry.mesh import Mesh
-from unitcad.meshcheck.one_mesh import check_on_bed, check_surface
 from unitcad.meshcheck.readers import kind_of
 from unitcad.meshcheck.readers.read_step import missing
 from unitcad.meshcheck.rules import g_shells, s_scale

@@ -1,17 +1,4 @@
-"""The base: plate, keyed plinth and cores in one piece.
-
-        section of pour 1            cup          rim, z = heights[0]
-            .-----------.  groove .--_-----------.
-            |           '--'      | |            |
-            |     cup   | cavity .'-'. tongue ====== grip
-        .---'  .--------+--------'core|-----------'---.
-        | skirt|  plinth            filament          |   seat, z = 0
-        '------'  ........................ .----------'   skirt ends above the plate
-        |  plate                     |   |            |
-        '----------------------------'   '- groove ---'
-
-Tools are drawn from the spec's lengths. None is made by subtracting the unit: C100 compares the two.
-"""
+"""The base with its plinth and cores, and the tongues that form the slot."""
 
 from __future__ import annotations
 
@@ -20,12 +7,40 @@ from collections.abc import Sequence
 
 from unitcad.designs import Dimensions, design_of
 from unitcad.designs.dimensions import Exit
-from unitcad.designs.parts import BEYOND, solid_within, strip
-from unitcad.designs.tooling import Layout
+from unitcad.designs.parts import BEYOND, Layout, solid_within, strip
 from unitcad.moulds import filament
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG
-from unitcad.shape import Extrude, Profile, Shape, box, cut, moved, rounded_rectangle, union
+from unitcad.shape import Extrude, Profile, Shape, box, cut, moved, rounded_rectangle, turned, union
 from unitcad.spec import Spec
+
+GRIP_LENGTH, GRIP_WIDTH, GRIP_GAP, GRIP_APART = 8.0, 10.0, 3.0, 0.5
+
+
+def tongue(dims: Dimensions, lay: Layout, exit: Exit, cut: bool = False) -> Shape:
+    """Draw the strip that forms the slot, with a grip outside the cup; for a single cell on the axis, leaving along +x.
+
+    Its tip is round and stops against the core's riser, its underside rests on the ledge. One that is `cut` from film
+    is a plain strip: tape makes its grip.
+    """
+    low, high = exit.low, exit.high
+    edge = max(lay.cup[0] - abs(c.x) for c in lay.cells)
+    reach = edge + GRIP_GAP + GRIP_LENGTH
+    if cut:
+        return strip(dims, 1, reach, exit.width / 2, low, high)
+    half = max(GRIP_WIDTH, exit.width + 4) / 2
+    if len(lay.cells) > 1:
+        half = max(min(half, lay.pitch / 2 - GRIP_APART), exit.width / 2)
+    grip = box(edge + GRIP_GAP, reach, -half, half, low, high)
+    return union((strip(dims, 1, reach - 1, exit.width / 2, low, high), grip))
+
+
+def tongues(dims: Dimensions, lay: Layout, cut: bool = False) -> list[tuple[int, Shape]]:
+    """Draw every tongue in its place, with the side (+1, -1 along x) that it is pulled out to; printed, or `cut`."""
+    if not dims.exit:
+        return []
+    one = tongue(dims, lay, dims.exit, cut)
+    return [(s, moved(turned(one, "z", 0 if s > 0 else 2), c.x, c.y)) for c in lay.cells for s in c.sides]
+
 
 PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER = 1.5, 4.0, 1.5
 

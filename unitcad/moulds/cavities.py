@@ -10,8 +10,8 @@ import numpy as np
 from manifold3d import Manifold, OpType
 
 from unitcad.kernels.mesh import realise
-from unitcad.moulds.congruence import MARGIN, column_round, cropped, once_each, reaching
 from unitcad.moulds.plan import Plan, Step
+from unitcad.moulds.surroundings import MARGIN, column_round, cropped, once_each, reaching
 from unitcad.shape import Shape, box
 from unitcad.shape.column import Standing
 

@@ -23,11 +23,19 @@ from manifold3d import Manifold, OpType
 
 from unitcad.designs import design_of, dimensions, inserts
 from unitcad.designs.limits import check_seat
-from unitcad.designs.parts import BEYOND
-from unitcad.designs.tooling import Tooling
+from unitcad.designs.parts import BEYOND, Tooling
 from unitcad.errors import UNIT_ALONE, Refusal
-from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_count, thick_pieces
-from unitcad.kernels.sections import gap, thick_parts, widest
+from unitcad.kernels.mesh import (
+    area_true,
+    arrays,
+    bounds,
+    gap,
+    realise,
+    segment_count,
+    thick_parts,
+    thick_pieces,
+    widest,
+)
 from unitcad.moulds import lid
 from unitcad.moulds.base import stand
 from unitcad.moulds.cup import cup_blank, groove, grooves, recess, skirt_end

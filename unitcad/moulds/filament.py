@@ -10,8 +10,7 @@ import math
 
 from unitcad.designs import Dimensions
 from unitcad.designs.limits import filament_groove
-from unitcad.designs.parts import BEYOND
-from unitcad.designs.tooling import Cell, Layout
+from unitcad.designs.parts import BEYOND, Cell, Layout
 from unitcad.shape import Profile, Revolve, Shape, box, cylinder, moved, polygon, ring, turned, union
 from unitcad.spec import Spec
 

@@ -1,32 +1,75 @@
-"""The lid for injection: a flat plate on a cup's rim with sprue and vents to every cavity, and a skirt to centre it.
-
-    .---------. .----. .----------.   vents at the rim, halfway between the axes
-    |         | |sprue| |          |
-    '-.  .----'-'-----'-'-----.  .-'   z = rim
-      |  |       cavity       |  |   skirt round the cup, above the windows
-
-Over a ring, whose width no syringe's tip fits, the sprue narrows to a gate and replaces the first vent.
-"""
+"""Lids for injection, air that they would trap, and the tray of the film that closes a unit's skin side."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from manifold3d import CrossSection
 
 from unitcad.designs import Dimensions
-from unitcad.designs.parts import BEYOND
-from unitcad.designs.tooling import Layout
+from unitcad.designs.dimensions import WIRE_GAP, Exit
+from unitcad.designs.limits import EPS, down
+from unitcad.designs.parts import BEYOND, Layout
 from unitcad.errors import Refusal
-from unitcad.kernels.sections import thick_parts, widest
+from unitcad.kernels.mesh import thick_parts, widest
 from unitcad.moulds.base import outline
-from unitcad.moulds.cup import window_section
+from unitcad.moulds.cup import grooves, window_section
 from unitcad.moulds.layout import MARK
-from unitcad.moulds.trapped_air import MESH_ROOM, TILT_DEG, deepest
 from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, mm, moved, polygon, union
 from unitcad.spec import Spec
+
+TILT_DEG = 5.0
+"""The tilt that a mould must bear on the bench."""
+DENT = 0.1
+"""Depth of a pocket of air over the layer's thinnest part, up to which it is a dent that the printer's play exceeds."""
+MESH_ROOM = 0.8
+"""The part of that depth that vents and tongues may use: a mesh's polygons, and a gate in a vent's place, add to it."""
+
+
+def deepest(spec: Spec, layer: int) -> float:
+    """Return the depth of a dent that a layer (from 0) bears, mm."""
+    drawn = spec.layers[layer]
+    return DENT * min(drawn.wall_mm, drawn.cap_mm if drawn.cap_mm else drawn.wall_mm)
+
+
+def under_tongue(dims: Dimensions, exit: Exit, layer: int) -> float:
+    """Return the depth of the air trapped under a tongue at the bore, the mould tilted towards it, mm.
+
+    The tongue's flat underside is a ceiling; its highest point is on the bore at r, and the way out leads round to the
+    tongue's edge, half a width h aside: lower by (r - sqrt(r^2 - h^2)) sin(tilt).
+    """
+    bore, half = dims.radii[layer], exit.width / 2
+    return (bore - math.sqrt(max(bore**2 - half**2, 0.0))) * math.sin(math.radians(TILT_DEG))
+
+
+def widest_tongue(spec: Spec, dims: Dimensions, layer: int) -> float:
+    """Return the width up to which air under a tongue gets out of a pour, mm: `under_tongue` solved for it."""
+    bore = dims.radii[layer]
+    drop = min(MESH_ROOM * deepest(spec, layer) / math.sin(math.radians(TILT_DEG)), bore)
+    return 2 * math.sqrt(bore**2 - (bore - drop) ** 2)
+
+
+def check_tongue(spec: Spec, dims: Dimensions) -> None:
+    """Raise Refusal if a tongue is too wide for the air under it to get out."""
+    widths = [widest_tongue(spec, dims, layer) for layer in range(len(spec.layers))]
+    if not dims.exit or dims.exit.width <= min(widths) + EPS:
+        return
+    layer = widths.index(min(widths))
+    widest = widths[layer] - spec.moulds.slot_width_clearance_mm
+    depth = under_tongue(dims, dims.exit, layer)
+    why = (
+        f"tilted by {TILT_DEG:g} degrees, pour {layer + 1} keeps {depth:.3f} mm of air under the tongue, more than "
+        f"{MESH_ROOM * deepest(spec, layer):.3f}"
+    )
+    if spec.wires:
+        each = down((widest + WIRE_GAP) / spec.wires.count - WIRE_GAP)
+        raise Refusal("wires.diameter_mm", spec.wires.diameter_mm, why, each if each > 0 else None)
+    tail = spec.fpcb.tail_width_mm if spec.fpcb else 0.0
+    raise Refusal("fpcb.tail_width_mm", tail, why, down(widest) if widest > 0.001 else None)
+
 
 THICKNESS, SKIRT, SKIRT_WALL, SKIRT_OFF_WINDOW = 3.0, 1.5, 1.6, 0.2
 VENT, LEAST_VENT = 1.0, 0.8
@@ -207,3 +250,24 @@ def _ceiling(dims: Dimensions, layer: int) -> tuple[float, float]:
 
 def _at_the_rim(dims: Dimensions, layer: int) -> bool:
     return dims.exit is not None and dims.exit.high >= dims.heights[layer]
+
+
+FLOOR_MM = 2.0
+"""Least thickness under the film, mm, before it ends a whole layer."""
+
+
+def skin_tray(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
+    """Draw the tray, its rim at the top of the last layer."""
+    rim, layer = dims.heights[-1], spec.moulds.layer_mm
+    floor = math.ceil((FLOOR_MM + dims.skin) / layer - 1e-6) * layer - dims.skin
+    film = cylinder(dims.outer_radius, rim - dims.skin, rim + BEYOND)
+    recesses = [moved(film, cell.x, cell.y) for cell in lay.cells]
+    closed = replace(dims, exit=None)
+    blank = Extrude(outline(lay.cup, MARK), rim - dims.skin - floor, rim)
+    return cut(blank, [*recesses, *grooves(spec, closed, lay, len(dims.heights) - 1)])
+
+
+def films(dims: Dimensions, lay: Layout) -> list[Shape]:
+    """Draw the films in their tray, one a cell."""
+    film = cylinder(dims.outer_radius, dims.heights[-1] - dims.skin, dims.heights[-1])
+    return [moved(film, cell.x, cell.y) for cell in lay.cells]

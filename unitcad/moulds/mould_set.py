@@ -14,19 +14,18 @@ from unitcad.catalogue import printers
 from unitcad.designs import Design, Dimensions, design_of, unit_bodies
 from unitcad.designs.design import Fitting
 from unitcad.kernels import mesh
-from unitcad.kernels.mesh import realise, segment_count
-from unitcad.kernels.sections import thick_parts
+from unitcad.kernels.mesh import realise, segment_count, thick_parts
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.cavities import Cavity, cavities, united
+from unitcad.moulds.cup import rib_spaces
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.plan import Plan, Step, plan
-from unitcad.moulds.ribs import rib_spaces
 from unitcad.moulds.surroundings import Surroundings, surroundings
 from unitcad.shape import Shape
-from unitcad.shape.body import Body
 from unitcad.shape.profile import FACETS
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec, assumed_lengths, from_json, to_json, with_formats
-from unitcad.spec.custom_code import is_body_file
+from unitcad.spec.design_files import is_body_file
 from unitcad.spec.raw import CastingTable
 from unitcad.spec.resolved import Estimate
 from unitcad.text import listed, number

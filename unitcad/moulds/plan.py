@@ -7,19 +7,36 @@ from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
 from unitcad.designs.dimensions import poured
-from unitcad.designs.tooling import Cell, Layout, Tooling
+from unitcad.designs.parts import BEYOND, Cell, Layout, Tooling
 from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
-from unitcad.moulds import lid
-from unitcad.moulds.base import plate_top
+from unitcad.moulds import filament, lid
+from unitcad.moulds.base import base, plate_bottom, plate_top, tongues
 from unitcad.moulds.complement import complement
-from unitcad.moulds.concentric import concentric
-from unitcad.moulds.dovetails import Split
-from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved, set_label
-from unitcad.moulds.pins import Pins
-from unitcad.moulds.removal import Removal, customary
+from unitcad.moulds.cup import Pins, cup
+from unitcad.moulds.cuts import Split
+from unitcad.moulds.layout import layout
+from unitcad.moulds.lid import skin_tray
+from unitcad.moulds.pieces import (
+    Removal,
+    base_label,
+    base_piece,
+    blade,
+    blade_piece,
+    cell_numbers,
+    corner_labels,
+    cup_piece,
+    customary,
+    engraved,
+    filament_pieces,
+    lid_piece,
+    seals,
+    set_label,
+    tongue_pieces,
+    tray_piece,
+)
 from unitcad.shape import Shape, moved, turned, union
-from unitcad.shape.body import Body, Kind
-from unitcad.spec import Spec
+from unitcad.shape.tree import Body, Kind
+from unitcad.spec import Spec, printer_of
 from unitcad.text import spaced
 
 
@@ -237,3 +254,39 @@ def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str)
         return tool
     file = engraved(tool.file, letters) if tool.file else None
     return replace(tool, shape=engraved(tool.shape, letters), file=file)
+
+
+def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
+    """Return the tooling of a spec's rings or cups; the shapes `cast` are not looked at, so that C100 can compare.
+
+    Raises Refusal beyond the bed, for a tail that reaches no edge, and for a tongue or vents that can't clear the air.
+    """
+    design = design_of(spec)
+    dims = poured(spec, design.dimensions(spec))
+    lay, pours = layout(spec, dims), range(len(cast))
+    lid.check_tongue(spec, dims)
+    injected = spec.moulds.pour == "injected"
+    tools = [base_piece(base(spec, dims, lay))]
+    for i in pours:
+        wider = spec.moulds.bore_compensation_mm
+        file = cup(spec, dims, lay, i, wider) if wider else None
+        tools.append(cup_piece(i + 1, cup(spec, dims, lay, i), file))
+        if injected:
+            drilled = lid.channels(spec, dims, lay, i, beyond=BEYOND)
+            tools.append(lid_piece(i + 1, lid.lid(spec, dims, lay, i, drilled)))
+    brittle = printer_of(spec).technology.value == "sla"
+    tools += tongue_pieces(tongues(dims, lay, cut=brittle), brittle)
+    if design.suction:
+        tools += filament_pieces([filament.piece(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells])
+    if dims.skin:
+        tools.append(tray_piece(skin_tray(spec, dims, lay)))
+    if not injected:
+        tools.append(blade_piece(blade(lay, dims.heights[-1])))
+    return Tooling(
+        dims,
+        lay,
+        tuple(tools),
+        seals=tuple(tuple(seals(spec, dims, lay, i)) for i in pours),
+        channels=tuple(tuple(lid.channels(spec, dims, lay, i)) for i in pours) if injected else (),
+        concentric=True,
+    )

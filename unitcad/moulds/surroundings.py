@@ -1,17 +1,121 @@
-"""Surroundings of each place of a mould set, pour by pour: which cells and tools are in like surroundings."""
+"""Places of a mould set in like surroundings: a result at one of them is valid at all."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
+import numpy as np
 from manifold3d import Manifold
 
-from unitcad.kernels.mesh import realise
-from unitcad.moulds.congruence import MARGIN, Congruence, column_round
+from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import Shape
+from unitcad.shape.column import Column, Standing
+
+_Judged = TypeVar("_Judged")
+
+SAME = 1e-6
+"""Distance up to which two corners of meshes are one, mm."""
+MARGIN = 0.2
+"""Margin of a column round the examined part, mm: less than the thinnest wall."""
+SLACK = 0.1
+"""How much wider than a column's circle its box is taken, mm: the polygon about it reaches beyond it."""
+_DIRECTIONS = np.array([[0.3217, 0.5931, 0.7381], [0.8017, -0.2713, 0.5326]])
+_SIDES = 48
+_FLAT = 1e-8
+"""Largest least eigenvalue of the sum of n n', over the normals n of a vertex, at which they count as in one plane."""
+
+
+def column_round(solids: Sequence[Manifold], margin: float) -> Column:
+    """Return the column round solids, `margin` (mm) larger than they are about their box's middle."""
+    boxes = np.array([solid.bounding_box() for solid in solids])
+    low, high = boxes[:, :2].min(axis=0), boxes[:, 3:5].max(axis=0)
+    x, y = (low + high) / 2
+    column = Column(float(x), float(y), 0.0)
+    corners = np.concatenate([arrays(solid)[0][:, :2] for solid in solids]) - (column.x, column.y)
+    ends = float(boxes[:, 2].min()) - margin, float(boxes[:, 5].max()) + margin
+    return Column(column.x, column.y, float(np.hypot(*corners.T).max()) + margin, *ends)
+
+
+def cropped(solid: Manifold, column: Column) -> Manifold:
+    """Return the part of a solid in a column, whose round wall is a polygon about it."""
+    low, high = max(solid.bounding_box()[2] - 1, column.low), min(solid.bounding_box()[5] + 1, column.high)
+    if low >= high:
+        return Manifold()
+    outer = column.radius / np.cos(np.pi / _SIDES)
+    wall = Manifold.cylinder(high - low, outer, outer, _SIDES)
+    return solid ^ wall.translate((column.x, column.y, low))
+
+
+def reaching(solids: Sequence[Manifold], column: Column) -> list[Manifold]:
+    """Return the solids whose boxes reach into a column's, seen from above."""
+    boxes = np.array([solid.bounding_box() for solid in solids]).reshape(-1, 6)
+    apart = np.maximum(boxes[:, :2] - (column.x, column.y), (column.x, column.y) - boxes[:, 3:5])
+    return [solids[int(i)] for i in np.flatnonzero((apart < column.radius + SLACK).all(axis=1))]
+
+
+class Congruence:
+    """Tells which columns through the same shapes and meshes are alike."""
+
+    def __init__(self, shapes: Sequence[Shape], meshes: Sequence[Manifold] = ()) -> None:
+        self.standing = Standing(shapes)
+        corners = _corners(*_together(meshes))
+        self._corners = corners[np.argsort(corners[:, 0], kind="stable")]
+        self._known: dict[Hashable, list[tuple[int, np.ndarray]]] = {}
+        self._count = 0
+
+    def number(self, column: Column) -> int:
+        """Return a number that is the same for columns that are alike."""
+        drawn = self.standing.within(column), *(round(v, 6) for v in (column.radius, column.low, column.high))
+        corners, known = self._about(column), self._known.setdefault(drawn, [])
+        for index, other in known:
+            if corners.shape == other.shape and np.all(np.abs(corners - other) <= SAME):
+                return index
+        self._count += 1
+        known.append((self._count, corners))
+        return self._count
+
+    def _about(self, column: Column) -> np.ndarray:
+        """Return the meshes' corners in a column as sorted lists of their heights along slanted directions, mm."""
+        first, last = np.searchsorted(self._corners[:, 0], (column.x - column.radius, column.x + column.radius))
+        near = self._corners[first:last] - (column.x, column.y, 0.0)
+        inside = (near[:, 2] > column.low) & (near[:, 2] < column.high)
+        near = near[inside & (np.hypot(near[:, 0], near[:, 1]) < column.radius)]
+        return np.sort(near @ _DIRECTIONS.T, axis=0)
+
+
+def _together(meshes: Sequence[Manifold]) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (n, 3) and faces (m, 3) of several meshes as of one."""
+    every = [arrays(mesh) for mesh in meshes]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in every)])
+    faces = [faces + start for (_, faces), start in zip(every, starts, strict=False)]
+    vertices = [np.empty((0, 3)), *(vertices for vertices, _ in every)]
+    return np.concatenate(vertices), np.concatenate([np.empty((0, 3), np.int64), *faces])
+
+
+def _corners(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the vertices (n, 3) at which three planes or more meet.
+
+    A boolean leaves others on flat faces and straight edges, which depend on the order of its operands. The normals
+    there are all square to one direction.
+    """
+    across = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
+    normals = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    spread = np.einsum("ni,nj->nij", normals, normals).reshape(-1, 9)
+    sums = np.stack([np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices)) for part in spread.T], axis=1)
+    return vertices[np.linalg.eigvalsh(sums.reshape(-1, 3, 3))[:, 0] > _FLAT]
+
+
+def once_each(keys: Sequence[int], make: Callable[[int], _Judged]) -> list[tuple[int, _Judged]]:
+    """Return for every number the place of the first equal one and the result of `make` there."""
+    first: dict[int, tuple[int, _Judged]] = {}
+    for i, key in enumerate(keys):
+        if key not in first:
+            first[key] = (i, make(i))
+    return [first[key] for key in keys]
 
 
 @dataclass(frozen=True, eq=False)

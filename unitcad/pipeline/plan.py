@@ -20,13 +20,12 @@ import numpy as np
 from unitcad import __version__
 from unitcad.cache import digest
 from unitcad.casting.bill import SPARE_TONGUE, plates
-from unitcad.casting.pictures import BenchPictures
 from unitcad.casting.preparation import slicer_settings
 from unitcad.casting.procedure_text import step_section
-from unitcad.casting.views import picture_path
+from unitcad.casting.views import BenchPictures, picture_path
 from unitcad.designs import design_of, no_estimate
 from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
-from unitcad.export import glb, printing, svg, threemf
+from unitcad.export import glb, printing, svg
 from unitcad.export.printing import TooThin, print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import mould_set
@@ -34,10 +33,10 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import step_helper
 from unitcad.pipeline.scenes import GAP, pictures
 from unitcad.shape import Shape, content_hash, moved
-from unitcad.shape.body import Body, copies, part_names
 from unitcad.shape.column import extent
+from unitcad.shape.tree import Body, copies, part_names
 from unitcad.spec import Spec
-from unitcad.spec.custom_code import is_body_file, is_custom
+from unitcad.spec.design_files import is_body_file, is_custom
 from unitcad.spec.raw import OUTPUTS, Output
 
 GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")
@@ -256,9 +255,9 @@ def threemf_content(moulds: MouldSet, bodies: Sequence[Body], settings: Mapping[
     parts = []
     for name, places in zip(part_names(bodies, alike), alike, strict=True):
         first, several = bodies[places[0]], tuple(bodies[i].name for i in places) if len(places) > 1 else ()
-        parts.append(threemf.MeshPart(name, first.colour, *ready(moulds, first), copies=several))
+        parts.append(printing.MeshPart(name, first.colour, *ready(moulds, first), copies=several))
     said = "; ".join(f"{key.replace('_', ' ')} {value}" for key, value in settings.items())
-    return threemf.content(parts, bed, settings, f"Print in this attitude: {said}" if said else "")
+    return printing.content(parts, bed, settings, f"Print in this attitude: {said}" if said else "")
 
 
 def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:

@@ -13,11 +13,11 @@ from manifold3d import CrossSection, FillRule, Manifold, OpType
 from unitcad.casting.preparation import in_resin
 from unitcad.export import drawing as sheet
 from unitcad.export import svg
-from unitcad.export.chart import number
+from unitcad.export.chart import coord
 from unitcad.export.raster import Colour, Surface, draw
 from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.shape.body import Body
+from unitcad.shape.tree import Body
 from unitcad.text import spaced
 
 GAP = 7.0
@@ -253,11 +253,11 @@ def _plan_view(solid: Manifold, y: float) -> Callable[[float], str]:
     """Draw a solid from above, with its widths and the line of the section."""
     seen, (x0, y0, _, x1, y1, _) = sheet.from_above(solid), bounds(solid)
     outline = seen[0].loops
-    size = [svg.Measure(number(x1 - x0, 2), x0, x1, "below", 0, y0)]
+    size = [svg.Measure(coord(x1 - x0, 2), x0, x1, "below", 0, y0)]
     upright = [[(b, a) for a, b in loop] for loop in outline]
     deep = sheet.across(upright, ((y0 + y1) / 2,), lambda *_: False, least=LEAST_SIDE_MM)
     deep = [one for one in deep if one.end - one.start < y1 - y0 - sheet.SAME_MM]
-    for one in (*deep, svg.Measure(number(y1 - y0, 2), y0, y1, "left", len(deep), x0)):
+    for one in (*deep, svg.Measure(coord(y1 - y0, 2), y0, y1, "left", len(deep), x0)):
         size.append(replace(one, side="left", reach=max(one.reach, x0)))
     above = partial(svg.section, seen, size, title="from above", ground="A", named=False, level=y, both_ends=True)
     return lambda scale: above(px_per_mm=scale)

@@ -19,7 +19,7 @@ from unitcad.rooms import load
 from unitcad.spec import Spec, from_json
 from unitcad.validation import compound_kind, from_data
 from unitcad.validation import load as load_spec
-from unitcad.validation.tables import Changes, Source
+from unitcad.validation.plain_data import Changes, Source
 
 
 class Compound(Subject):

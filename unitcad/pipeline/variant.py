@@ -8,13 +8,13 @@ from typing import Any, Literal, overload
 
 from manifold3d import Manifold
 
-from unitcad import notebook
+from unitcad import text
 from unitcad.catalogue import materials
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.kernels.mesh import as_trimesh
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import unit_section
-from unitcad.shape.body import Body
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 from unitcad.validation import Source, load
 
@@ -130,8 +130,8 @@ class Variant(MouldSet):
             mass = volume * float(material.density_g_cm3) / 1000
             rows.append((body.name, material.name, round(volume, 2), round(mass, 3)))
         head = ("layer", "material", "volume, mm³", "mass, g")
-        drawn = notebook.drawing(self.section(), f"section of {self.spec.name}")
-        return drawn + notebook.table(head, rows, self.spec.summary)
+        drawn = text.drawing(self.section(), f"section of {self.spec.name}")
+        return drawn + text.table(head, rows, self.spec.summary)
 
     def _body(self, name: str) -> Body:
         """Return the unit's body of that name, else the tool's: the moulds are drawn only for a tool."""

@@ -17,7 +17,49 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+import msgspec
+
 from unitcad import __version__
+
+REFERENCE = "\0"
+"""The key of a reference, {REFERENCE: index in the pool}: no spec or result has it, since TOML and JSON names of ours
+are text without a NUL."""
+LEAST = 160
+"""Bytes of JSON below which a part is not worth a reference."""
+_ENCODER = msgspec.json.Encoder()
+
+
+class Pool:
+    """Parts kept once. `entries[i]` is plain data whose larger parts are references to earlier entries."""
+
+    def __init__(self) -> None:
+        self.entries: list[Any] = []
+        self._index: dict[bytes, int] = {}
+
+    def put(self, data: Any) -> Any:
+        """Return `data` (of JSON's types) with every larger part replaced by a reference."""
+        if not isinstance(data, dict | list | tuple | str):
+            return data
+        text = _encode(data)
+        if len(text) < LEAST:
+            return data
+        if text not in self._index:
+            if isinstance(data, dict):
+                data = {key: self.put(value) for key, value in data.items()}
+            elif isinstance(data, list | tuple):
+                data = [self.put(value) for value in data]
+            self._index[text] = len(self.entries)
+            self.entries.append(data)
+        return {REFERENCE: self._index[text]}
+
+
+def _encode(data: Any) -> bytes:
+    """Return data as JSON, by the encoder that is ten times as fast as Python's if it can write all of it."""
+    try:
+        return _ENCODER.encode(data)
+    except UnicodeEncodeError:  # names of files that are no text
+        return json.dumps(data).encode()
+
 
 _EFFORT = 6
 """Of the compression: half the time of the greatest, pages a hundredth larger."""
@@ -116,3 +158,45 @@ def asset(name: str) -> str:
 @cache
 def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+_STYLES = ("app/page.css", "app/print.css")
+
+
+_PROGRAMS = ("vendor/three.min.js", *(f"app/{name}.js" for name in ("dom", "glb", "viewer", "controls", "array")))
+VIEW = '<div class="stage-host"><p class="absent">A script draws the 3D view.</p></div>'
+"""The place of the 3D view in a page's markup."""
+
+
+def plain_page(title: str, body: str, model: dict[str, Any] | None = None) -> str:
+    """Return the HTML of a page that contacts nothing; `body` is markup, whose texts are escaped already.
+
+    With a `model` it contains the programs of the 3D view, which draw it in the place of VIEW.
+    """
+    sheets, markup = [asset(name) for name in _STYLES], [f'<main id="page">{body}</main>']
+    if model is None:
+        return document(title, sheets, markup)
+    licence = html.escape(asset("vendor/three.LICENSE.txt"), quote=False)
+    markup += [
+        f'<script type="text/plain" id="data">{packed(model)}</script>',
+        f'<script type="text/plain" id="licences">{licence}</script>',
+    ]
+    return document(title, sheets, markup, [asset(name) for name in _PROGRAMS])
+
+
+def drawing(svg: str, alt: str, narrow: str = "") -> str:
+    """Return an SVG document as an image in the page, with a description in words; `narrow` replaces it on a phone."""
+    image = f'<img class="drawing" alt="{html.escape(alt)}" src="{_data(svg)}">'
+    if not narrow:
+        return image
+    return f'<picture><source media="(max-width: 600px)" srcset="{_data(narrow)}">{image}</picture>'
+
+
+def picture(png: bytes, alt: str) -> str:
+    """Return a PNG as an image in the page, with a description in words."""
+    data = base64.b64encode(png).decode()
+    return f'<img class="drawing" alt="{html.escape(alt)}" src="data:image/png;base64,{data}">'
+
+
+def _data(svg: str) -> str:
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"

@@ -14,11 +14,10 @@ from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.write import BENCH, PAGE
-from unitcad.report import batch_table, read_results
+from unitcad.report import read_results
 from unitcad.report.bench_page import write_bench
-from unitcad.report.html_page import asset, html_page
-from unitcad.report.pool import Pool
-from unitcad.report.records import VariantRecord
+from unitcad.report.html_page import Pool, asset, html_page
+from unitcad.report.read_results import VariantRecord
 from unitcad.report.viewer_models import Modelled, model
 from unitcad.rooms import load
 from unitcad.spec import Spec
@@ -91,13 +90,13 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
         records, specs, batch = [], [], None
         folders = read_results.variant_folders(folder)
         try:
-            batch = batch_table.read_batch(folder)
-            listed = None if batch else batch_table.rows_of_csv(folder)
+            batch = read_results.read_batch(folder)
+            listed = None if batch else read_results.rows_of_csv(folder)
             if listed is not None and listed > len(folders):
                 some = f"{listed} variants, of which {len(folders)} have a folder"
-                damaged[batch_table.CSV] = f"{some}; {_TABLE_OF_PAGE}"
+                damaged[read_results.CSV] = f"{some}; {_TABLE_OF_PAGE}"
         except UnitcadError as error:
-            damaged[batch_table.name_in(folder)] = str(error)
+            damaged[read_results.name_in(folder)] = str(error)
         if not folders and not batch:
             why = "; ".join(damaged.values()) or "no manifest.json in it or right below it"
             raise UnitcadError(f"{folder}: has no result of unitcad ({why})")
@@ -109,7 +108,7 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
                 continue
             records.append(record)
             specs.append(spec)
-        of_variants = {name: why for name, why in damaged.items() if name not in batch_table.TABLES}
+        of_variants = {name: why for name, why in damaged.items() if name not in read_results.BATCH_TABLES}
         table = read_results.results_table(batch, records, of_variants, stored=read_results.keeps_store(folder))
         title = f"{(batch or {}).get('name') or folder.resolve().name}: {counted(len(table.rows), 'variant')}"
     models = _models(records, specs, modelled) if modelled else {}

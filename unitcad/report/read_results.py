@@ -6,6 +6,8 @@ file opened, and no code of a spec run. Unreadable files are named with the reas
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import os
 from collections.abc import Iterator
@@ -13,19 +15,153 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from msgspec import structs
+from msgspec import UNSET, Struct, UnsetType, structs
 
 from unitcad import files
 from unitcad.casting.cast_record import ENDING, read_cast_record
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal, UnitcadError, misfit, missing_extra
 from unitcad.files import TEMPORARY
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.write import ADDRESS, PAGE, STORE
-from unitcad.report.records import ResultsTable, VariantRecord, expect
-from unitcad.report.step_pictures import step_pictures
-from unitcad.report.viewer_models import model_key, spec_in
+from unitcad.report.html_page import REFERENCE
+from unitcad.report.viewer_models import model_key, spec_in, step_pictures
 from unitcad.rooms import FileKind, file_kinds
 from unitcad.spec import Spec, to_data
+
+DEEPEST = 40
+"""Nesting of lists and tables that a result's file may have."""
+
+
+class ListedVariant(Struct):
+    """A variant of a batch."""
+
+    folder: str | None = None
+
+
+class SweptLevels(Struct):
+    """Each model's typical error in a batch, a factor, and the swept keys that it does not read.
+
+    `not_measured`: swept lengths with the one value, mm, that every measured unit had; earlier batches have none.
+    """
+
+    typical_error: dict[str, float]
+    insensitive: dict[str, list[str]]
+    not_measured: dict[str, float] = {}
+
+
+class BatchFile(Struct):
+    """batch.json."""
+
+    columns: list[str]
+    variants: list[ListedVariant]
+    estimate: SweptLevels | None = None
+
+
+class VariantRecord(Struct, kw_only=True):
+    """A variant on the page; a file that its folder lacks, or that can't be read, is None.
+
+    `casts`: the cast records in it; `drawings`: SVG by path; `pictures`: those of the procedure's steps as data by
+    path, only on the page of one variant; `files`: (path, bytes); `damaged`: unreadable files; `model`: the key of the
+    geometry, and `no_model` the reason for none.
+    """
+
+    folder: str
+    manifest: Manifest
+    estimate: dict[str, Any] | None
+    casting: dict[str, Any] | None
+    slicer: dict[str, Any] | None
+    drawings: dict[str, str]
+    pictures: dict[str, str]
+    casts: list[dict[str, Any]]
+    files: list[tuple[str, int]]
+    damaged: list[str]
+    spec: dict[str, Any] | None = None
+    model: str | None = None
+    no_model: str | UnsetType = UNSET
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the record as plain data."""
+        return {name: value for name, value in structs.asdict(self).items() if value is not UNSET}
+
+
+class ResultsTable(Struct, frozen=True):
+    """Table of a batch on the page: each row begins with the folder that its variant has, or can have, else "".
+
+    `swept` are the columns that a person chose values for.
+    """
+
+    columns: list[str]
+    rows: list[list[Any]]
+    swept: list[str] = []
+
+
+def expect(data: Any, kind: Any, path: Path) -> None:
+    """Raise UnitcadError, naming file and place, for data of another kind, too deep, or with the page's own key."""
+    level = [data]
+    for _ in range(DEEPEST):
+        tables = [node for node in level if isinstance(node, dict)]
+        if any(REFERENCE in table for table in tables):
+            raise UnitcadError(f"{path}: is not a result of unitcad: a key of it is a NUL")
+        level = [item for table in tables for item in table.values()] + [
+            item for node in level if isinstance(node, list) for item in node
+        ]
+    if level:
+        raise UnitcadError(f"{path}: is not a result of unitcad: nested deeper than {DEEPEST}")
+    try:
+        msgspec.convert(data, kind)
+    except msgspec.ValidationError as error:
+        raise UnitcadError(f"{path}: is not a result of unitcad: {misfit(error)}") from None
+
+
+JSON, PARQUET, CSV = BATCH_TABLES = ("batch.json", "variants.parquet", "variants.csv")
+HEAD = b"unitcad"
+"""Key of a Parquet file's metadata with the content of batch.json except its rows, as JSON."""
+
+
+def read_batch(folder: Path) -> dict[str, Any] | None:
+    """Read the table of a batch's folder; None without one. Raises UnitcadError if it can't be read."""
+    try:
+        batch, path = files.read_json(folder / JSON, largest=files.LARGEST_TABLE, links=False), folder / JSON
+    except files.NotThere:
+        try:
+            batch, path = read_parquet(folder / PARQUET), folder / PARQUET
+        except files.NotThere:
+            return None
+    expect(batch, BatchFile, path)
+    return batch
+
+
+def name_in(folder: Path) -> str:
+    """Return the name of the table that `read_batch` reads in a folder."""
+    return JSON if os.path.lexists(folder / JSON) else PARQUET
+
+
+def read_parquet(path: Path) -> dict[str, Any]:
+    """Return the head of a Parquet table with its rows, as batch.json has them.
+
+    Raises NotThere, Missing without the extra, UnitcadError for another file.
+    """
+    content = files.read(path, largest=files.LARGEST_TABLE, links=False)
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        raise missing_extra("parquet", f"{path}: needs pyarrow") from None
+    try:
+        table = parquet.read_table(pa.BufferReader(content))
+        return {**json.loads((table.schema.metadata or {})[HEAD]), "variants": table.to_pylist()}
+    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError) as error:
+        raise UnitcadError(f"{path}: is not the table of a batch, or damaged ({type(error).__name__})") from None
+
+
+def rows_of_csv(folder: Path) -> int | None:
+    """Count the variants in the CSV table of a folder, None without one. Raises UnitcadError."""
+    try:
+        text = files.read_text(folder / CSV, largest=files.LARGEST_TABLE, links=False)
+    except files.NotThere:
+        return None
+    return sum(1 for row in csv.reader(io.StringIO(text)) if row) - 1
+
 
 MANIFEST = "manifest.json"
 TABLES = ("estimate", "casting", "slicer")

@@ -1,17 +1,42 @@
-"""The viewer's data of a geometry: meshes as assembled, the moments of casting, places of parts when taken apart."""
+"""Data of a page: the models of its viewer, and the pictures of the steps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import base64
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from unitcad import files
+from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import GEOMETRIC, build_key, glb_content
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
 from unitcad.report.html_page import compressed
 from unitcad.spec import Spec, read_toml, with_formats
 from unitcad.validation import from_data
+
+LARGEST_PICTURE = 1_000_000
+"""Bytes of a step's picture, at most."""
+MOST_PICTURES = 500
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def step_pictures(folder: Path, paths: Iterable[str]) -> dict[str, str]:
+    """Return the pictures of these paths in a folder as data, without files that are missing or no PNG."""
+    read: dict[str, str] = {}
+    for path in list(dict.fromkeys(path for path in paths if path))[:MOST_PICTURES]:
+        parts = Path(path).parts
+        if Path(path).is_absolute() or ".." in parts or any((folder / p).is_symlink() for p in Path(path).parents):
+            continue
+        try:
+            content = files.read(folder / path, largest=LARGEST_PICTURE, links=False)
+        except UnitcadError:
+            continue
+        if content.startswith(PNG):
+            read[path] = f"data:image/png;base64,{base64.b64encode(content).decode()}"
+    return read
+
 
 Modelled = Callable[[Spec], dict[str, Any]]
 """Returns the result of `model` for a spec."""

@@ -8,11 +8,10 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.output import console, print_json, progress
-from unitcad.cli.shared_options import AsJson
+from unitcad.cli.output import AsJson, console, print_json, progress
 from unitcad.files import seen_from
-from unitcad.search import design_files, design_text
-from unitcad.search.explanation import explain as explained
+from unitcad.search import design_files
+from unitcad.search.proposals import explain as explained
 from unitcad.search.proposals import invert
 from unitcad.search.target_file import load_target
 
@@ -55,7 +54,7 @@ def design(
         if as_json:
             print_json(reasons)
         else:
-            for line in design_text.explanation_lines(reasons):
+            for line in design_files.explanation_lines(reasons):
                 console().print(line, soft_wrap=True)
         return
     data = design_files.with_files(made.data, seen_from(folder))
@@ -63,16 +62,16 @@ def design(
         print_json({"folder": str(folder), **data})
         return
     plain, bold = partial(console().print, soft_wrap=True), partial(console().print, soft_wrap=True, style="bold")
-    bold(f"{data['name']}: {design_text.target_line(data['target'])}")
-    for line in design_text.head_lines(data):
+    bold(f"{data['name']}: {design_files.target_line(data['target'])}")
+    for line in design_files.head_lines(data):
         plain(f"  {line}")
     for i, one in enumerate(data["proposals"]):
-        if design_text.is_first_other(data["proposals"], i):
-            plain(f"{design_text.OTHERS}:")
-        bold(design_text.title(one))
-        plain(f"   {design_text.level_line(one)}")
-        for line in design_text.lines(one):
+        if design_files.is_first_other(data["proposals"], i):
+            plain(f"{design_files.OTHERS}:")
+        bold(design_files.title(one))
+        plain(f"   {design_files.level_line(one)}")
+        for line in design_files.lines(one):
             plain(f"   - {line}")
-    for line in design_text.skipped_lines(data):
+    for line in design_files.skipped_lines(data):
         plain(line)
     typer.echo(str(folder))

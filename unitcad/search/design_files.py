@@ -19,14 +19,127 @@ from unitcad.errors import UnitcadError
 from unitcad.export.chart import Series, chart
 from unitcad.pipeline import write as folders
 from unitcad.pipeline.variant import Variant
-from unitcad.report.plain_page import drawing, plain_page
-from unitcad.search import design_text
-from unitcad.search.candidates import Candidates, Say
-from unitcad.search.limits import limits
-from unitcad.search.proposals import Inversion, name_of
-from unitcad.search.ranking import ordered
+from unitcad.report.html_page import drawing, plain_page
+from unitcad.search.candidates import Candidates, Say, limits
+from unitcad.search.proposals import Inversion, name_of, ordered
 from unitcad.spec import to_toml
-from unitcad.text import cell, markdown, number
+from unitcad.text import cell, listed, markdown, number
+
+OTHERS = "Nearest others: measured outside the target, or below the probability that is asked for"
+"""The heading over the candidates that are no proposals."""
+_GOALS = {
+    "edge_min": "at least {} of the motor's amplitude at the edge",
+    "edge_max": "at most {} of the motor's amplitude at the edge",
+    "diameter_max_mm": "diameter at most {} mm",
+    "height_max_mm": "height at most {} mm",
+    "mass_max_g": "mass at most {} g",
+    "cure_hours_max": "out of the mould within {} h",
+    "crosstalk_ratio_max": "crosstalk ratio at most {}",
+    "pitch_mm": "neighbours {} mm apart",
+    "frequency_hz": "at {} Hz",
+}
+
+
+def percent(level: float) -> str:
+    """Return a level as per cent of the motor's amplitude, two digits."""
+    return f"{number(100 * level, 2)} %"
+
+
+def target_line(goals: Mapping[str, Any]) -> str:
+    """Return the target in words."""
+    texts = {
+        key: percent(value) if key in ("edge_min", "edge_max") else number(value, 4) for key, value in goals.items()
+    }
+    return ", ".join(text.format(texts[key]) for key, text in _GOALS.items() if key in goals)
+
+
+def head_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return the number of candidates, the source of the probabilities, and the order that the evidence supports."""
+    tried, leads = data["tried"], data["leads"]
+    refused = sum(one["count"] for one in tried["refused"])
+    not_made = f"; {refused} sets of lengths that no design accepts" if refused else ""
+    return [
+        f"{tried['candidates']} candidates ({tried['geometries']} sets of lengths), {tried['within_limits']} within "
+        f"the limits{not_made}",
+        f"probabilities by {leads['model']}, fitted to {leads['by']}; they rank {leads['ranks']}",
+        f"they do not rank {leads['does_not_rank']}",
+    ]
+
+
+def skipped_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return a line for each silicone that is skipped, and for each candidate that can't be cast."""
+    return [
+        *(f"skipped, {name}: {why}" for name, why in data["skipped"].items()),
+        *(f"can't be cast, {one['candidate']}: {'; '.join(one['failed'])}" for one in data["not_castable"]),
+    ]
+
+
+def title(one: Mapping[str, Any]) -> str:
+    """Return a proposal's heading: its number, its kind, and whether its lengths were never measured."""
+    return f"{one['rank']}. {one['label']}" + ("" if one["lengths_measured"] else " (not measured at these lengths)")
+
+
+def is_first_other(proposals: Sequence[Mapping[str, Any]], i: int) -> bool:
+    """Tell whether a candidate is under the heading `OTHERS`."""
+    return proposals[i]["nearest_other"] and not any(one["nearest_other"] for one in proposals[:i])
+
+
+def level_line(one: Mapping[str, Any]) -> str:
+    """Return a proposal's measurement, if there is one, then its probability and range."""
+    first = f"{measured_words(one['measured'])}; " if one["measured"] else ""
+    edge, least = one["edge"], one["probability_min"]
+    below = f", below your {100 * least:.3g} %" if one["probability"] < least else ""
+    return (
+        f"{first}probability {one['probability']:.2f}{below}, {percent(edge['p10'])} to {percent(edge['p90'])} "
+        "at the edge (10 to 90 %)"
+    )
+
+
+def measured_words(measured: Mapping[str, Any]) -> str:
+    """Return a unit's measurement, by whom, and whether it is within the target."""
+    level, second = percent(measured["level"]), measured.get("also")
+    also = f", also printed as {percent(second)}" if second and percent(second) != level else ""
+    return f"measured {level} ({measured['by']}{also}): {'meets' if measured['meets'] else 'outside'} the target"
+
+
+def lines(one: Mapping[str, Any]) -> list[str]:
+    """Return a proposal's size, mass and hours, then its reasons and its unknowns."""
+    checks = "moulds not checked" if one["checks"] is None else f"moulds pass at {one['checks']} places"
+    size = (
+        f"{number(one['diameter_mm'], 3)} mm wide, {number(one['height_mm'], 3)} mm high, "
+        f"{number(one['mass_g'], 3)} g with motor, out of the mould in {number(one['cure_hours'], 3)} h, {checks}"
+    )
+    made = [size]
+    if one["equal_to"]:
+        made.insert(0, f"as likely as number {one['equal_to']}: the order among equals is how easily they are made")
+    if crosstalk := one.get("crosstalk"):
+        value, low, high = (number(crosstalk[key], 2) for key in ("value", "low", "high"))
+        made.append(
+            f"crosstalk ratio {value} ({low} to {high}) at {number(crosstalk['pitch_mm'], 4)} mm, the same for every "
+            f"unit of this diameter; {percent(crosstalk['neighbour'])} of the motor's amplitude at the neighbour"
+        )
+    if sibling := one.get("measured_sibling"):
+        made.append(
+            f"the measured unit of this kind ({sibling['label']}): {measured_words(sibling)}; "
+            f"its probability is {sibling['probability']:.2f}"
+        )
+    if one["relies_on"]:
+        made.append(f"the nearest measured unit differs in {listed(one['relies_on'])}")
+    return [*made, one["lengths_gain"], *one["remarks"]]
+
+
+def explanation_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return an answer of `explain`."""
+    head = data["name"]
+    if data["probability"] is not None:
+        place = f", place {data['rank']} of {data['of']}" + ("" if data["among"] else " if it were tried")
+        head += f": {level_line(data)}{place if data['rank'] else ''}"
+    elif data["measured"]:
+        head += f": {measured_words(data['measured'])}"
+    is_proposal = data["listed"] and not data["nearest_other"]
+    among = [f"it is among the proposals, as number {data['listed']}"] if is_proposal else []
+    return [head, *(f"  {line}" for line in [*among, *data["reasons"]])]
+
 
 SPECS = "specs"
 _QUANTITIES = {
@@ -147,23 +260,23 @@ def front_charts(made: Inversion) -> dict[str, str]:
 
 def page(data: Mapping[str, Any], charts: Mapping[str, str]) -> str:
     """Return the result as Markdown."""
-    made = [f"# {markdown(data['name'])}: {design_text.target_line(data['target'])}", ""]
-    made += [f"{'; '.join(design_text.head_lines(data))}.", ""]
+    made = [f"# {markdown(data['name'])}: {target_line(data['target'])}", ""]
+    made += [f"{'; '.join(head_lines(data))}.", ""]
     for i, one in enumerate(data["proposals"]):
-        if design_text.is_first_other(data["proposals"], i):
-            made += [f"*{design_text.OTHERS}.*", ""]
-        made += [f"## {markdown(design_text.title(one))}", "", f"**{markdown(design_text.level_line(one))}**", ""]
-        made += [f"- {markdown(line)}" for line in design_text.lines(one)]
+        if is_first_other(data["proposals"], i):
+            made += [f"*{OTHERS}.*", ""]
+        made += [f"## {markdown(title(one))}", "", f"**{markdown(level_line(one))}**", ""]
+        made += [f"- {markdown(line)}" for line in lines(one)]
         made += [f"- build it: `unitcad build {shlex.quote(one['file'])}`", ""]
     made += [f"![probability of the level]({name})\n" for name in charts]
-    if skipped := design_text.skipped_lines(data):
+    if skipped := skipped_lines(data):
         made += ["## Skipped", "", *(f"- {markdown(line)}" for line in skipped), ""]
     return "\n".join(made)
 
 
 def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequence[str]) -> str:
     """Return the page of a result; `sections`: the SVG of each proposal."""
-    tried, *ranks = (escape(line) for line in design_text.head_lines(data))
+    tried, *ranks = (escape(line) for line in head_lines(data))
     refused = [
         f"{one['what']}: {one['count']} sets of lengths refused, first {one['first']}"
         for one in data["tried"]["refused"]
@@ -171,13 +284,13 @@ def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequ
     proposals = zip(data["proposals"], sections, strict=True)
     body = [
         f'<div class="top"><div><h1>{escape(data["name"])}</h1>',
-        f'<p class="line">{escape(design_text.target_line(data["target"]))}</p></div></div>',
+        f'<p class="line">{escape(target_line(data["target"]))}</p></div></div>',
         f"<section><h2>Proposals</h2>{_table(data['proposals'])}",
         f'<p class="note">Levels in per cent of the motor; mm: diameter x height. The {"; ".join(ranks)}. A '
         "probability is that of meeting the level.</p></section>",
         *(
-            f'<section id="proposal-{one["rank"]}"><h2>{escape(design_text.title(one))}</h2>'
-            f"<p><strong>{escape(design_text.level_line(one))}</strong></p>{_list(design_text.lines(one))}"
+            f'<section id="proposal-{one["rank"]}"><h2>{escape(title(one))}</h2>'
+            f"<p><strong>{escape(level_line(one))}</strong></p>{_list(lines(one))}"
             f"{drawing(section, 'section of ' + one['label'])}"
             f"<p>Build it: <code>unitcad build {escape(shlex.quote(one['file']))}</code></p></section>"
             for one, section in proposals
@@ -185,7 +298,7 @@ def html_page(data: Mapping[str, Any], charts: Mapping[str, str], sections: Sequ
         "<section><h2>Less costs probability</h2>",
         *(drawing(svg, "probability of the level, with the front") for svg in charts.values()),
         f"</section><section><h2>Tried</h2><p>{tried}. All of them are in ranking.csv.</p>",
-        f"{_list([*design_text.skipped_lines(data), *refused])}</section>",
+        f"{_list([*skipped_lines(data), *refused])}</section>",
     ]
     return plain_page(f"{data['name']}: designs", "\n".join(body))
 
@@ -196,20 +309,20 @@ def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
         edge, measured = one["edge"], one["measured"]
         outside = "" if not measured or measured["meets"] else ", outside"
         cells = [
-            design_text.percent(measured["level"]) + outside if measured else "",
+            percent(measured["level"]) + outside if measured else "",
             f"{one['probability']:.2f}",
-            f"{design_text.percent(edge['p10'])} to {design_text.percent(edge['p90'])}",
+            f"{percent(edge['p10'])} to {percent(edge['p90'])}",
             number(one["mass_g"], 2),
             number(one["cure_hours"], 3),
             f"{number(one['diameter_mm'], 3)} x {number(one['height_mm'], 3)}",
         ]
-        if design_text.is_first_other(proposals, i):
-            rows.append(f'<tr><td colspan="{len(head)}">{escape(design_text.OTHERS)}</td></tr>')
+        if is_first_other(proposals, i):
+            rows.append(f'<tr><td colspan="{len(head)}">{escape(OTHERS)}</td></tr>')
         numbers = "".join(
             f'<td{_NUMBER} data-head="{escape(name)}">{escape(text)}</td>'
             for name, text in zip(head[1:], cells, strict=True)
         )
-        link = f'<a href="#proposal-{one["rank"]}">{escape(design_text.title(one))}</a>'
+        link = f'<a href="#proposal-{one["rank"]}">{escape(title(one))}</a>'
         rows.append(f"<tr><td>{link}</td>{numbers}</tr>")
     heads = "".join(f"<th{_NUMBER if i else ''}>{escape(name)}</th>" for i, name in enumerate(head))
     return (

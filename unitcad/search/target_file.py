@@ -30,8 +30,8 @@ from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import read_text
 from unitcad.spec import convert
 from unitcad.spec.raw import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
-from unitcad.validation.fit_text import lab_fit
-from unitcad.validation.typed_files import load_file
+from unitcad.validation.defaults import lab_fit
+from unitcad.validation.load import load_file
 
 Level = Annotated[float, Meta(ge=0.001, le=2, description="of the motor's amplitude, at the unit's edge")]
 Ratio = Annotated[

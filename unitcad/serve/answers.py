@@ -16,7 +16,7 @@ import msgspec
 
 from unitcad.errors import NEAREST, UNIT_ALONE, Refusal, UnitcadError, UnknownKey
 from unitcad.serve import unit_answers
-from unitcad.serve.edits import edited
+from unitcad.serve.form import edited
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted
 from unitcad.serve.remedies import remedied
 from unitcad.spec import parse_toml

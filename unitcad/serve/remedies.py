@@ -13,7 +13,7 @@ from tomlkit.exceptions import TOMLKitError
 from unitcad.errors import NEAREST, Refusal, UnitcadError, shown
 from unitcad.serve.messages import Edit, Fault
 from unitcad.validation import put
-from unitcad.validation.dotted import ABSENT, at, drop
+from unitcad.validation.plain_data import ABSENT, at, drop
 from unitcad.validation.suggestions import followed, is_number, nearest_number, refused
 
 Judge = Callable[[dict[str, Any]], Mapping[str, Any]]

@@ -7,12 +7,14 @@ clear the air, as many cavities as the bed takes. Lengths in mm, the unit in eac
 from __future__ import annotations
 
 import inspect
+from collections.abc import Container
+from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
 from msgspec import Struct, structs
 
-from unitcad import notebook
+from unitcad import catalogue, text
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue.entries import Drive
 from unitcad.errors import UnitcadError
@@ -31,6 +33,7 @@ from unitcad.spec.raw import (
     Table,
     WiresTable,
 )
+from unitcad.text import number
 
 Casting = CastingTable
 Wires = WiresTable
@@ -248,8 +251,8 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
         """Name, design, diameter and layers in at most 160 characters."""
         layers = [f"{layer.material} {layer.wall_mm:g}" for layer in self.layers]
         listed = " / ".join(layers) if len(layers) <= _MOST_LAYERS else f"{len(layers)} layers"
-        unit = f"{notebook.shortened(self.design, 40)}, {self.diameter_mm:g} mm"
-        return notebook.shortened(f"{notebook.shortened(self.name, 40)!r}: {unit}, {listed}", 160)
+        unit = f"{text.shortened(self.design, 40)}, {self.diameter_mm:g} mm"
+        return text.shortened(f"{text.shortened(self.name, 40)!r}: {unit}, {listed}", 160)
 
     def __repr__(self) -> str:
         return f"Spec({self.summary})"
@@ -267,9 +270,63 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
             ("printer", self.moulds.printer),
             ("estimate", f"{self.estimate.frequency_hz:g} Hz on {self.estimate.tissue}"),
         ]
-        return notebook.table((), rows, self.name)
+        return text.table((), rows, self.name)
 
 
 def with_formats(spec: Spec, formats: tuple[Format, ...] = ()) -> Spec:
     """Return the spec with other formats, or with none: for keys that do not depend on them."""
     return structs.replace(spec, output=structs.replace(spec.output, formats=formats))
+
+
+MOTOR_SIZES = ("diameter_mm", "thickness_mm")
+
+
+def printer_of(spec: Spec) -> catalogue.Printer:
+    """Return the catalogue's printer with the lengths that the spec's moulds override."""
+    return _override(catalogue.printers(spec.printers)[spec.moulds.printer], spec.moulds)
+
+
+@lru_cache(maxsize=16)
+def _override(printer: catalogue.Printer, moulds: Moulds) -> catalogue.Printer:
+    overridden = {
+        name: catalogue.Value(value, "spec", "moulds")
+        for name, value in structs.asdict(moulds).items()
+        if hasattr(printer, name) and float(getattr(printer, name) or 0.0) != value
+    }
+    return structs.replace(printer, **overridden)
+
+
+def motor_of(spec: Spec) -> catalogue.Motor | None:
+    """Return the catalogue's motor, or None if the spec names none or overrides a size beyond the entry's range."""
+    motor = catalogue.motors(spec.motors)[spec.motor.part] if spec.motor.part else None
+    if motor and all(_within(getattr(spec.motor, size), getattr(motor, size)) for size in MOTOR_SIZES):
+        return motor
+    return None
+
+
+def assumed_lengths(spec: Spec, given: Container[str] = ()) -> dict[str, str]:
+    """Return the assumption about each length that nobody has measured, by its key, but for those `given`."""
+    motor = motor_of(spec)
+    sizes = [(size, getattr(motor, size)) for size in MOTOR_SIZES] if motor else []
+    found = {
+        f"motor.{size}": f"{number(value.low, 3)} to {number(value.high, 3)}"
+        for size, value in sizes
+        if value.status == "assumed" and value.value == getattr(spec.motor, size)
+    }
+    if (key := "motor.thickness_mm") in found and motor and motor.thickness_mm.high:
+        proud = motor.thickness_mm.high - spec.motor.thickness_mm
+        found[key] += f": up to {number(proud, 2)} mm out of the skin's plane"
+    if spec.fpcb and spec.fpcb.thickness_mm == FpcbTable().thickness_mm:
+        found["fpcb.thickness_mm"] = "usual stock"
+    return {key: how for key, how in found.items() if key not in given}
+
+
+def said_of(spec: Spec, key: str) -> str:
+    """Return "key = value" for a length of a spec."""
+    table, _, name = key.partition(".")
+    return f"{key} = {number(getattr(getattr(spec, table), name), 3)}"
+
+
+def _within(size: float, entry: catalogue.Value[float]) -> bool:
+    low, high = (entry.value if end is None else end for end in (entry.low, entry.high))
+    return low <= size <= high

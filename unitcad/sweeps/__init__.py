@@ -4,9 +4,9 @@
 """
 
 from unitcad.sweeps.batch_call import BatchResult, batch
-from unitcad.sweeps.batch_options import BatchOptions
-from unitcad.sweeps.batch_records import Summary
+from unitcad.sweeps.journal import Summary
 from unitcad.sweeps.run import run
+from unitcad.sweeps.shards import BatchOptions
 from unitcad.sweeps.sweep import Sweep, load_sweep
 
 __all__ = ["BatchOptions", "BatchResult", "Summary", "Sweep", "batch", "load_sweep", "run"]

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
-from unitcad.cache import DiskStore, MissingContent, SharedStore, digest
+from unitcad import files
+from unitcad.cache import Bundle, DiskStore, MissingContent, SharedStore, absolute, digest
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.write import whole
+from unitcad.files import write_new
+from unitcad.pipeline.plan import code_version
+from unitcad.pipeline.write import ADDRESS, STORE, replacing, sync, whole
 from unitcad.sweeps import task as tasks
-from unitcad.sweeps.batch_records import JournalEntry
+from unitcad.sweeps.journal import JournalEntry
 from unitcad.sweeps.record_packs import export, intact, packed_specs
 from unitcad.sweeps.task import Task, VariantOutcome
 
@@ -120,3 +125,67 @@ class InStore:
 def made(entry: JournalEntry) -> bool:
     """Check whether a variant was made, with or without a broken mould check."""
     return entry.status in (tasks.OK, tasks.BROKEN)
+
+
+class Receiver(Folders):
+    """Folders of the results of remote workers: each content once, and the reusable files of each geometry."""
+
+    def task(self, task: Task) -> Task:
+        return replace(task, known=self.known(task.geometry))
+
+    def known(self, geometry: str) -> Bundle | None:
+        """Return the bundle of a geometry, or None if any of it is missing."""
+        bundle = self.store.peek(_key(geometry))
+        if bundle is None or not all(map(self.store.has, bundle["files"].values())):
+            return None
+        return Bundle(bundle["data"], bundle["files"], bundle["sizes"])
+
+    def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
+        """Put a variant's files into its folder; return the outcome without them. Raises OSError."""
+        if outcome.product is None:
+            return outcome
+        try:
+            for content in outcome.contents.values():
+                self.store.keep(content)
+            if outcome.bundle and all(map(self.store.has, outcome.bundle.files.values())):
+                self.store.forget(_key(geometry))
+                with self.store.entry(_key(geometry)) as entry:
+                    entry.data = vars(outcome.bundle)
+            folder = self.out / outcome.folder
+            timings = {"code": code_version(), "seconds": {"all": round(outcome.seconds, 4)}}
+            with replacing(folder) as fresh:
+                outcome.product.place(fresh, self.store)
+                write_new(fresh / "timings.json", (json.dumps(timings) + "\n").encode())
+            sync([folder])
+        except OSError:
+            raise
+        except Exception as error:
+            return tasks.failure(outcome.index, error)
+        return replace(outcome, product=None, contents={}, bundle=None)
+
+
+def _key(geometry: str) -> str:
+    return digest(f"remote {geometry}".encode())
+
+
+def note_store(out: Path, address: str) -> None:
+    """Note the store's place in a batch's folder. Raises OSError."""
+    files.write(out / ADDRESS, json.dumps({"store": noted(out, address)}).encode() + b"\n")
+
+
+def noted(out: Path, address: str) -> str:
+    """Return a store's address as a batch in `out` notes it: relative if near the batch, so that both can move."""
+    near = {str((place / STORE).absolute()): way for place, way in ((out, STORE), (out.parent, f"../{STORE}"))}
+    return near.get(address, address)
+
+
+def found_at(out: Path, address: str) -> str:
+    """Return the address that a batch in `out` has `noted`."""
+    return absolute(address if "://" in address else os.path.normpath(out / address))
+
+
+def store_noted(out: Path) -> str | None:
+    """Return the address of the store that a batch's folder notes, None if it notes none. Raises UnitcadError."""
+    if not (out / ADDRESS).is_file():
+        return None
+    return found_at(out, str(files.read_json(out / ADDRESS)["store"]))

@@ -23,17 +23,16 @@ from unitcad.errors import UnitcadError
 from unitcad.estimate_inputs import closed_forms, drawn_input
 from unitcad.spec import Spec
 from unitcad.sweeps import task as tasks
-from unitcad.sweeps.batch_options import BatchOptions
-from unitcad.sweeps.batch_records import Failure, JournalEntry, Summary
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
-from unitcad.sweeps.journal import Journal
+from unitcad.sweeps.journal import Failure, Journal, JournalEntry, Summary
 from unitcad.sweeps.results import FIRST, write_results, write_timings
 from unitcad.sweeps.run import MOST_FAILURES, batch_head, counted
+from unitcad.sweeps.shards import BatchOptions
 from unitcad.sweeps.sweep import Sweep
 from unitcad.sweeps.task import OK
 from unitcad.validation import from_data, put
-from unitcad.validation.fit_text import lab_fit
+from unitcad.validation.defaults import lab_fit
 
 BLOCK = 1 << 15
 FREE = re.compile(r"layers\.(\d+)\.material|estimate\.frequency_hz|name|casting\..+")

@@ -15,13 +15,10 @@ from unitcad import files
 from unitcad.cache import DiskStore, MissingContent, SharedStore, absolute
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.pipeline.write import STORE, placing, whole
-from unitcad.sweeps.batch_options import BatchOptions
-from unitcad.sweeps.batch_records import JournalEntry, RecordPlace
-from unitcad.sweeps.destination import Destination, Folders, InStore, made
-from unitcad.sweeps.journal import JOURNAL
+from unitcad.sweeps.destination import Destination, Folders, InStore, Receiver, made, note_store, store_noted
+from unitcad.sweeps.journal import JOURNAL, JournalEntry, RecordPlace
 from unitcad.sweeps.record_packs import export, read_record
-from unitcad.sweeps.remote import Receiver
-from unitcad.sweeps.store_address import note_store, store_noted
+from unitcad.sweeps.shards import BatchOptions
 
 FOLDERS_BELOW = 1000
 """Variants below which each has a folder, unless asked otherwise."""

@@ -21,16 +21,13 @@ from unitcad.pipeline.plan import checked_outputs, code_version, kernel_versions
 from unitcad.pipeline.subjects import subject
 from unitcad.pipeline.write import clear_leftovers
 from unitcad.sweeps import task as tasks
-from unitcad.sweeps.batch_options import BatchOptions
-from unitcad.sweeps.batch_records import BatchHead, Failure, JournalEntry, Summary
-from unitcad.sweeps.destination import Destination, InStore
+from unitcad.sweeps.destination import Destination, InStore, noted
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
-from unitcad.sweeps.journal import JOURNAL, Journal
+from unitcad.sweeps.journal import JOURNAL, BatchHead, Failure, Journal, JournalEntry, Summary
 from unitcad.sweeps.result_folders import destination_of, folders_wanted, make_folders
 from unitcad.sweeps.results import columns_of, write_results, write_timings
-from unitcad.sweeps.shards import Shard, ShardRecord, write_shard
-from unitcad.sweeps.store_address import noted
+from unitcad.sweeps.shards import BatchOptions, Shard, ShardRecord, write_shard
 from unitcad.sweeps.sweep import MOST, Sweep
 from unitcad.sweeps.task import Job, Task, VariantOutcome
 from unitcad.workers import WorkerEnded

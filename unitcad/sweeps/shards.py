@@ -1,8 +1,4 @@
-"""Shards of a sweep: consecutive parts with a parent and a journal each, and one batch put together of them.
-
-<out>/store                   the store of all shards, unless another one is named
-<out>/shard-03-of-16/         a batch of its own, and shard.json, which names the whole
-"""
+"""Shards of a sweep: consecutive parts with a parent and a journal each; and the options of a batch's run."""
 
 from __future__ import annotations
 
@@ -14,12 +10,12 @@ from pathlib import Path
 import msgspec
 
 from unitcad import files
-from unitcad.cache import absolute
+from unitcad.cache import DEFAULT_LIMIT_MB, absolute
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.pipeline.write import STORE
-from unitcad.sweeps.batch_records import BatchHead
-from unitcad.sweeps.journal import SHARDS, batch_in
-from unitcad.sweeps.store_address import found_at
+from unitcad.spec.raw import OUTPUTS
+from unitcad.sweeps.destination import found_at
+from unitcad.sweeps.journal import SHARDS, BatchHead, batch_in
 from unitcad.sweeps.sweep import Sweep
 from unitcad.text import some
 
@@ -178,3 +174,32 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
         them = "it" if len(missing) == 1 else "them"
         raise UnitcadError(f"{len(missing)} of {of} shards {are} missing: {named}; run {them} with --shard, then merge")
     return [records[number] for number in sorted(records)]
+
+
+@dataclass(frozen=True)
+class BatchOptions:
+    """Options of a run.
+
+    `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end; `verify` compares the hashes
+    of finished variants, not only their sizes. `store` is the address (a folder, s3://bucket/path)
+    of a store that workers write to; with `folders` each variant also has its folder, with None if there are few.
+    `tables` are names of results.TABLES, None chooses by the number of variants. `shard` is a part of the sweep.
+    Raises WrongArgument for an address that is no store's.
+    """
+
+    only: Sequence[str] = OUTPUTS
+    check: bool = True
+    keep_going: bool = False
+    timeout: float | None = None
+    limit: int | None = None
+    cache: Path | None = None
+    cache_mb: float = DEFAULT_LIMIT_MB
+    verify: bool = False
+    store: str | None = None
+    folders: bool | None = None
+    tables: Sequence[str] | None = None
+    shard: Shard | None = None
+
+    def __post_init__(self) -> None:
+        if self.store is not None:
+            absolute(self.store)

@@ -1,7 +1,6 @@
 """Validation: from a TOML file, a template or plain data to a resolved spec, or one refusal that names the field."""
 
-from unitcad.validation.advice import warnings
-from unitcad.validation.dotted import put
+from unitcad.validation.defaults import warnings
 from unitcad.validation.load import (
     compound_kind,
     confirm_known,
@@ -15,7 +14,7 @@ from unitcad.validation.load import (
     read,
     templates,
 )
-from unitcad.validation.tables import Changes, Source
+from unitcad.validation.plain_data import Changes, Source, put
 
 __all__ = [
     "Changes",

@@ -7,23 +7,100 @@ import os
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from unitcad.arguments import confirm_form
 from unitcad.designs import default_design
-from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, confirm_form, unknown_name
 from unitcad.files import read_text
-from unitcad.rooms import FileKind, file_kinds
+from unitcad.rooms import FileKind, expect_none_but, file_kinds, of_other_kind
+from unitcad.rooms import load as load_reference
 from unitcad.spec import Spec, check_plain, convert, read_toml, to_data
-from unitcad.spec.custom_code import with_source
+from unitcad.spec.design_files import is_body_file, with_source
 from unitcad.spec.raw import RawSpec
-from unitcad.spec.toml_lines import line_of
+from unitcad.spec.toml import line_of
 from unitcad.validation.defaults import resolve
-from unitcad.validation.dotted import ABSENT, at, put
-from unitcad.validation.shipped_files import expect_kind, is_path, named_file, shipped_files, shipped_of, spelled
+from unitcad.validation.plain_data import ABSENT, Changes, Source, asked_of, at, changes_of, plain, put
 from unitcad.validation.suggestions import every_fault, suggested
-from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
+
+
+def shipped_files(kind: str = "") -> dict[str, Path]:
+    """Return the TOML files in the templates' folder, or in its folder `kind`, by name."""
+    package = Path(str(files("unitcad")))
+    folder = next((f for f in (package / "templates", package.parent / "templates") if f.is_dir()), package)
+    return {file.stem: file for file in sorted((folder / kind).glob("*.toml"))}
+
+
+def shipped_of(kind: FileKind) -> dict[str, Path]:
+    """Return the shipped files of a kind by name."""
+    return load_reference(kind.shipped)() if kind.shipped else shipped_files(kind.plural)
+
+
+def is_path(text: str) -> bool:
+    """Whether a text names a file by its path (a path separator in it, or .toml at its end), not by a bare name."""
+    return os.sep in text or "/" in text or text.endswith(".toml")
+
+
+def spelled(text: str, known: Iterable[str]) -> str:
+    """Return a text that names a file by its path, or one of `known`; for NAME of a file NAME.toml here, NAME.toml."""
+    own = f"{text}.toml"
+    return own if text not in known and not is_path(text) and os.path.isfile(own) else text
+
+
+def expect_kind(data: Mapping[str, object], source: str, kind: str) -> None:
+    """Raise WrongArgument for an empty file, and for one of another kind, with the command that takes it."""
+    if not data:
+        raise WrongArgument(kind, source, f"is empty; `unitcad schema {kind}` lists its keys")
+    expect_none_but(kind, data, source, kind, WrongArgument)
+
+
+def named_file(text: str, known: Mapping[str, Path], field: str, kind: type[Refusal] = Refusal) -> Path:
+    """Return the file that a text names, see `spelled`, there or not. Raises `kind`, of that field, for other text."""
+    text = spelled(text, known)
+    if text in known:
+        return known[text]
+    path = Path(text)
+    if os.path.isdir(text):
+        own = [file for file in (path / "spec.toml", path / "array.toml") if file.is_file()]
+        raise kind(field, text, "is a folder; name a TOML file in it", str(own[0]) if own else None)
+    if path.suffix != ".toml" and os.path.isfile(text) and (path.suffix or not is_path(text)):
+        if is_body_file(text):
+            raise kind(field, text, f'is a body: write design = "{text}" in a spec')
+        raise kind(field, text, "is not a TOML file, whose name ends in .toml")
+    if is_path(text) or path.suffix or not known:
+        return path
+    for other in file_kinds():
+        if other.command and other.plural and text in shipped_of(other):
+            raise of_other_kind(other, field, text, kind)
+    raise unknown_name(field, text, known, kind)
+
+
+T = TypeVar("T")
+
+
+def load_file(source: str | os.PathLike[str], kind: str, judge: Callable[[dict[str, Any], Path], T]) -> T:
+    """Return the result of `judge` for data and path of a TOML file of a kind: one by its path, or a shipped one.
+
+    Raises Refusal with the file's other faults, each with file and line; WrongArgument for a file of another kind.
+    """
+    shipped = next(shipped_of(one) if one.plural else {} for one in file_kinds() if one.name == kind)
+    path = named_file(os.fspath(source), shipped, kind, WrongArgument)
+    data = read_toml(path)
+    expect_kind(data, str(path), kind)
+    try:
+        return judge(data, path)
+    except Refusal as first:
+        sound = read_toml(next(iter(shipped.values()))) if shipped else {}
+        every = every_fault(first, data, lambda data: judge(data, path), sound)
+        text = read_text(path)
+        for i, one in enumerate(every):
+            if isinstance(one, UnknownKey):
+                limit = one.limit.replace("`unitcad schema`", f"`unitcad schema {kind}`")
+                every[i] = one = UnknownKey(one.field, one.value, limit, one.nearest)
+            one.file, one.line = os.fspath(path), line_of(text, one.field)
+        every[0].others = tuple(every[1:])
+        raise every[0] from None
 
 
 def templates() -> dict[str, Path]:
@@ -179,7 +256,7 @@ def from_tables(keys: Mapping[str, object]) -> Spec:
 def read(source: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the data of a spec file or template, not checked. Raises UnitcadError for a file that is no TOML.
 
-    The code of a design that the file names may run from now on: see `unitcad.spec.custom_code`.
+    The code of a design that the file names may run from now on: see `unitcad.spec.design_files`.
     """
     path = named_file(os.fspath(source), templates() | custom_templates(), "spec", WrongArgument)
     data = read_toml(path)

@@ -13,7 +13,7 @@ from typing import Any, TypeGuard
 
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, shown
 from unitcad.text import number
-from unitcad.validation.dotted import ABSENT, at, drop, put
+from unitcad.validation.plain_data import ABSENT, at, drop, put
 
 Judge = Callable[[dict[str, Any]], object]
 """Validates plain data and may return it settled, as a mapping; raises Refusal for the first fault."""

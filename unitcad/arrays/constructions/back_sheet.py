@@ -8,10 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from unitcad.arrays.array import Array, Box
-from unitcad.arrays.circuit.wiring import Wiring, wiring
-from unitcad.arrays.construction import Construction, Level
-from unitcad.arrays.grooves import stopped_ring
-from unitcad.arrays.limb import bent_stretches
+from unitcad.arrays.circuit import Wiring, wiring
+from unitcad.arrays.constructions import Construction, Level
 from unitcad.arrays.piece_seams import (
     Strip,
     box_feature,
@@ -24,25 +22,33 @@ from unitcad.arrays.piece_seams import (
     sized,
     too_much,
 )
-from unitcad.arrays.sheet import rounded, slot_profile
+from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile, stopped_ring
 from unitcad.arrays.tails import CLEAR
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, shipped
 from unitcad.designs.design import Fitting
 from unitcad.designs.limits import filament_groove
-from unitcad.designs.parts import ADHESIVE, BEYOND, bond
-from unitcad.designs.tooling import Cell, Layout
+from unitcad.designs.parts import ADHESIVE, BEYOND, Cell, Layout, bond
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point, nearer
 from unitcad.moulds import filament
 from unitcad.moulds.base import PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER, core, outline, plate_top, pry_floor, pry_slot
-from unitcad.moulds.cuts import BESIDE, Feature, seams
-from unitcad.moulds.dovetails import Interval, Seam, Split, split, strips, unseen
-from unitcad.moulds.labels import corner_labels, engraved, row_width, set_label
+from unitcad.moulds.cup import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
+from unitcad.moulds.cuts import BESIDE, Feature, Interval, Seam, Split, seams, split, strips, unseen
 from unitcad.moulds.layout import MARK, TEXT_MARGIN, groove_depth_of
-from unitcad.moulds.pieces import base_piece, blade, blade_piece, cup_piece, filament_pieces
-from unitcad.moulds.pins import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
+from unitcad.moulds.pieces import (
+    CAST,
+    Removal,
+    base_piece,
+    blade,
+    blade_piece,
+    corner_labels,
+    cup_piece,
+    engraved,
+    filament_pieces,
+    row_width,
+    set_label,
+)
 from unitcad.moulds.plan import Plan, Step
-from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import (
     Common,
     Extrude,
@@ -53,8 +59,8 @@ from unitcad.shape import (
     moved,
     union,
 )
-from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 from unitcad.text import number
 

@@ -8,24 +8,20 @@ from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.circuit.wiring import wiring
-from unitcad.arrays.construction import Construction, Level
-from unitcad.arrays.constructions import back_sheet
+from unitcad.arrays.circuit import wiring
+from unitcad.arrays.constructions import Construction, Level, back_sheet
 from unitcad.arrays.constructions.back_sheet import OFF_SQUARE, UP, core_top, fins, inner_tools
-from unitcad.arrays.limb import angle_deg, axis, barrel, bent, bent_stretches, inside_of_end, slice_of, strap_slot
+from unitcad.arrays.sheet import angle_deg, axis, barrel, bent, bent_stretches, inside_of_end, slice_of, strap_slot
 from unitcad.catalogue import printers
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour
 from unitcad.designs.design import Fitting
 from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
 from unitcad.moulds.base import core
-from unitcad.moulds.labels import engraved, set_label
-from unitcad.moulds.lid import THICKNESS, VENT
-from unitcad.moulds.pieces import base_piece, filament_pieces, lid_piece
-from unitcad.moulds.pins import PIN_RADIUS, Pins, pin_holes, standing_pins
+from unitcad.moulds.cup import PIN_RADIUS, Pins, pin_holes, standing_pins
+from unitcad.moulds.lid import MESH_ROOM, THICKNESS, TILT_DEG, VENT, deepest
+from unitcad.moulds.pieces import CAST, Removal, base_piece, engraved, filament_pieces, lid_piece, set_label
 from unitcad.moulds.plan import Plan, Step
-from unitcad.moulds.removal import CAST, Removal
-from unitcad.moulds.trapped_air import MESH_ROOM, TILT_DEG, deepest
 from unitcad.shape import (
     Common,
     Revolve,
@@ -39,8 +35,8 @@ from unitcad.shape import (
     turned,
     union,
 )
-from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec, printer_of
 
 MOST_DEG = 75.0

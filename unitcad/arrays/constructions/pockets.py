@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from unitcad.arrays.array import OFF_ROUND, Array, Box, Sheet
-from unitcad.arrays.construction import Construction, Level
-from unitcad.arrays.limb import bent_stretches
+from unitcad.arrays.constructions import Construction, Level
 from unitcad.arrays.piece_seams import (
     Strip,
     longer_than_bed,
@@ -17,22 +16,19 @@ from unitcad.arrays.piece_seams import (
     sized,
     too_much,
 )
-from unitcad.arrays.sheet import rounded, slot_profile
+from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, unit_bodies
-from unitcad.designs.tooling import Cell, Layout
+from unitcad.designs.parts import Cell, Layout
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise, segment_count, thick_pieces
 from unitcad.moulds.cavities import united
-from unitcad.moulds.cuts import seams
-from unitcad.moulds.dovetails import Seam, split
-from unitcad.moulds.labels import engraved, set_label
+from unitcad.moulds.cuts import Seam, seams, split
 from unitcad.moulds.layout import groove_depth_of
-from unitcad.moulds.pieces import bar, base_piece, blade_piece
+from unitcad.moulds.pieces import CAST, Removal, bar, base_piece, blade_piece, engraved, set_label
 from unitcad.moulds.plan import Plan, Step
-from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Extrude, Shape, cut, cylinder, moved, ring, union
-from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 from unitcad.text import number
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from unitcad.arrays.array_tables import Pitch
-from unitcad.arrays.layouts.kind import LayoutKind, Point, named, needs
+from unitcad.arrays.layouts import LayoutKind, Point, named, needs
 from unitcad.designs.limits import up
 from unitcad.errors import Refusal
 from unitcad.spec import convert

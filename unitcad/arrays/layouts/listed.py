@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from unitcad.arrays.layouts.kind import LayoutKind, Point, needs
+from unitcad.arrays.layouts import LayoutKind, Point, needs
 from unitcad.errors import Refusal
 from unitcad.spec.raw import Table
 

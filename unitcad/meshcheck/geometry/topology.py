@@ -14,6 +14,7 @@ from unitcad.geometry.arrays import (
     Bools,
     Floats,
     Ints,
+    components,
     cross,
     distinct,
     extent,
@@ -21,7 +22,6 @@ from unitcad.geometry.arrays import (
     order_of_packed,
 )
 from unitcad.geometry.boxes import Tick
-from unitcad.geometry.components import components
 from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_steps, same_place
 
 _FACES = 1 << 14  # faces that stay in the processor's cache

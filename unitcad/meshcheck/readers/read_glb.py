@@ -17,7 +17,7 @@ import numpy as np
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location, counted
 from unitcad.meshcheck.geometry.mesh import Mesh, Source
-from unitcad.meshcheck.readers.polygons import Polygons, mesh_of
+from unitcad.meshcheck.readers.rows import Polygons, mesh_of
 from unitcad.meshcheck.rules.f_file import F001, F002, F003, F004, F006, F008, F011, Deadline, Limits
 from unitcad.meshcheck.rules.p_package import P007, P009, P011, P012, P013, P016
 

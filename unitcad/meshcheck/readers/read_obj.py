@@ -14,8 +14,7 @@ from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location
 from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers import rows
-from unitcad.meshcheck.readers.polygons import Polygons, mesh_of
-from unitcad.meshcheck.readers.rows import BLANK, JOINED, NEWLINE, SLASH, SPACE
+from unitcad.meshcheck.readers.rows import BLANK, JOINED, NEWLINE, SLASH, SPACE, Polygons, mesh_of
 from unitcad.meshcheck.rules.f_file import F005, F011, Deadline, Limits
 from unitcad.meshcheck.rules.p_package import P011
 

@@ -9,8 +9,7 @@ import numpy as np
 from unitcad.meshcheck.findings import Finding, counted
 from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers import rows
-from unitcad.meshcheck.readers.polygons import Polygons, check_promise, mesh_of
-from unitcad.meshcheck.readers.rows import Rows
+from unitcad.meshcheck.readers.rows import Polygons, Rows, check_promise, mesh_of
 from unitcad.meshcheck.rules.f_file import F002, F003, F005, F006, Deadline, Limits
 
 _START = re.compile(rb"(?:\s|#[^\n]*\n)*([A-Z0-9]*)OFF(?![A-Z])", re.IGNORECASE)

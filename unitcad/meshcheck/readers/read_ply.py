@@ -18,8 +18,7 @@ from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck.findings import Finding, Location, counted
 from unitcad.meshcheck.geometry.mesh import Mesh, Source
 from unitcad.meshcheck.readers import rows
-from unitcad.meshcheck.readers.polygons import Polygons, check_promise, mesh_of
-from unitcad.meshcheck.readers.rows import Rows
+from unitcad.meshcheck.readers.rows import Polygons, Rows, check_promise, mesh_of
 from unitcad.meshcheck.rules.f_file import F001, F002, F003, F005, F006, Deadline, Limits, Unreadable
 
 _TYPES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, Ints
-from unitcad.geometry.components import components
+from unitcad.geometry.arrays import Floats, Ints, components
 from unitcad.meshcheck.findings import Finding, Location, number
 from unitcad.meshcheck.geometry.topology import Topology
 from unitcad.meshcheck.rules.inspection import Inspection, Printer, at_region

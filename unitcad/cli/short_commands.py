@@ -1,0 +1,244 @@
+"""The short commands: init, list, schema, coupon, report and cache."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+from msgspec import to_builtins
+
+from unitcad import catalogue, files
+from unitcad.cache import collect, default_root, usage
+from unitcad.casting.coupon import Coupon, write
+from unitcad.cli.output import AllowCode, AsJson, allow_code, finite, print_json, progress, warn
+from unitcad.designs import shipped as designs
+from unitcad.errors import Refusal, UnitcadError, unknown_name
+from unitcad.files import names_device, write_new
+from unitcad.meshcheck.rules.registry import rules
+from unitcad.report import write_report
+from unitcad.report.read_results import check_casts
+from unitcad.rooms import file_kinds, load
+from unitcad.validation import default_template
+from unitcad.validation.load import shipped_of
+from unitcad.validation.starter import commented
+
+
+def init(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the variant, and of its file NAME.toml.")],
+    template: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEMPLATE",
+            help=f"Shipped file to start from (unitcad list templates). Default: {default_template()}.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a commented file to start from. The last line printed is the file.
+
+    Its first line names the schema that an editor checks it with; `unitcad schema -o FILE` writes that.
+    """
+    kinds = [kind for kind in file_kinds() if kind.starts]
+    starts = {shipped: (kind, file) for kind in reversed(kinds) for shipped, file in shipped_of(kind).items()}
+    template = template or default_template()
+    if template not in starts:
+        raise unknown_name("--template", template, starts)
+    stem = name.removesuffix(".toml")
+    if not re.fullmatch(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9_-])?", stem):
+        near = re.sub(r"[^A-Za-z0-9._-]+", "-", stem)[:60].strip("-._") or "my-unit"
+        raise Refusal("NAME", name, "must be letters, digits, dots and dashes", near)
+    if Path(stem).suffix in (".txt", ".json", ".yaml", ".yml"):
+        raise Refusal("NAME", name, "is the name of a TOML file", f"{Path(stem).stem}.toml")
+    if names_device(stem):
+        raise Refusal("NAME", name, "is the name of a device on Windows", f"my-{stem}")
+    path = Path(f"{stem}.toml")
+    kind, start = starts[template]
+    schema = f"unitcad-{kind.name}.schema.json"
+    try:
+        write_new(path, commented(start, stem, load(kind.model), schema).encode())
+    except FileExistsError:
+        raise UnitcadError(f"{path}: is there already; choose another name") from None
+    except OSError as error:
+        raise UnitcadError(f"{path}: {(error.strerror or 'unwritable').lower()}") from None
+    if as_json:
+        print_json({kind.name: str(path)})
+        return
+    typer.echo(f"then: {kind.command} {path}")
+    if not Path(schema).exists():
+        typer.echo(f"an editor checks it as you type after: unitcad schema {kind.name} -o {schema}")
+    typer.echo(str(path))
+
+
+def _kinds() -> dict[str, Callable[[], dict[str, Any]]]:
+    """Return the kinds in the order of the list, each with the function that returns its entries by name."""
+    return {
+        **{kind.plural: lambda kind=kind: _first_comments(shipped_of(kind)) for kind in file_kinds() if kind.plural},
+        "designs": lambda: {name: design.about for name, design in designs().items()},
+        "materials": lambda: _values(catalogue.materials()),
+        "motors": lambda: _values(catalogue.motors()),
+        "printers": lambda: _values(catalogue.printers()),
+        "rules": lambda: {code: rule.title for code, rule in rules().items()},
+    }
+
+
+def list_(
+    kind: Annotated[
+        str, typer.Argument(help=f"Kind to list: {', '.join(_kinds())}. Default: the kinds.", metavar="[KIND]")
+    ] = "",
+    as_json: AsJson = False,
+) -> None:
+    """List the shipped entries, each value with its source and status."""
+    kinds = _kinds()
+    if not kind:
+        print_json({"kinds": list(kinds)}) if as_json else typer.echo("\n".join(kinds))
+        return
+    if kind not in kinds:
+        raise unknown_name("KIND", kind, kinds)
+    entries = kinds[kind]()
+    if as_json:
+        print_json({kind: entries})
+        return
+    for name, entry in entries.items():
+        if isinstance(entry, str):
+            typer.echo(f"{name}\t{entry}" if entry else name)
+            continue
+        typer.echo(name)
+        for key, value in entry.items():
+            how = f"; {value['method']}" if "method" in value else ""
+            bounds = f" ({value['low']:g} to {value['high']:g})" if "low" in value else ""
+            typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}{how}")
+
+
+def _values(entries: dict[str, Any]) -> dict[str, Any]:
+    return {
+        name: {key: value for key, value in to_builtins(entry).items() if isinstance(value, dict)}
+        for name, entry in entries.items()
+    }
+
+
+def _first_comments(shipped: dict[str, Path]) -> dict[str, str]:
+    lines = {name: path.read_text("utf-8").partition("\n")[0] for name, path in shipped.items()}
+    return {name: line.lstrip("# ") if line.startswith("#") else "" for name, line in lines.items()}
+
+
+def schema(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="[KIND]", help=f"Kind of file: {', '.join(one.name for one in file_kinds() if one.model)}."
+        ),
+    ] = "spec",
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="File for an editor. Default: print the schema.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; the schema always is one.")] = False,
+) -> None:
+    """Print the JSON Schema of a spec, or of another kind of file.
+
+    An editor checks a TOML file against it whose first line is `#:schema FILE`, as `unitcad init` writes it.
+    """
+    kinds = {known.name: known for known in file_kinds() if known.model}
+    if kind not in kinds:
+        raise unknown_name("KIND", kind, kinds)
+    chosen = kinds[kind]
+    found = load(chosen.schema)() if chosen.schema else msgspec.json.schema(load(chosen.model))
+    document = {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
+    document["title"] = f"unitcad {kind.replace('-', ' ')}"
+    if out is None:
+        print_json(document)
+        return
+    files.write(out, (json.dumps(document, indent=2) + "\n").encode())
+    print_json({"schema": str(out)}) if as_json else typer.echo(str(out))
+
+
+def coupon(
+    printer: Annotated[
+        str, typer.Argument(metavar="PRINTER", help="A printer of the catalogue (unitcad list printers).")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Parent of the coupon's folder.")] = Path(
+        "out"
+    ),
+    as_json: AsJson = False,
+) -> None:
+    """Write a fit coupon to print first, and how to read it. The last line printed is the folder."""
+
+    chosen = catalogue.choose("PRINTER", printer, catalogue.printers())
+    folder = write(chosen, out)
+    if as_json:
+        fits = {
+            fit.key: {"feature": fit.feature, "choose": fit.choose, "values_mm": list(fit.values_mm)}
+            for fit in Coupon(chosen).fits.values()
+        }
+        print_json({"folder": str(folder), "printer": printer, "fits": fits})
+    else:
+        typer.echo(Coupon(chosen).markdown())
+        typer.echo(str(folder))
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a variant, or of several.")],
+    code: AllowCode = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write one offline page for a folder of results. The last line printed is the page."""
+
+    allow_code(code)
+    with progress(str(folder)) as say:
+        check_casts(folder)
+        say("page")
+        page = write_report(folder, warn)
+    if as_json:
+        print_json({"page": str(page), "bytes": page.stat().st_size})
+    else:
+        typer.echo(str(page))
+
+
+cache = typer.Typer(
+    help="Show or shrink the cache of distinct parts.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+)
+Where = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Folder of the cache. Default: the user's.")]
+
+
+@cache.command("ls")
+def ls(where: Where = None, as_json: AsJson = False) -> None:
+    """Print the content of the cache. The last line printed is its folder."""
+
+    root = where or default_root()
+    used = usage(root)
+    _print_usage(f"{used.entries} entries, {used.contents} files, {used.bytes / 1e6:.1f} MB", root, vars(used), as_json)
+
+
+@cache.command("gc")
+def gc(
+    where: Where = None,
+    limit: Annotated[
+        float,
+        typer.Option(
+            metavar="MB", min=0, max=1e12, callback=finite, help="Maximum size afterwards; 0 empties the cache."
+        ),
+    ] = 4096,
+    as_json: AsJson = False,
+) -> None:
+    """Remove the parts that were used longest ago, down to a size. Results keep their files: they are links."""
+
+    root = where or default_root()
+    gone = collect(root, int(limit * 1e6))
+    text = f"{gone.entries} entries, {gone.contents} files, {gone.bytes / 1e6:.1f} MB removed"
+    _print_usage(text, root, vars(gone), as_json)
+
+
+def _print_usage(text: str, root: Path, data: dict, as_json: bool) -> None:
+
+    if as_json:
+        print_json({"cache": str(root), **data})
+    else:
+        typer.echo(text)
+        typer.echo(str(root))
