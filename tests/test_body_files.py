@@ -21,7 +21,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.write import build
 from unitcad.shape import Extrude, Shape, cut, cylinder, polygon
 from unitcad.shape.tree import Body
-from unitcad.spec.design_files import bodies_in
+from unitcad.spec.body_file import bodies_in
 from unitcad.validation import load
 
 LAYER = '[[layers]]\nmaterial = "ecoflex-00-30"\nwall_mm = 2.0\ncap_mm = 1.25\n'

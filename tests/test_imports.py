@@ -37,10 +37,10 @@ FLOORS = [
     {"shape"},
     {"meshcheck"},
     {"catalogue"},
-    {"files", "arguments"},
+    {"files"},
     {"workers", "rooms"},
     {"errors"},
-    {"text", "json_text", "notebook", "geometry"},
+    {"text", "geometry"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 LIVE = {Path(importlib.util.find_spec(kind.page).origin or "") for kind in file_kinds() if kind.page}
@@ -80,12 +80,10 @@ def test_attenuation_and_check_know_nothing_of_cad() -> None:
     for room, below, file in _edges():
         if room == "attenuation":
             known = (
-                "arguments",
                 "catalogue",
                 "workers",
                 "files",
                 "geometry",
-                "notebook",
                 "text",
                 "errors",
             )
@@ -146,7 +144,7 @@ def test_the_rooms_of_check_import_one_way() -> None:
         {"manifest", "baseline"},
         {"file_checks"},
         {"builds"},
-        {"readers", "one_mesh", "output"},
+        {"readers", "output"},
         {"rules"},
         {"findings"},
         {"geometry"},

@@ -9,43 +9,43 @@ import pytest
 
 import unitcad
 from unitcad.errors import UnitcadError
-from unitcad.kernels import occt
+from unitcad.kernels import ocp
 from unitcad.validation import load
 
 
 def test_nothing_installed():
     error = ModuleNotFoundError("No module named 'OCP'", name="OCP")
-    text = occt.advice("OCP", error, {})
+    text = ocp.advice("OCP", error, {})
     assert text.startswith("OCP is not installed; build without STEP (--formats stl,3mf), or install it: ")
     assert "-m pip install" in text
     assert shlex.split(text)[-1].endswith("[step]")
     error = ModuleNotFoundError("No module named 'cadquery'", name="cadquery")
-    assert occt.advice("cadquery", error, {"cadquery-ocp-novtk": "7.9.3.1.1"}).rstrip("'").endswith("[cadquery]")
+    assert ocp.advice("cadquery", error, {"cadquery-ocp-novtk": "7.9.3.1.1"}).rstrip("'").endswith("[cadquery]")
 
 
 def test_half_removed():
     """One of the two wheels is uninstalled: the other's record is there, the files are not."""
     error = ModuleNotFoundError("No module named 'OCP.gp'", name="OCP.gp")
-    text = occt.advice("OCP", error, {"cadquery-ocp-novtk": "7.9.3.1.1"})
+    text = ocp.advice("OCP", error, {"cadquery-ocp-novtk": "7.9.3.1.1"})
     assert "found cadquery-ocp-novtk 7.9.3.1.1" in text
     assert text.endswith("pip install --force-reinstall --no-deps cadquery-ocp-novtk==7.9.3.1.1")
 
 
 def test_cadquery_with_the_wheel_that_lacks_vtk():
     error = ModuleNotFoundError("No module named 'OCP.IVtkOCC'", name="OCP.IVtkOCC")
-    text = occt.advice("cadquery", error, {"cadquery-ocp-novtk": "7.9.3.1.1", "cadquery-ocp": "7.9.3.1.1"})
+    text = ocp.advice("cadquery", error, {"cadquery-ocp-novtk": "7.9.3.1.1", "cadquery-ocp": "7.9.3.1.1"})
     assert text.endswith("--no-deps cadquery-ocp==7.9.3.1.1")
 
 
 def test_wrong_version():
-    text = occt.advice("build123d", ImportError("cannot import name 'X' from 'OCP'"), {"cadquery-ocp-novtk": "8.0.0"})
+    text = ocp.advice("build123d", ImportError("cannot import name 'X' from 'OCP'"), {"cadquery-ocp-novtk": "8.0.0"})
     assert "found cadquery-ocp-novtk 8.0.0" in text
     assert "cadquery-ocp-novtk==7.9.3.1.1" in text
 
 
 def test_a_library_of_the_system_is_missing():
     error = ImportError("libGL.so.1: cannot open shared object file: No such file or directory")
-    assert "apt-get install libgl1" in occt.advice("OCP", error, {"cadquery-ocp": "7.9.3.1.1"})
+    assert "apt-get install libgl1" in ocp.advice("OCP", error, {"cadquery-ocp": "7.9.3.1.1"})
 
 
 @pytest.mark.parametrize("kernel", ["kernels.occt", "kernels.build123d", "kernels.cadquery", "export.step"])
@@ -62,9 +62,9 @@ def test_a_broken_folder_ocp_becomes_one_error(tmp_path, kernel, fault):
 
 
 def test_loading_passes_other_errors_on():
-    with pytest.raises(ZeroDivisionError), occt.loading("OCP"):
+    with pytest.raises(ZeroDivisionError), ocp.loading("OCP"):
         raise ZeroDivisionError
-    with pytest.raises(UnitcadError), occt.loading("OCP"):
+    with pytest.raises(UnitcadError), ocp.loading("OCP"):
         raise ImportError
 
 

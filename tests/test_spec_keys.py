@@ -17,7 +17,7 @@ from unitcad.cache import MemoryStore, digest
 from unitcad.catalogue.entries import kinds_of
 from unitcad.errors import Refusal
 from unitcad.pipeline.make import Progress, Subject
-from unitcad.spec.design_files import ANY, allow, allow_nothing
+from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.spec.fields import alternatives, entry_in, fields_of, notes, table_in
 from unitcad.spec.raw import OUTPUTS, RawSpec
 from unitcad.validation import from_data, put, read

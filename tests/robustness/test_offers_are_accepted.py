@@ -13,7 +13,7 @@ import pytest
 from unitcad.errors import Refusal, UnknownKey
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import to_data
-from unitcad.spec.design_files import ANY, allow, allow_nothing
+from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.validation import custom_templates, load, put, read, templates
 from unitcad.validation.suggestions import is_number, with_changes
 

@@ -13,7 +13,7 @@ pytest.importorskip("uvicorn", reason="the extra serve is not installed")
 import uvicorn
 
 from unitcad.errors import UnitcadError
-from unitcad.serve.request_guard import hosts, means
+from unitcad.serve.addresses import hosts, means
 from unitcad.serve.server import Connection, serve
 from unitcad.validation import templates
 

@@ -18,7 +18,8 @@ pytest.importorskip("uvicorn", reason="the extra serve is not installed")
 import uvicorn
 
 from unitcad.files import TEMPORARY, scratch
-from unitcad.serve.request_guard import AccessKeys, Limits, RequestGuard
+from unitcad.serve.access_keys import AccessKeys
+from unitcad.serve.request_guard import Limits, RequestGuard
 from unitcad.serve.server import Connection
 
 TOKEN = "a-token-of-the-lab"

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from running import serving
 
-from unitcad.serve.request_guard import AccessKeys
+from unitcad.serve.access_keys import AccessKeys
 from unitcad.validation import templates
 
 TOKEN = "a-token-of-the-lab"

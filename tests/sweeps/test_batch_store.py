@@ -17,7 +17,7 @@ from object_store import BUCKET, Faulty, s3_server
 from unitcad.cache import MissingContent, SharedStore, digest, shared_store
 from unitcad.cache.shared_store import TRIES
 from unitcad.errors import UnitcadError
-from unitcad.spec import design_files
+from unitcad.spec import custom_code
 from unitcad.sweeps import BatchOptions, batch, load_sweep, record_packs, run
 from unitcad.sweeps.batch_call import make
 from unitcad.sweeps.executors import SerialExecutor, Workers
@@ -111,7 +111,7 @@ def test_a_store_gives_the_bytes_of_a_run_without_one(address, tmp_path):
 
 
 def test_at_most_two_kilobytes_a_variant_pass_the_scheduler(tmp_path, monkeypatch):
-    monkeypatch.setattr(design_files, "_allowed", set())  # a task names the codes of earlier tests
+    monkeypatch.setattr(custom_code, "_allowed", set())  # a task names the codes of earlier tests
     silicones = ["ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30"]
     data = {
         "base": "encapsulating",

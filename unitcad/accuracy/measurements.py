@@ -1,4 +1,4 @@
-"""Measurements for one spec: meshes and response at five tolerances, and what a build skips, in interleaved times."""
+"""Measurements for one spec: meshes and response at five tolerances, and the outputs that a build skips, with times."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ from unitcad.files import read_text
 from unitcad.moulds.plan import Plan
 from unitcad.shape import mm
 from unitcad.spec import Spec, convert, read_toml, to_data
-from unitcad.spec.design_files import with_source
+from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import fields_of
 from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import line_of, text_of

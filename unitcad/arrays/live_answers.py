@@ -29,7 +29,7 @@ from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
 from unitcad.serve.messages import Answer, Field, Group, Trusted
 from unitcad.serve.unit_answers import has_code as unit_holds_code
 from unitcad.serve.unit_answers import unit_procedure
-from unitcad.spec.design_files import files_named
+from unitcad.spec.custom_code import files_named
 from unitcad.spec.toml import from_json, line_of, to_json
 from unitcad.validation import templates
 from unitcad.validation.plain_data import at

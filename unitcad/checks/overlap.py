@@ -20,7 +20,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.surroundings import MARGIN, column_round
 from unitcad.shape import Shape, union
-from unitcad.spec.design_files import is_body_file, is_custom
+from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.text import number
 
 POCKET = 0.05

@@ -16,7 +16,8 @@ from typing import Annotated
 import typer
 
 from unitcad.casting.steps import casting_summary
-from unitcad.cli.output import (
+from unitcad.cli.output import print_json, progress, say_error, warn
+from unitcad.cli.shared_options import (
     AllowCode,
     AsJson,
     Fit,
@@ -29,10 +30,6 @@ from unitcad.cli.output import (
     names_in,
     outputs,
     overrides,
-    print_json,
-    progress,
-    say_error,
-    warn,
     with_fit,
 )
 from unitcad.designs import widths
@@ -46,7 +43,7 @@ from unitcad.pipeline.write import BENCH, PAGE, Built, check_slicing, held, slic
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
 from unitcad.spec import Spec, assumed_lengths, read_toml, said_of
-from unitcad.spec.design_files import files_named
+from unitcad.spec.custom_code import files_named
 from unitcad.text import listed, number
 from unitcad.validation import confirm_known, every_template
 from unitcad.validation.suggestions import numbers

@@ -153,7 +153,6 @@ def _read(path: Path) -> Configuration | None:
                     raise unknown_key(".".join([*above, key]), data[key], [last])
         if last not in data:
             return None
-        from unitcad.cli.check_settings import Settings
         from unitcad.spec.convert import convert
 
         settings = convert(_mapping(table, data[last]), Settings, table)

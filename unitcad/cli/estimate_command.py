@@ -13,7 +13,8 @@ from rich.text import Text
 
 from unitcad.attenuation.edge.models import MODELS
 from unitcad.catalogue import FREQUENCIES_HZ
-from unitcad.cli.output import AsJson, Fit, Sets, console, print_json, progress, warn, with_fit
+from unitcad.cli.output import console, print_json, progress, warn
+from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
 from unitcad.designs import design_of
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import FEM, estimate_spec, frequency_table_of_spec, neighbours_of_specs

@@ -15,7 +15,8 @@ from msgspec import to_builtins
 from unitcad import catalogue, files
 from unitcad.cache import collect, default_root, usage
 from unitcad.casting.coupon import Coupon, write
-from unitcad.cli.output import AllowCode, AsJson, allow_code, finite, print_json, progress, warn
+from unitcad.cli.output import print_json, progress, warn
+from unitcad.cli.shared_options import AllowCode, AsJson, allow_code, finite
 from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import names_device, write_new

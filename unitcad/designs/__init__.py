@@ -18,7 +18,7 @@ from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.shape import cylinder
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec
-from unitcad.spec.design_files import is_custom
+from unitcad.spec.custom_code import is_custom
 from unitcad.spec.raw import RawSpec
 
 __all__ = [

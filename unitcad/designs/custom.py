@@ -16,7 +16,8 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device
 from unitcad.shape import ProfileError, Shape, cut
 from unitcad.spec import Spec
-from unitcad.spec.design_files import bodies_in, is_allowed, is_body_file, name_in_file
+from unitcad.spec.body_file import bodies_in
+from unitcad.spec.custom_code import is_allowed, is_body_file, name_in_file
 from unitcad.text import some
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")

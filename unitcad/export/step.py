@@ -19,7 +19,7 @@ from pathlib import Path
 from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.kernels import occt
-from unitcad.kernels.occt import loading
+from unitcad.kernels.ocp import loading
 from unitcad.shape.tree import Body, part_names
 
 with loading("OCP"):

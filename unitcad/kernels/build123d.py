@@ -9,7 +9,7 @@ from importlib.util import find_spec
 
 from unitcad.errors import UnitcadError, pip_install
 from unitcad.kernels import brep, occt
-from unitcad.kernels.occt import loading
+from unitcad.kernels.ocp import loading
 from unitcad.shape import Shape
 from unitcad.shape.tree import Body, Turn
 

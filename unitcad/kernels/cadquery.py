@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from unitcad.kernels import brep, occt
-from unitcad.kernels.occt import loading
+from unitcad.kernels.ocp import loading
 from unitcad.shape import Shape
 from unitcad.shape.tree import Body, Turn
 

@@ -17,7 +17,8 @@ from unitcad import catalogue, files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.layered import FractionalKelvinVoigt
 from unitcad.catalogue import Material, MaterialEntry, materials
-from unitcad.cli.output import AsJson, console, finite, print_json, progress, warn
+from unitcad.cli.output import console, print_json, progress, warn
+from unitcad.cli.shared_options import AsJson, finite
 from unitcad.errors import Refusal, unknown_name
 from unitcad.export.chart import Series, chart
 from unitcad.lab.material import (

@@ -18,7 +18,8 @@ import typer
 
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.cli.output import AsJson, print_json, progress, warn
+from unitcad.cli.output import print_json, progress, warn
+from unitcad.cli.shared_options import AsJson
 from unitcad.errors import UnitcadError
 from unitcad.export.chart import Series, chart
 from unitcad.files import sha256

@@ -19,7 +19,8 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import Item, to_csv
 from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room, bubble_rise_s
 from unitcad.catalogue import printers
-from unitcad.cli.output import AsJson, console, print_json, progress, warn
+from unitcad.cli.output import console, print_json, progress, warn
+from unitcad.cli.shared_options import AsJson
 from unitcad.export import printing, svg
 from unitcad.export.chart import Series, chart
 from unitcad.export.printing import print_ready

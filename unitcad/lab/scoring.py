@@ -19,7 +19,8 @@ from unitcad.attenuation.edge.models import COMPARED
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import figures, measurements
-from unitcad.cli.output import AsJson, console, print_json, progress
+from unitcad.cli.output import console, print_json, progress
+from unitcad.cli.shared_options import AsJson
 from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import estimate_input

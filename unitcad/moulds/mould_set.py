@@ -25,7 +25,7 @@ from unitcad.shape import Shape
 from unitcad.shape.profile import FACETS
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec, assumed_lengths, from_json, to_json, with_formats
-from unitcad.spec.design_files import is_body_file
+from unitcad.spec.custom_code import is_body_file
 from unitcad.spec.raw import CastingTable
 from unitcad.spec.resolved import Estimate
 from unitcad.text import listed, number

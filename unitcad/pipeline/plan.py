@@ -36,7 +36,7 @@ from unitcad.shape import Shape, content_hash, moved
 from unitcad.shape.column import extent
 from unitcad.shape.tree import Body, copies, part_names
 from unitcad.spec import Spec
-from unitcad.spec.design_files import is_body_file, is_custom
+from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.spec.raw import OUTPUTS, Output
 
 GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")

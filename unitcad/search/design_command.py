@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.output import AsJson, console, print_json, progress
+from unitcad.cli.output import console, print_json, progress
+from unitcad.cli.shared_options import AsJson
 from unitcad.files import seen_from
 from unitcad.search import design_files
 from unitcad.search.proposals import explain as explained

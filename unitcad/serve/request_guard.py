@@ -1,107 +1,22 @@
-"""The guard of requests: addresses, keys, Host, Origin and token, and limits in size, time and number."""
+"""The guard of requests: checks Host, Origin and token, and limits requests in size, time and number.
+
+A page of another site can reach the loopback address through the person's browser. Its requests carry its own Origin,
+or under DNS rebinding its own Host, and never the token. A result's page is apart from the server too, and its links to
+files next to it are another site's: they carry their folder's key in their path.
+"""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import hashlib
 import hmac
-import ipaddress
-import socket
 from dataclasses import dataclass
-from pathlib import PurePosixPath
 from urllib.parse import parse_qs
 
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from unitcad.errors import WrongArgument
-
-
-class AccessKeys:
-    """The cookie and the folders' keys of a server with a token."""
-
-    def __init__(self, token: str) -> None:
-        self._token = token.encode()
-        self.cookie = self._made("cookie")
-        """Reads only the page itself, which has no token."""
-
-    def address(self, file: str) -> str:
-        """Return the path of a file below /files/, with the key of its folder: it reads that folder and those in it."""
-        return f"{self._made(f'folder {PurePosixPath(file).parent}')}/{file}"
-
-    def file(self, address: str) -> str | None:
-        """Return the file that a path below /files/ means; None without the key of one of the folders that it is in."""
-        key, _, file = address.partition("/")
-        folders = PurePosixPath(file).parents
-        good = [hmac.compare_digest(key.encode(), self._made(f"folder {folder}").encode()) for folder in folders]
-        return file if any(good) else None
-
-    def _made(self, what: str) -> str:
-        return hmac.new(self._token, what.encode("utf-8", "replace"), hashlib.sha256).hexdigest()
-
-
-LOOPBACK = "127.0.0.1"
-TOKEN = "UNITCAD_TOKEN"
-"""Environment variable with the token; other users of a machine can read a command's arguments."""
-_OWN = ("localhost", "127.0.0.1", "[::1]")
-ANY_ADDRESS = "*"
-"""Stands for every Host that is an address itself, not a name: no other site's name can be made to mean one."""
-_ELSEWHERE = ("192.0.2.1", 9)
-"""An address for documentation. Nothing is sent to it: a way there tells this machine's own address."""
-
-
-def check_address(host: str, token: str | None) -> None:
-    """Raise WrongArgument for an address beyond the loopback without a token, and for a token easily guessed."""
-    try:
-        loopback = ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        loopback = host == "localhost"
-    if not loopback and not token:
-        limit = f"is not this machine's loopback address; another one needs a token of yours, in the variable {TOKEN}"
-        raise WrongArgument("host", host, limit, LOOPBACK)
-    if token is not None and (len(token) < 16 or not token.isascii() or not token.isprintable() or " " in token):
-        raise WrongArgument(TOKEN, "(not shown)", "needs at least 16 printable ASCII characters without spaces")
-
-
-def hosts(host: str, port: int) -> frozenset[str]:
-    """Return the values of Host under which a browser may ask for the server at an address."""
-    if _is_any(host):
-        names = {*_OWN, socket.gethostname().lower(), ANY_ADDRESS}
-    else:
-        own = f"[{host}]" if ":" in host else host
-        names = {own, *_OWN} if host in ("localhost", LOOPBACK, "::1") else {own}
-    return frozenset(f"{name}:{port}" for name in names)
-
-
-def means(host: str, allowed: frozenset[str]) -> bool:
-    """Tell whether a Host, in lower case, is among the allowed ones of `hosts`."""
-    if host in allowed:
-        return True
-    name, _, port = host.rpartition(":")
-    if f"{ANY_ADDRESS}:{port}" not in allowed:
-        return False
-    bare = name[1:-1] if name.startswith("[") and name.endswith("]") else name
-    with contextlib.suppress(ValueError):
-        return (ipaddress.ip_address(bare).version == 6) == (bare != name)
-    return False
-
-
-def shown(host: str) -> str:
-    """Return the host of the address to open: of one that means all, this machine's own."""
-    if not _is_any(host):
-        return f"[{host}]" if ":" in host else host
-    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
-        one.connect(_ELSEWHERE)
-        return str(one.getsockname()[0])
-    return LOOPBACK
-
-
-def _is_any(host: str) -> bool:
-    with contextlib.suppress(ValueError):
-        return ipaddress.ip_address(host).is_unspecified
-    return False
-
+from unitcad.serve.access_keys import AccessKeys
+from unitcad.serve.addresses import means
 
 TOKEN_HEADER = b"x-unitcad-token"
 FILES = "/files/"

@@ -10,9 +10,9 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.output import AllowCode
+from unitcad.cli.shared_options import AllowCode
 from unitcad.errors import missing_extra
-from unitcad.serve.request_guard import TOKEN
+from unitcad.serve.addresses import TOKEN
 from unitcad.validation import default_template
 
 

@@ -21,13 +21,13 @@ from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
 from unitcad.rooms import FileKind, expect_none_but, file_kinds
+from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown
 from unitcad.serve.answers import answers_about
 from unitcad.serve.application import Live, Setting, application
 from unitcad.serve.jobs import RESULTS
 from unitcad.serve.messages import Source, Trusted
-from unitcad.serve.request_guard import LOOPBACK, check_address, hosts, shown
 from unitcad.spec import parse_toml, read_toml
-from unitcad.spec.design_files import files_named, is_body_file, is_custom
+from unitcad.spec.custom_code import files_named, is_body_file, is_custom
 from unitcad.text import some
 from unitcad.validation import compound_kind, custom_templates, default_template, every_template
 from unitcad.validation.load import is_path, named_file

@@ -22,7 +22,7 @@ from unitcad.report.viewer_models import cells
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Trusted
 from unitcad.spec import Spec, convert, to_data, to_toml
-from unitcad.spec.design_files import files_named, is_allowed, is_body_file, is_custom, with_source
+from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, is_custom, with_source
 from unitcad.spec.raw import RawSpec
 from unitcad.validation import from_data, warnings
 from unitcad.validation.defaults import resolve

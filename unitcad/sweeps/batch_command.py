@@ -16,7 +16,8 @@ from msgspec import to_builtins
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from unitcad.cache import DiskStore, MissingContent, SharedStore, default_root
-from unitcad.cli.output import (
+from unitcad.cli.output import console, print_json, print_json_line, progress, stage_lines, warn
+from unitcad.cli.shared_options import (
     AllowCode,
     AsJson,
     Formats,
@@ -24,17 +25,11 @@ from unitcad.cli.output import (
     Only,
     Sets,
     allow_code,
-    console,
     expect_commas,
     finite,
     names_in,
     outputs,
     overrides,
-    print_json,
-    print_json_line,
-    progress,
-    stage_lines,
-    warn,
 )
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.meshcheck.findings import counted

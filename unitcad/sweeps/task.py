@@ -22,7 +22,7 @@ from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes, row
 from unitcad.pipeline.plan import code_version
 from unitcad.pipeline.subjects import subject_of_text
 from unitcad.pipeline.write import TRIES
-from unitcad.spec import design_files
+from unitcad.spec import custom_code
 from unitcad.sweeps import record_packs
 from unitcad.sweeps.journal import RecordPlace, Values
 from unitcad.workers import limit
@@ -64,7 +64,7 @@ class Task:
     store: str | None = None
     specs: bytes | str = b""
     code: str = field(default_factory=code_version)
-    allowed: frozenset[str] = field(default_factory=design_files.allowed)
+    allowed: frozenset[str] = field(default_factory=custom_code.allowed)
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def work(task: Task) -> Answer:
     """Make a task's variants; return the argument of `outcomes`. An error of one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
-    design_files.allow(task.allowed)
+    custom_code.allow(task.allowed)
     if task.store:
         return zlib.compress(pickle.dumps(_into_store(task, record_packs.store_at(task.store))))
     if task.out is None:

@@ -25,7 +25,7 @@ from unitcad.catalogue.entries import Drive
 from unitcad.designs import Design, design_of
 from unitcad.designs.limits import EPS, check_ribs, farthest_push, leaf_mm, least_skirt, least_slot
 from unitcad.spec import Spec, motor_of
-from unitcad.spec.design_files import is_body_file, is_custom
+from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.spec.raw import DEFAULT_MOTOR, Format, RawSpec
 from unitcad.spec.resolved import CastLayer, Circuit, Estimate, MotorSize, Moulds, Output
 from unitcad.text import number

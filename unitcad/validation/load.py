@@ -17,7 +17,7 @@ from unitcad.files import read_text
 from unitcad.rooms import FileKind, expect_none_but, file_kinds, of_other_kind
 from unitcad.rooms import load as load_reference
 from unitcad.spec import Spec, check_plain, convert, read_toml, to_data
-from unitcad.spec.design_files import is_body_file, with_source
+from unitcad.spec.custom_code import is_body_file, with_source
 from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import line_of
 from unitcad.validation.defaults import resolve
@@ -256,7 +256,7 @@ def from_tables(keys: Mapping[str, object]) -> Spec:
 def read(source: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the data of a spec file or template, not checked. Raises UnitcadError for a file that is no TOML.
 
-    The code of a design that the file names may run from now on: see `unitcad.spec.design_files`.
+    The code of a design that the file names may run from now on: see `unitcad.spec.custom_code`.
     """
     path = named_file(os.fspath(source), templates() | custom_templates(), "spec", WrongArgument)
     data = read_toml(path)
