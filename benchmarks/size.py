@@ -16,8 +16,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (535_000, 286, 66_200),
-    "core": (264_200, 153, 33_600),
+    "total": (535_100, 289, 66_300),
+    "core": (264_300, 156, 33_700),
     "tests": (397_500, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""

@@ -37,10 +37,10 @@ FLOORS = [
     {"shape"},
     {"meshcheck"},
     {"catalogue"},
-    {"files"},
+    {"files", "arguments"},
     {"workers", "rooms"},
     {"errors"},
-    {"text", "geometry"},
+    {"text", "json_text", "geometry"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 LIVE = {Path(importlib.util.find_spec(kind.page).origin or "") for kind in file_kinds() if kind.page}
@@ -80,6 +80,7 @@ def test_attenuation_and_check_know_nothing_of_cad() -> None:
     for room, below, file in _edges():
         if room == "attenuation":
             known = (
+                "arguments",
                 "catalogue",
                 "workers",
                 "files",

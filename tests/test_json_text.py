@@ -10,8 +10,8 @@ import pytest
 
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.procedure_text import to_json
+from unitcad.json_text import json_bytes
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.text import json_bytes
 from unitcad.validation.load import load
 
 DATA: dict[str, Any] = {"none": None, "list": [1, {"deep": [None, 0.5]}], "map": {"a": {"b": 1e-300, "c": None}}}

@@ -6,16 +6,13 @@ import copyreg
 import importlib.util
 import json
 import math
-import os
 import re
 import shlex
 import sys
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 from importlib import metadata
-from numbers import Integral, Real
 from pathlib import Path
-from typing import cast
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
@@ -246,39 +243,3 @@ _MOST_KEYS = 5
 """Keys of a table that are named for one that it does not have."""
 _LONGEST = 200
 """Characters of a value that are shown."""
-
-
-def texts(name: str, given: object) -> list[str]:
-    """Return a list's texts; a single text is a list of one. Raises WrongArgument for anything else."""
-    if isinstance(given, str):
-        return [given]
-    entries = list(cast("Iterable[object]", given)) if isinstance(given, Iterable) else [given]
-    for entry in entries:
-        if not isinstance(entry, str):
-            raise WrongArgument(name, entry, f"takes a text or a list of texts, not {type(entry).__name__}")
-    return cast("list[str]", entries)
-
-
-def path(name: str, given: object) -> str:
-    """Return the text of a path, a text or os.PathLike. Raises WrongArgument for anything else."""
-    if not isinstance(given, str | os.PathLike):
-        raise WrongArgument(name, given, f"takes a path, not {type(given).__name__}")
-    return os.fspath(cast("str | os.PathLike[str]", given))
-
-
-def check_number(name: str, given: object, least: float, most: float, whole: bool = False) -> None:
-    """Check a number, which may be None. Raises WrongArgument for anything else, or a number out of range."""
-    if given is None:
-        return
-    number = given if isinstance(given, Integral if whole else Real) else None
-    if number is None or isinstance(given, bool) or not least <= cast("float", number) <= most:
-        noun = "a whole number" if whole else "a number"
-        raise WrongArgument(name, given, f"must be {noun} from {least:g} to {most:g}", least)
-
-
-def confirm_form(text: str) -> str:
-    """Return a change as it is. Raises WrongArgument for one that has another form than path=value."""
-    path, equals, _ = text.partition("=")
-    if not equals or not path.strip():
-        raise WrongArgument("set", text, "needs the form path=value in one word, such as layers.0.wall_mm=1.0")
-    return text

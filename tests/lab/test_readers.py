@@ -421,7 +421,7 @@ def test_a_library_that_takes_all_memory_is_ended(tmp_path, monkeypatch):
     from unitcad.workers import Pool
 
     write_tdms(tmp_path / "a.tdms")
-    with Pool(memory=400 << 20) as pool:
+    with Pool(memory=1 << 30) as pool:  # the worker imports this file, with SciPy
         monkeypatch.setattr(readers, "_worker", lambda: pool)
         monkeypatch.setattr(readers, "_read_in", _fill)
         assert "takes more than 3 GiB to read" in refused(tmp_path / "a.tdms")

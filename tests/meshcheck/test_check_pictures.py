@@ -125,7 +125,7 @@ def test_the_3mf_has_the_faces_in_the_colour_of_the_worst_severity(tmp_path: Pat
         worst |= dict.fromkeys((face for place in found["locations"] for face in place["faces"]), found["severity"])
     written = (tmp_path / "p" / "a.stl" / "findings.3mf").read_bytes()
     (colours,) = painted(written)
-    names = {finding_pictures.threemf.colour_hex(rgb): name for name, rgb in finding_pictures.COLOURS.items()}
+    names = {finding_pictures.printing.colour_hex(rgb): name for name, rgb in finding_pictures.COLOURS.items()}
     shown = {i: names[colour] for i, colour in enumerate(colours) if colour in names}
     assert {face: shown.get(face) for face in worst} == worst
     assert len(colours) == 23

@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 from shapes import CUBE_CORNERS, CUBE_FACES, box, stl
 
-from unitcad.geometry.arrays import components
+from unitcad.geometry.components import components
 from unitcad.meshcheck import check_mesh
 from unitcad.meshcheck.geometry import topology
 from unitcad.meshcheck.geometry.mesh import weld_exact

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from unitcad.checks.air import _ways_out
-from unitcad.geometry.arrays import components
+from unitcad.geometry.components import components
 
 
 def flooded(edges: np.ndarray, height: np.ndarray, opening: np.ndarray) -> list[float]:

@@ -12,7 +12,7 @@ from unitcad.validation import templates
 
 WRONG = {
     "batch x -j abc": "--jobs = 'abc': takes a whole number, such as 1",
-    "batch a b": "SWEEP = 'b': a batch takes one sweep; build this one by another command",
+    "batch a b": "SWEEP = 'b': a batch takes one sweep; run a second batch for this one",
     "material a.csv --width-mm nan": "--width-mm: nan is not a finite number; see unitcad material --help",
 }
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Protocol
 
 from unitcad import text
-from unitcad.errors import path, texts
+from unitcad.arguments import path, texts
 from unitcad.pipeline.subjects import load_subject
 from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.write import PAGE, Built, held

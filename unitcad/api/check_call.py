@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from unitcad import text
+from unitcad.arguments import check_number, path, texts
 from unitcad.catalogue import Printer, choose, printers
-from unitcad.errors import UnitcadError, WrongArgument, check_number, path, texts
+from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.meshcheck.file_checks import check_files, expand
 from unitcad.meshcheck.findings import FileReport, Finding
 from unitcad.meshcheck.rules.f_file import Limits

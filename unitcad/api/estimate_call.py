@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from unitcad import text
+from unitcad.arguments import texts
 from unitcad.attenuation.edge.estimates import summary
-from unitcad.errors import texts
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.spec.raw import Model
 from unitcad.validation import Changes, Source, load

@@ -17,10 +17,11 @@ from unitcad.casting.procedure import Procedure
 from unitcad.casting.steps import BenchStep, Phase, duration, shortened
 from unitcad.casting.troubles import TROUBLES, troubles_markdown
 from unitcad.export import svg
+from unitcad.json_text import all_finite
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.tree import Body
-from unitcad.text import all_finite, listed, markdown, number, spaced
+from unitcad.text import listed, markdown, number, spaced
 
 
 def _nine_digits(text: str) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from unitcad.checks.finding import MouldCheck, MouldFinding, at_most, each_cavity
-from unitcad.geometry.arrays import components
+from unitcad.geometry.components import components
 from unitcad.kernels.mesh import arrays
 from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.lid import TILT_DEG, deepest

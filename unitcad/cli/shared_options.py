@@ -10,7 +10,8 @@ from typing import Annotated
 
 import typer
 
-from unitcad.errors import Refusal, confirm_form, unknown_name
+from unitcad.arguments import confirm_form
+from unitcad.errors import Refusal, unknown_name
 from unitcad.spec import custom_code
 from unitcad.spec.raw import FORMATS, OUTPUTS
 

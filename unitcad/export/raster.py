@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 from PIL import Image, ImageChops, ImageDraw, ImageFont
 
-from unitcad.geometry.arrays import components
+from unitcad.geometry.components import components
 from unitcad.text import printable
 
 Colour = tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""Arrays of numbers and points: their types, faster versions of some numpy functions, and components of a graph."""
+"""Arrays of numbers and points: their types, faster versions of some numpy functions."""
 
 from __future__ import annotations
 
@@ -115,21 +115,3 @@ def unique_rows(rows: Floats) -> tuple[Floats, Ints]:
     place = np.empty(len(rows), np.int64)
     place[order] = np.cumsum(first) - 1
     return ordered[first], place
-
-
-def components(n: int, left: Ints, right: Ints) -> Ints:
-    """Return the component of each of `n` nodes joined by pairs, numbered in the order of their first node."""
-    root = np.arange(n, dtype=np.int32)
-    while True:
-        a, b = root.take(left), root.take(right)
-        apart = np.flatnonzero(a != b)
-        if not len(apart):
-            break
-        left, right, a, b = left.take(apart), right.take(apart), a.take(apart), b.take(apart)
-        np.minimum.at(root, np.maximum(a, b), np.minimum(a, b))
-        while True:
-            above = root.take(root)
-            if np.array_equal(above, root):
-                break
-            root = above
-    return by_appearance(root, n)[1]  # each component's root is its first node

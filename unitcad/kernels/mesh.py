@@ -12,7 +12,7 @@ import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold
 
 from unitcad.errors import UnitcadError
-from unitcad.geometry.arrays import components
+from unitcad.geometry.components import components
 from unitcad.geometry.segments import between_outlines
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import FACETS, GRID_PER_MM, Profile, points

@@ -25,6 +25,7 @@ from unitcad.checks import Strain, check_geometry, check_unit, strain_findings, 
 from unitcad.checks.finding import FindingRecord
 from unitcad.errors import Unfinished
 from unitcad.estimate_inputs import estimate_input, estimate_spec
+from unitcad.json_text import json_bytes
 from unitcad.kernels.mesh import bounds
 from unitcad.meshcheck import Options, check_bytes
 from unitcad.moulds.mould_set import MouldSet
@@ -57,7 +58,6 @@ from unitcad.pipeline.scenes import drawing
 from unitcad.shape.tree import Body
 from unitcad.spec import Spec, printer_of, spec_hash, to_json, to_toml, with_formats
 from unitcad.spec.raw import Format
-from unitcad.text import json_bytes
 from unitcad.validation import from_data
 
 MESH_FORMATS = ("stl", "3mf")

@@ -19,13 +19,14 @@ from unitcad import cache, files
 from unitcad.cache import MemoryStore, MissingContent, Store, digest
 from unitcad.errors import Missing, Refusal, UnitcadError
 from unitcad.export import slicer
+from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product, Progress, Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
 from unitcad.pipeline.plan import checked_outputs, code_version
 from unitcad.pipeline.subjects import subject
 from unitcad.spec import Spec, printer_of, read_toml
 from unitcad.spec.raw import FORMATS, OUTPUTS, Format
-from unitcad.text import json_bytes, some
+from unitcad.text import some
 
 LOCK = re.compile(r"\.[a-z0-9.-]+-[0-9a-f]{12}\.lock")
 PAGE = "report.html"

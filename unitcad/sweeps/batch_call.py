@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from unitcad import text
+from unitcad.arguments import check_number, path, texts
 from unitcad.cache import MemoryStore
-from unitcad.errors import UnitcadError, WrongArgument, check_number, path, texts, unknown_name
+from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.pipeline.make import Progress, Subject
 from unitcad.pipeline.plan import body_key, checked_outputs, groups
 from unitcad.pipeline.subjects import subject

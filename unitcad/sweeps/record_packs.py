@@ -18,13 +18,13 @@ import msgspec
 from unitcad import files
 from unitcad.cache import Bundle, DiskStore, MissingContent, SharedStore, digest
 from unitcad.errors import UnitcadError
+from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.plan import code_version
 from unitcad.pipeline.subjects import subject_of_data
 from unitcad.pipeline.write import replacing, sync
 from unitcad.sweeps.journal import RecordPlace
-from unitcad.text import json_bytes
 from unitcad.validation import default_template, read
 
 _INSIDE = re.compile(r"[^/\\:\0][^\\:\0]*")

@@ -11,8 +11,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
+from unitcad.arguments import confirm_form
 from unitcad.designs import default_design
-from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, confirm_form, unknown_name
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
 from unitcad.rooms import FileKind, expect_none_but, file_kinds, of_other_kind
 from unitcad.rooms import load as load_reference

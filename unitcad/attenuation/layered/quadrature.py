@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -159,11 +159,15 @@ def pieced(panels: Array, corners: Array) -> Array:
 NODES = 16
 """Of a panel: Gauss's rule."""
 _AT, _WEIGHTS = np.polynomial.legendre.leggauss(NODES)
-_TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_AT, NODES - 1))
-"""From values at the nodes to coefficients of degrees 0 to 15."""
 _DEGREES = np.arange(2 * NODES, NODES, -1)
 """Of the waves: for each coefficient of the kernel the least degree that meets an error of the rule."""
 _ODD_FACTORIALS = np.array([float(factorial2(2 * m - 1)) for m in _DEGREES])
+
+
+@cache  # not at import: the inverse makes OpenBLAS take its buffers
+def _to_legendre() -> Array:
+    """Return the matrix from values at the nodes to coefficients of degrees 0 to 15."""
+    return np.linalg.inv(np.polynomial.legendre.legvander(_AT, NODES - 1))
 
 
 def nodes(panels: Array) -> tuple[Array, Array]:
@@ -207,7 +211,7 @@ class Poles(NamedTuple):
 
 def poles(kernel: Array, close: np.ndarray) -> Poles:
     """Return the pole that each panel's kernel (with dk/ds), (rows, panels, nodes), would have; close: `closeness`."""
-    last = _TO_LEGENDRE[-_LAST:].T
+    last = _to_legendre()[-_LAST:].T
     plain, turned = kernel @ last, (kernel * _AT) @ last
     size = np.sum(np.abs(plain) ** 2, axis=(0, 2))
     safe = np.where(size > 0, size, 1.0)
@@ -339,7 +343,7 @@ def evaluate(seen: Seen, panels: Array, kernel: Array, phase: float) -> Evaluate
     """
     close = closeness(panels)
     peak = np.abs(kernel).max(axis=-1)
-    series = np.abs(kernel @ _TO_LEGENDRE.T)
+    series = np.abs(kernel @ _to_legendre().T)
     rest = 2.0 * np.maximum(2.0 * series[..., -2:].sum(axis=-1), _rounding(peak, close))
     slope = wavenumbers(panels, panels[:, :2])[1]
     turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(seen)
@@ -403,8 +407,8 @@ def _spread(number: int) -> tuple[np.ndarray, np.ndarray]:
     """
     middles = (2.0 * np.arange(number) + 1.0) / number - 1.0
     degrees = np.polynomial.legendre.legvander((middles[:, None] + _AT / number).ravel(), NODES - 1)
-    bounds = np.abs(_TO_LEGENDRE @ degrees.reshape(number, NODES, NODES))
-    return (degrees @ _TO_LEGENDRE).T, bounds.reshape(-1, NODES).T
+    bounds = np.abs(_to_legendre() @ degrees.reshape(number, NODES, NODES))
+    return (degrees @ _to_legendre()).T, bounds.reshape(-1, NODES).T
 
 
 def _waves(seen: Seen, panels: Array) -> tuple[Array, np.ndarray, np.ndarray]:

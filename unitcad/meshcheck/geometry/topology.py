@@ -10,18 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from unitcad.geometry.arrays import (
-    Bools,
-    Floats,
-    Ints,
-    components,
-    cross,
-    distinct,
-    extent,
-    extents,
-    order_of_packed,
-)
+from unitcad.geometry.arrays import Bools, Floats, Ints, cross, distinct, extent, extents, order_of_packed
 from unitcad.geometry.boxes import Tick
+from unitcad.geometry.components import components
 from unitcad.meshcheck.geometry.mesh import Mesh, area_vectors, float32_steps, same_place
 
 _FACES = 1 << 14  # faces that stay in the processor's cache

@@ -12,8 +12,9 @@ from collections.abc import Iterator
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
-from unitcad.geometry.arrays import Floats, Ints, components
+from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.boxes import Tick
+from unitcad.geometry.components import components
 from unitcad.meshcheck.findings import Finding, Location, counted, number
 from unitcad.meshcheck.geometry.mesh import solid_of
 from unitcad.meshcheck.geometry.rays import Rays

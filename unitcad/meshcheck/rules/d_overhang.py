@@ -10,7 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, Ints, components
+from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.components import components
 from unitcad.meshcheck.findings import Finding, Location, number
 from unitcad.meshcheck.geometry.topology import Topology
 from unitcad.meshcheck.rules.inspection import Inspection, Printer, at_region

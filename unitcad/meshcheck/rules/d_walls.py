@@ -10,7 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from unitcad.geometry.arrays import Floats, components
+from unitcad.geometry.arrays import Floats
+from unitcad.geometry.components import components
 from unitcad.meshcheck.findings import Finding, Location, counted, number, point
 from unitcad.meshcheck.geometry.rays import SLACK, Rays, cast, lying
 from unitcad.meshcheck.geometry.topology import Topology
