@@ -133,7 +133,7 @@ def test_a_test_that_imports_a_room_lies_in_the_room_s_folder() -> None:
 
 def test_no_files_import_each_other_in_a_circle() -> None:
     graph = _file_imports(PACKAGE)
-    assert len(graph) > 250
+    assert len(graph) > 150
     assert graph.keys() >= set().union(*graph.values()) != set()
     del graph["__init__.py"]  # it loads its names on first use, and holds the version
     assert _circles(graph) == {}
