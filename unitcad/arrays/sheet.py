@@ -1,4 +1,9 @@
-"""The sheet of an array: its outline, its lengths on the bed; the frame of its limb, and the strain when it bends."""
+"""The sheet of an array: its outline, its lengths on the bed; the frame of its limb, and the strain when it bends.
+
+The overflow grooves round the bores of a back sheet's cups: rings that stop before a wall gets too thin.
+
+A groove ends square to its way. So its rest has its full width, and no slit stays between two stops.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,13 @@
-"""The limits that concentric designs share: stretch, rib leaves, and all that no kernel would notice."""
+"""The limits that concentric designs share: stretch, rib leaves, and all that no kernel would notice.
+
+Each refusal names the field, its value, the limit and the nearest accepted value: that value, put in, meets this limit.
+
+The leaves that carry the ribs of a cup printed in resin: how long they must be to bend and not to break.
+
+Crushing would chip a rib of resin. So each is on a leaf of the skirt, cut free on three sides, which gives way: a
+cantilever of thickness t, pushed aside by d at the arm a below its root. The strain at the root is 1.5 t d / a^2, the
+most in it, if nothing but the leaf bends. No leaf has been printed yet.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Parts and tooling that designs share: motor, circuit or wires, the slot of the tail, blank tools and their cells."""
+"""Parts and tooling that designs share: motor, circuit or wires, the slot of the tail, blank tools and their cells.
+
+z
+|   .--------- pad, radius pad.radius ---------.========== tail ===  pad.low to pad.high
+|      .------- motor, radius motor_radius ----.
+0------'---------------------------------------'------------------- skin
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""A body for a printer's file: as printed on the bed, in the single precision that STL and slicers have, and as STL."""
+"""A body for a printer's file: as printed on the bed, in the single precision that STL and slicers have, and as STL.
+
+3MF core: one model part with mm, names and colours, the parts side by side on the bed.
+
+Written after the 3MF Core Specification 1.3 (https://github.com/3MFConsortium/spec_core).
+"""
 
 from __future__ import annotations
 

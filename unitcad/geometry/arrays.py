@@ -1,4 +1,7 @@
-"""Arrays of numbers and points: their types, faster versions of some numpy functions."""
+"""Arrays of numbers and points: their types, faster versions of some numpy functions.
+
+numpy's own generic types make every sum and mask a union that a type checker cannot follow.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Checks of one mesh, and of the builds of a 3MF file and the bodies of a STEP file."""
+"""Checks of one mesh, and of the builds of a 3MF file and the bodies of a STEP file.
+
+Solids may share volume though each is sound by itself (G002). 3MF's core specification (4.1, 4.1.1) permits overlapping
+components and objects, and defines what is filled, so this is a warning.
+"""
 
 from __future__ import annotations
 

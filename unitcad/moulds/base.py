@@ -1,4 +1,17 @@
-"""The base with its plinth and cores, and the tongues that form the slot."""
+"""The base with its plinth and cores, and the tongues that form the slot.
+
+        section of pour 1            cup          rim, z = heights[0]
+            .-----------.  groove .--_-----------.
+            |           '--'      | |            |
+            |     cup   | cavity .'-'. tongue ====== grip
+        .---'  .--------+--------'core|-----------'---.
+        | skirt|  plinth            filament          |   seat, z = 0
+        '------'  ........................ .----------'   skirt ends above the plate
+        |  plate                     |   |            |
+        '----------------------------'   '- groove ---'
+
+Tools are drawn from the spec's lengths. None is made by subtracting the unit: C100 compares the two.
+"""
 
 from __future__ import annotations
 

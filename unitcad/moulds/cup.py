@@ -1,4 +1,40 @@
-"""The cups: one piece a layer, lifted off upwards, and the ribs or pins that centre it."""
+r"""The cups: one piece a layer, lifted off upwards, and the ribs or pins that centre it.
+
+Pins on a base and blind holes in its cups: they centre cups that are too large for a skirt.
+
+          .----------------- cup -----.
+          |    .--------.   blind hole, wider by the clearance and deeper by its relief
+    ------'    | /----\ |    '--------  seat, z = 0
+               |_| pin|_|
+    ----------- base ------------------
+
+A pin's end is chamfered, and the hole's mouth: a first printed layer that is squeezed out narrows it.
+
+Ribs centre a cup on its plinth. Each face of its recess has two, level with those opposite.
+
+      plan, from above                  section of a rib
+    .--v-----------v--.                      seat
+    |  .---------.    |              |  .-----------     z = 0
+    |> | plinth   \  <|              | |
+    |  |           |  |              |  \    <- roof
+    |> |           | <|              |   |
+    |  '-----------'  |              |   |   <- crest: reaches into the plinth by the interference
+    '--^-----------^--'              |  /    <- lead-in, down to the skirt's end
+
+The plinth is tapered, so a rib meets it only when the cup is nearly down, along its whole crest at once. Opposite ribs
+are crushed alike, which leaves the cup in the middle; pairs hold it against turning too. They are as far from the axes
+as the cut corner permits: for leverage, and clear of tails, which leave along x.
+
+Ribs of resin would chip. Each is low on a leaf of the skirt, which a slot from below frees behind and on both sides;
+the leaf bends, and nothing is crushed:
+
+      plan of a face, from above
+    ----.  .---.  .----
+    wall|  |   |  |wall      slot, open downwards
+        |  '---'  |
+        |  leaf   |          its thickness and the slot's width: the printer's least wall
+    ----'----v----'----      recess
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,23 @@
-"""Cuts of tools larger than the printer's bed, and the dovetails whose pieces slide together along z."""
+r"""Cuts of tools larger than the printer's bed, and the dovetails whose pieces slide together along z.
+
+Tools larger than the printer's bed: cut at dovetails, whose pieces slide together along z.
+
+       piece 1        piece 2
+    ------------.  .-------------      the line of a seam, seen from above: round corners, teeth of piece 1 in piece 2
+               /  /  .------.
+    ----------'  /  /            y
+      tooth     |  |             |
+    ----------.  \  \            '-- x
+               \  \  '------'
+    ------------'  '-------------
+
+Either side of the line is moved square to itself by half the play, so that the gap is the play everywhere, along the
+flanks too. A seam goes from edge to edge. Seams across x and across y cross on straight stretches: the corners of the
+four pieces are whole, and no tooth is cut.
+
+In a wide gap a seam is straight and its teeth reach to one side. In a narrow one its line is in the middle, with small
+teeth to either side if the features leave room: between four units of a grid, or three of a hexagon.
+"""
 
 from __future__ import annotations
 

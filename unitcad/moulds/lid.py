@@ -1,4 +1,20 @@
-"""Lids for injection, air that they would trap, and the tray of the film that closes a unit's skin side."""
+"""Lids for injection, air that they would trap, and the tray of the film that closes a unit's skin side.
+
+    .---------. .----. .----------.   vents at the rim, halfway between the axes
+    |         | |sprue| |          |
+    '-.  .----'-'-----'-'-----.  .-'   z = rim
+      |  |       cavity       |  |   skirt round the cup, above the windows
+
+Over a ring, whose width no syringe's tip fits, the sprue narrows to a gate and replaces the first vent.
+
+The tray of the film that closes a unit's skin side: filled, struck off, and the unit set onto the wet film.
+
+        .---.  .------------------.  .---.   rim, with the blade's groove round each recess
+        |   '--'   film, skin_mm  '--'   |
+        '--------------------------------'   floor
+
+It has the outline of the cups, and its rim the height of the last one: the blade and the labels fit both.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,11 @@
-"""Places of a mould set in like surroundings: a result at one of them is valid at all."""
+"""Places of a mould set in like surroundings: a result at one of them is valid at all.
+
+Congruent places of a mould: a result at one of them is valid at all.
+
+A place is an upright column. Two places are alike if the drawn shapes reach into them in the same way
+(`shape/column.py`), and if the meshes have the same corners there: a kernel that loses a wedge at one of a hundred
+cells makes that cell one of its own.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Shards of a sweep: consecutive parts with a parent and a journal each; and the options of a batch's run."""
+"""Shards of a sweep: consecutive parts with a parent and a journal each; and the options of a batch's run.
+
+<out>/store                   the store of all shards, unless another one is named
+<out>/shard-03-of-16/         a batch of its own, and shard.json, which names the whole
+"""
 
 from __future__ import annotations
 
