@@ -16,7 +16,7 @@ from shapes import box, stl
 from test_check_command import run
 from typer.main import get_command
 
-from unitcad.cli import app, check_settings
+from unitcad.cli import app, check_command
 from unitcad.meshcheck.output import json_report
 
 needs_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action's script is bash")
@@ -204,7 +204,7 @@ def test_the_settings_on_the_page_are_settings(tmp_path: Path, monkeypatch: pyte
     assert [name for name, _ in shown] == ["unitcad.toml", "pyproject.toml"]
     for name, text in shown:
         (tmp_path / name).write_text(text)
-        found = check_settings.find(name)
+        found = check_command.find(name)
         assert found.settings.select is not None
         assert found.ignored("scans/a.stl")
         if name == "unitcad.toml":  # it shows every key there is

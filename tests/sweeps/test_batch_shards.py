@@ -13,8 +13,7 @@ from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.report import write_report
 from unitcad.report.read_results import read_parquet
 from unitcad.sweeps import BatchOptions, load_sweep, record_packs, result_folders, results
-from unitcad.sweeps.batch_call import make
-from unitcad.sweeps.batch_command import merge
+from unitcad.sweeps.batch_call import make, merge
 from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.journal import BatchHead, JournalEntry
 from unitcad.sweeps.result_folders import export_variants

@@ -546,7 +546,7 @@ def heat_map_svg(data: Mapping[str, Any], drive: str | None = None, target: str 
             for j, value in enumerate(row):
                 if value is not None:
                     at = left + (j + 0.5) * cell, top + (i + 0.5) * cell + 0.35 * size
-                    parts.append(_text(*at, _percents(value), size, "middle", _ink(_share(value, high))))
+                    parts.append(_text(*at, _map_percent(value), size, "middle", _ink(_share(value, high))))
     above = top - 26 if n <= _MOST_NAMES else top - 8
     parts.append(_text(left + n * cell / 2, above, "unit that is reached", 11, "middle"))
     middle = top + n * cell / 2
@@ -593,7 +593,7 @@ def patch_map_svg(
     )
     for i, place in enumerate(array.places):
         fill = _colour(_share(values[i], high)) if values else "#ffffff"
-        title = place.name if values is None else f"{place.name}: {_percents(values[i])} %"
+        title = place.name if values is None else f"{place.name}: {_map_percent(values[i])} %"
         parts.append(
             f'<circle cx="{coord(place.x)}" cy="{coord(-place.y)}" r="{coord(place.radius)}" fill="{fill}" '
             f'stroke="#33566e"><title>{escape(title)}</title></circle>'
@@ -608,7 +608,7 @@ def patch_map_svg(
         fill = _ink(_share(values[i], high)) if values else _INK
         parts.append(_text(x, y - (0.1 if values else -0.35) * size, place.name, size, "middle", fill))
         if values:
-            parts.append(_text(x, y + 1.0 * size, _percents(values[i]), size, "middle", fill))
+            parts.append(_text(x, y + 1.0 * size, _map_percent(values[i]), size, "middle", fill))
     if values:
         parts += _scale(wide - _SCALE_PX + 20, top, min(240.0, tall - top - edge), high)
     return "\n".join([*parts, "</svg>", ""])
@@ -635,7 +635,7 @@ def _largest(values: Iterable[float]) -> float:
 
 def _share(value: float, high: float) -> float:
     """Return a value's place from 0 to `high`, as both are written."""
-    return float(_percents(value)) / float(_percents(high))
+    return float(_map_percent(value)) / float(_map_percent(high))
 
 
 def _colour(share: float) -> str:
@@ -658,7 +658,7 @@ def _scale(x: float, y: float, length: float, high: float) -> list[str]:
         for i in range(STEPS)
     ]
     marks = [
-        _text(x + 18, y + length - share * length + 4, f"{_percents(share * high)} %", 11, "start")
+        _text(x + 18, y + length - share * length + 4, f"{_map_percent(share * high)} %", 11, "start")
         for share in (0.0, 0.5, 1.0)
     ]
     return [*bars, *marks]
@@ -680,7 +680,7 @@ def _text(x: float, y: float, content: str, size: float, anchor: str, fill: str 
 
 
 @lru_cache(maxsize=4096)
-def _percents(value: float) -> str:
+def _map_percent(value: float) -> str:
     """Return a fraction in per cent: two digits, three from 100 on."""
     shown = 100.0 * value
     return f"{shown:.0f}" if shown >= 9.95 else number(shown, 2)

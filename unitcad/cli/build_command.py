@@ -1,4 +1,4 @@
-"""unitcad build."""
+"""The commands build and report."""
 
 from __future__ import annotations
 
@@ -42,6 +42,7 @@ from unitcad.pipeline.subjects import Compound, load_subject
 from unitcad.pipeline.write import BENCH, PAGE, Built, check_slicing, held, slice_tools
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
+from unitcad.report.read_results import check_casts
 from unitcad.spec import Spec, assumed_lengths, read_toml, said_of
 from unitcad.spec.custom_code import files_named
 from unitcad.text import listed, number
@@ -284,3 +285,21 @@ def _print_faults(manifest: Manifest) -> None:
             typer.echo(f"{check['code']} {check['where']}: {measured}{advice}", err=True)
     for finding in manifest["check"]["findings"]:
         typer.echo(f"{finding['path']}: {finding['code']} {finding['message']}", err=True)
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a variant, or of several.")],
+    code: AllowCode = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write one offline page for a folder of results. The last line printed is the page."""
+
+    allow_code(code)
+    with progress(str(folder)) as say:
+        check_casts(folder)
+        say("page")
+        page = write_report(folder, warn)
+    if as_json:
+        print_json({"page": str(page), "bytes": page.stat().st_size})
+    else:
+        typer.echo(str(page))

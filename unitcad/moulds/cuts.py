@@ -117,13 +117,13 @@ class Seam:
         shift = -of * self.play / 2  # to the left of the way along the line
         line = (self.line[0], *self.corners, self.line[-1])
         ways = [_unit(a, b) for a, b in pairwise(line)]
-        border = [(*_next_to(line[0], ways[0], shift), 0.0)]
+        border = [(*_left_of(line[0], ways[0], shift), 0.0)]
         for corner, before, after in zip(line[1:-1], ways[:-1], ways[1:], strict=True):
             turn = math.atan2(before[0] * after[1] - before[1] * after[0], before[0] * after[0] + before[1] * after[1])
             tangent = ROUND * abs(math.tan(turn / 2))
             start, end = _along(corner, before, -tangent), _along(corner, after, tangent)
-            border += [(*_next_to(start, before, shift), math.tan(turn / 4)), (*_next_to(end, after, shift), 0.0)]
-        return (*border, (*_next_to(line[-1], ways[-1], shift), 0.0))
+            border += [(*_left_of(start, before, shift), math.tan(turn / 4)), (*_left_of(end, after, shift), 0.0)]
+        return (*border, (*_left_of(line[-1], ways[-1], shift), 0.0))
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ def strips(seam: Seam, by: float) -> Iterator[tuple[Point, ...]]:
     for start, end in pairwise((seam.line[0], *seam.corners, seam.line[-1])):
         way = _unit(start, end)
         ends = _along(start, way, -by), _along(end, way, by)
-        yield tuple(_next_to(ends[i], way, side * by) for i, side in ((0, -1), (1, -1), (1, 1), (0, 1)))
+        yield tuple(_left_of(ends[i], way, side * by) for i, side in ((0, -1), (1, -1), (1, 1), (0, 1)))
     for tooth in seam.teeth:
         yield tooth.corners[:: tooth.side]
 
@@ -235,7 +235,7 @@ def _along(point: Point, way: Point, by: float) -> Point:
     return point[0] + way[0] * by, point[1] + way[1] * by
 
 
-def _next_to(point: Point, way: Point, by: float) -> Point:
+def _left_of(point: Point, way: Point, by: float) -> Point:
     """Return the point moved to the left of a way by `by`."""
     return point[0] - way[1] * by, point[1] + way[0] * by
 

@@ -1,28 +1,23 @@
-"""The short commands: init, list, schema, coupon, report and cache."""
+"""The commands before a build: init and list, and coupon, which shows the clearances that a printer needs."""
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
-import msgspec
 import typer
 from msgspec import to_builtins
 
-from unitcad import catalogue, files
-from unitcad.cache import collect, default_root, usage
+from unitcad import catalogue
 from unitcad.casting.coupon import Coupon, write
-from unitcad.cli.output import print_json, progress, warn
-from unitcad.cli.shared_options import AllowCode, AsJson, allow_code, finite
+from unitcad.cli.output import print_json
+from unitcad.cli.shared_options import AsJson
 from unitcad.designs import shipped as designs
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.files import names_device, write_new
 from unitcad.meshcheck.rules.registry import rules
-from unitcad.report import write_report
-from unitcad.report.read_results import check_casts
 from unitcad.rooms import file_kinds, load
 from unitcad.validation import default_template
 from unitcad.validation.load import shipped_of
@@ -127,36 +122,6 @@ def _first_comments(shipped: dict[str, Path]) -> dict[str, str]:
     return {name: line.lstrip("# ") if line.startswith("#") else "" for name, line in lines.items()}
 
 
-def schema(
-    kind: Annotated[
-        str,
-        typer.Argument(
-            metavar="[KIND]", help=f"Kind of file: {', '.join(one.name for one in file_kinds() if one.model)}."
-        ),
-    ] = "spec",
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help="File for an editor. Default: print the schema.")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; the schema always is one.")] = False,
-) -> None:
-    """Print the JSON Schema of a spec, or of another kind of file.
-
-    An editor checks a TOML file against it whose first line is `#:schema FILE`, as `unitcad init` writes it.
-    """
-    kinds = {known.name: known for known in file_kinds() if known.model}
-    if kind not in kinds:
-        raise unknown_name("KIND", kind, kinds)
-    chosen = kinds[kind]
-    found = load(chosen.schema)() if chosen.schema else msgspec.json.schema(load(chosen.model))
-    document = {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
-    document["title"] = f"unitcad {kind.replace('-', ' ')}"
-    if out is None:
-        print_json(document)
-        return
-    files.write(out, (json.dumps(document, indent=2) + "\n").encode())
-    print_json({"schema": str(out)}) if as_json else typer.echo(str(out))
-
-
 def coupon(
     printer: Annotated[
         str, typer.Argument(metavar="PRINTER", help="A printer of the catalogue (unitcad list printers).")
@@ -179,67 +144,3 @@ def coupon(
     else:
         typer.echo(Coupon(chosen).markdown())
         typer.echo(str(folder))
-
-
-def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a variant, or of several.")],
-    code: AllowCode = False,
-    as_json: AsJson = False,
-) -> None:
-    """Write one offline page for a folder of results. The last line printed is the page."""
-
-    allow_code(code)
-    with progress(str(folder)) as say:
-        check_casts(folder)
-        say("page")
-        page = write_report(folder, warn)
-    if as_json:
-        print_json({"page": str(page), "bytes": page.stat().st_size})
-    else:
-        typer.echo(str(page))
-
-
-cache = typer.Typer(
-    help="Show or shrink the cache of distinct parts.",
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
-)
-Where = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Folder of the cache. Default: the user's.")]
-
-
-@cache.command("ls")
-def ls(where: Where = None, as_json: AsJson = False) -> None:
-    """Print the content of the cache. The last line printed is its folder."""
-
-    root = where or default_root()
-    used = usage(root)
-    _print_usage(f"{used.entries} entries, {used.contents} files, {used.bytes / 1e6:.1f} MB", root, vars(used), as_json)
-
-
-@cache.command("gc")
-def gc(
-    where: Where = None,
-    limit: Annotated[
-        float,
-        typer.Option(
-            metavar="MB", min=0, max=1e12, callback=finite, help="Maximum size afterwards; 0 empties the cache."
-        ),
-    ] = 4096,
-    as_json: AsJson = False,
-) -> None:
-    """Remove the parts that were used longest ago, down to a size. Results keep their files: they are links."""
-
-    root = where or default_root()
-    gone = collect(root, int(limit * 1e6))
-    text = f"{gone.entries} entries, {gone.contents} files, {gone.bytes / 1e6:.1f} MB removed"
-    _print_usage(text, root, vars(gone), as_json)
-
-
-def _print_usage(text: str, root: Path, data: dict, as_json: bool) -> None:
-
-    if as_json:
-        print_json({"cache": str(root), **data})
-    else:
-        typer.echo(text)
-        typer.echo(str(root))
