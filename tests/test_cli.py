@@ -13,6 +13,7 @@ import pytest
 from typer.main import get_command
 from typer.testing import CliRunner
 
+from unitcad import cli
 from unitcad.casting.steps import duration
 from unitcad.cli import app
 from unitcad.export import slicer
@@ -202,3 +203,32 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     without = run("build", "embedded", "--formats", "stl", "-o", str(tmp_path / "b"), "--no-report")
     assert not (Path(without.stdout.strip()) / "report.html").exists()
     assert "open " not in without.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (MemoryError(), "error: out of memory"),
+        (
+            SystemError("<built-in method x> returned NULL without setting an exception"),
+            "error: out of memory: <built-in method x> returned NULL without setting an exception",
+        ),
+        (SystemError("error return without exception set"), "error: out of memory: error return without exception set"),
+        (
+            ImportError("libjpeg.so.62: failed to map segment from shared object"),
+            "error: out of memory: libjpeg.so.62: failed to map segment from shared object",
+        ),
+        (ImportError("no x"), "error: internal error: ImportError: no x (a bug; UNITCAD_TRACEBACK=1 shows where)"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, Exception) else "",
+)
+def test_a_library_without_memory_is_no_bug(error: Exception, said: str, monkeypatch, capsys) -> None:
+    def run(words: list[str]) -> int:
+        raise error
+
+    monkeypatch.delenv("UNITCAD_TRACEBACK", raising=False)
+    monkeypatch.setattr(cli.command_line, "run", run)
+    with pytest.raises(SystemExit) as left:
+        cli.main()
+    assert left.value.code == 1
+    assert capsys.readouterr().err == f"{said}\n"

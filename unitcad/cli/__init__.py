@@ -29,6 +29,13 @@ def _interrupt_behind(error: BaseException | None) -> bool:
     return error is not None
 
 
+def _lacks_memory(error: BaseException) -> bool:
+    """Return whether a compiled library that found no memory raised this error."""
+    # CPython raises SystemError if C code says that it failed and sets no exception, or the reverse.
+    said = {SystemError: ("exception set", "setting an exception"), ImportError: ("failed to map segment",)}
+    return any(part in str(error) for part in said.get(type(error), ()))
+
+
 def _leave_interrupted() -> NoReturn:
     """Say so and leave with exit code 130."""
     warn("interrupted")
@@ -69,6 +76,9 @@ def main() -> NoReturn:
             _leave_interrupted()
         if os.environ.get("UNITCAD_TRACEBACK"):
             raise
+        if _lacks_memory(error):
+            say_error(UnitcadError(f"out of memory: {error}"), form)
+            sys.exit(1)
         say_error(
             UnitcadError(f"internal error: {type(error).__name__}: {error} (a bug; UNITCAD_TRACEBACK=1 shows where)"),
             form,
