@@ -11,9 +11,8 @@
 from dataclasses import replace
 
 from unitcad.designs import Design
-from unitcad.designs.design import Fitting
+from unitcad.designs.design import Fitting, circuit, motor
 from unitcad.designs.dimensions import concentric
-from unitcad.designs.parts import circuit, motor
 from unitcad.errors import Refusal
 from unitcad.shape import cut, cylinder, moved
 

@@ -17,7 +17,7 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import build
 from unitcad.report import page, read_results, write_report
 from unitcad.report.html_page import REFERENCE, Pool
-from unitcad.report.viewer_models import model
+from unitcad.report.page import model
 from unitcad.validation import load, templates
 
 NAMESPACE = "http://www.w3.org/1999/xhtml"

@@ -18,8 +18,8 @@ from unitcad.arrays.array import Array, Box, Placed, Sheet
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.constructions import Construction
 from unitcad.arrays.layouts import Point
+from unitcad.designs.design import BEYOND
 from unitcad.designs.limits import down, up
-from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point as PlanePoint
 from unitcad.moulds.cuts import Feature

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from unitcad.designs import layer_colour
-from unitcad.designs.parts import Cell
+from unitcad.designs.design import Cell
 from unitcad.moulds.base import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH, PRY_HALF_WIDTH, outline, plate_top
 from unitcad.moulds.cup import skirt_end, window_section
 from unitcad.moulds.cuts import Axis, Interval

@@ -32,8 +32,7 @@ from unitcad.casting.preparation import inner
 from unitcad.casting.steps import BenchStep
 from unitcad.casting.views import fed_through, picture_path
 from unitcad.catalogue import Material
-from unitcad.designs.design import Fitting
-from unitcad.designs.parts import ADHESIVE, bond
+from unitcad.designs.design import ADHESIVE, Fitting, bond
 from unitcad.moulds.cup import ribs
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST

@@ -9,11 +9,10 @@ from dataclasses import replace
 from functools import cache
 from importlib import import_module
 
-from unitcad.designs import parts
+from unitcad.designs import design
 from unitcad.designs.custom import custom
-from unitcad.designs.design import Design
+from unitcad.designs.design import Design, Tooling
 from unitcad.designs.dimensions import Dimensions
-from unitcad.designs.parts import Tooling
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.shape import cylinder
 from unitcad.shape.tree import Body
@@ -151,13 +150,13 @@ def _inside(spec: Spec, dims: Dimensions) -> tuple[Body, ...]:
     """Return the bought bodies that go into the silicone."""
     bodies: list[Body] = []
     if not spec.motor.absent:
-        bodies.append(Body("motor", "unit", "motor", parts.motor(dims), _MOTOR_COLOUR, made="bought"))
+        bodies.append(Body("motor", "unit", "motor", design.motor(dims), _MOTOR_COLOUR, made="bought"))
     if spec.fpcb and dims.pad:
-        drawn = parts.circuit(spec.fpcb, dims.pad, dims)
+        drawn = design.circuit(spec.fpcb, dims.pad, dims)
         bodies.append(Body("fpcb", "unit", "circuit", drawn, CIRCUIT_COLOUR, made="bought"))
     if spec.wires and dims.exit:
         bodies += [
             Body(f"wire{i + 1}", "unit", "wire", shape, CIRCUIT_COLOUR, made="bought")
-            for i, shape in enumerate(parts.wires(spec.wires, dims.exit.wires_y, dims))
+            for i, shape in enumerate(design.wires(spec.wires, dims.exit.wires_y, dims))
         ]
     return tuple(bodies)

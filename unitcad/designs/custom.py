@@ -9,9 +9,8 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any, get_args
 
-from unitcad.designs.design import Design
+from unitcad.designs.design import Design, Tooling
 from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
-from unitcad.designs.parts import Tooling
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device
 from unitcad.shape import ProfileError, Shape, cut

@@ -1,4 +1,12 @@
-"""The protocol of a design, for the shipped designs and for a custom design's file."""
+"""The protocol of a design, for the shipped designs and for a custom design's file, and the parts that they share.
+
+Shared: motor, circuit or wires, the slot of the tail.
+
+z
+|   .--------- pad, radius pad.radius ---------.========== tail ===  pad.low to pad.high
+|      .------- motor, radius motor_radius ----.
+0------'---------------------------------------'------------------- skin
+"""
 
 from __future__ import annotations
 
@@ -6,14 +14,65 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from unitcad.designs.dimensions import Dimensions
-from unitcad.designs.parts import Tooling
-from unitcad.shape import Shape
+from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Outline, Pad
+from unitcad.shape import Revolve, Shape, box, cut, cylinder, moved, polygon, turned, union
+from unitcad.shape.tree import Body
 from unitcad.spec import Spec
 from unitcad.spec.raw import RawSpec
+from unitcad.spec.resolved import Circuit, Wires
+from unitcad.text import number
 
 Reason = tuple[str, str]
 """A skipped output and the reason."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cavity: its centre, the sides (+1, -1 along x) of its tails, and its number among several ("")."""
+
+    x: float
+    y: float
+    sides: tuple[int, ...]
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Cells and half sizes along x and y (mm): `plinth` at z = 0, `cup` and `plate` outside; `key` is a leg."""
+
+    cells: tuple[Cell, ...]
+    key: float
+    pitch: float
+    plinth: tuple[float, float]
+    cup: tuple[float, float]
+    plate: tuple[float, float]
+    label_height: float
+
+
+@dataclass(frozen=True)
+class Tooling:
+    """The tools of all pours, without labels, and the other seals.
+
+    dimensions   the lengths that the tools are drawn to; `heights` are the rims of the pours
+    layout       cells and plates; the labels go into the plates' corners
+    tools        in the order in which a person needs them: "base", and "cup1", "cup2" ... with their pour as `step`; a
+                 tool without `step`, except a blade, is part of every pour
+    seals        for each pour, space without tool that silicone is kept from
+    channels     for each pour under a lid, the silicone in sprue and vents, as many a cell; () if all pours are open
+    grooves      for each pour, whether its cup has an overflow groove; () if all have one
+    concentric   whether the tools are those of rings: then the dimensions define every hole and gap in them
+    """
+
+    dimensions: Dimensions
+    layout: Layout
+    tools: tuple[Body, ...]
+    seals: tuple[tuple[Shape, ...], ...]
+    channels: tuple[tuple[Shape, ...], ...] = ()
+    grooves: tuple[bool, ...] = ()
+    concentric: bool = False
+
+    def __repr__(self) -> str:
+        return f"Tooling({', '.join(tool.name for tool in self.tools)})"
 
 
 def _no_limits(spec: Spec, dims: Dimensions) -> None:
@@ -93,3 +152,68 @@ class Design:
     assembly: Callable[[Spec, Dimensions], Sequence[str | Fitting]] = _nothing
     skipped: Callable[[Spec], list[Reason]] = _nothing_skipped
     default: bool = False
+
+
+BEYOND = 1.0
+"""How far a cutting tool reaches past the part that it cuts, mm: never in one plane with it."""
+
+
+def motor(dims: Dimensions) -> Shape:
+    """Draw the motor as a cylinder on the skin, or on the lip."""
+    return cylinder(dims.motor_radius, dims.motor_low, dims.motor_height)
+
+
+def solid_within(outline: Outline, low: float, high: float) -> Shape:
+    """Draw the solid within a surface of revolution that goes on straight down to z = `low` and up to `high`."""
+    (r0, _), *_, (r1, _) = outline
+    if len(outline) == 2 and r0 == r1:
+        return cylinder(r0, low, high)
+    return Revolve(polygon(*dict.fromkeys(((0.0, low), (r0, low), *outline, (r1, high), (0.0, high)))))
+
+
+ADHESIVE = "silicone adhesive"
+
+
+def motor_hold(spec: Spec, dims: Dimensions) -> str:
+    """Describe the surroundings of the motor once it is in."""
+    lip = " The lip keeps it in." if dims.mouth_radius else ""
+    if spec.motor.fill:
+        return f"Layer 1 encloses the motor.{lip}"
+    return f"A ring of air of {number(dims.air_ring, 3)} mm stays round the motor.{lip}"
+
+
+def bond(what: str, where: str) -> str:
+    """Write how the motor is fixed: the same words in every design."""
+    return f"Coat {what} thinly with {ADHESIVE} where it touches {where}: cast silicone does not bond to it."
+
+
+def circuit(fpcb: Circuit, pad: Pad, dims: Dimensions) -> Shape:
+    """Draw pad and tails of the flexible circuit. The tail starts inside the pad, so that the union has one outline."""
+    half, reach = fpcb.tail_width_mm / 2, dims.outer_radius + fpcb.tail_length_mm
+    tails = (box(min(0, s * reach), max(0, s * reach), -half, half, pad.low, pad.high) for s in dims.sides)
+    return union((cylinder(pad.radius, pad.low, pad.high), *tails))
+
+
+def wires(drawn: Wires, across: tuple[float, ...], dims: Dimensions) -> list[Shape]:
+    """Draw the wires, from just off the motor's side out along +x, side by side, a gap below the core's top.
+
+    `across`: y of their axes, mm.
+    """
+    radius = drawn.diameter_mm / 2
+    lying = turned(cylinder(radius, dims.motor_radius + WIRE_GAP, dims.outer_radius + drawn.length_mm), "y", 1)
+    return [moved(lying, 0, y, dims.core_height - WIRE_GAP - radius) for y in across]
+
+
+def strip(dims: Dimensions, side: int, reach: float, half_width: float, z0: float, z1: float) -> Shape:
+    """Draw a flat strip that leaves radially on one side, from the ledge's round riser outwards to x = `reach` (mm)."""
+    flat = box(min(0, side * reach), max(0, side * reach), -half_width, half_width, z0, z1)
+    return cut(flat, [cylinder(dims.ledge_radius, z0 - BEYOND, z1 + BEYOND)])
+
+
+def slots(dims: Dimensions) -> list[Shape]:
+    """Draw the passages of tails or wires through every layer, open outwards; a notch is open upwards too."""
+    if not dims.exit:
+        return []
+    low, high = dims.exit.low, dims.exit.high
+    high += BEYOND if high >= dims.heights[0] else 0.0
+    return [strip(dims, side, dims.outer_radius + BEYOND, dims.exit.width / 2, low, high) for side in dims.sides]

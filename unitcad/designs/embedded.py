@@ -11,9 +11,8 @@ import math
 
 from unitcad import catalogue
 from unitcad.designs import limits
-from unitcad.designs.design import Design, Fitting, Reason
+from unitcad.designs.design import ADHESIVE, Design, Fitting, Reason, bond, motor_hold, slots
 from unitcad.designs.dimensions import Dimensions, Outline, concentric, motor_low, wire_exit
-from unitcad.designs.parts import ADHESIVE, bond, motor_hold, slots
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from unitcad import catalogue
 from unitcad.designs import limits
-from unitcad.designs.design import Design, Fitting
+from unitcad.designs.design import ADHESIVE, Design, Fitting, bond, motor_hold, slots
 from unitcad.designs.dimensions import (
     MOTOR_CLEARANCE,
     Dimensions,
@@ -24,7 +24,6 @@ from unitcad.designs.dimensions import (
     wire_exit,
 )
 from unitcad.designs.limits import allowed_strain, pad_strain, tail_strain, widest_tail_end
-from unitcad.designs.parts import ADHESIVE, bond, motor_hold, slots
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec

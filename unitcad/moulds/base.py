@@ -19,8 +19,8 @@ import math
 from collections.abc import Sequence
 
 from unitcad.designs import Dimensions, design_of
+from unitcad.designs.design import BEYOND, Layout, solid_within, strip
 from unitcad.designs.dimensions import Exit
-from unitcad.designs.parts import BEYOND, Layout, solid_within, strip
 from unitcad.moulds import filament
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG
 from unitcad.shape import Extrude, Profile, Shape, box, cut, moved, rounded_rectangle, turned, union

@@ -22,8 +22,8 @@ import numpy as np
 from manifold3d import Manifold, OpType
 
 from unitcad.designs import design_of, dimensions, inserts
+from unitcad.designs.design import BEYOND, Tooling
 from unitcad.designs.limits import check_seat
-from unitcad.designs.parts import BEYOND, Tooling
 from unitcad.errors import UNIT_ALONE, Refusal
 from unitcad.kernels.mesh import (
     area_true,

@@ -43,9 +43,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from unitcad.designs import Dimensions
+from unitcad.designs.design import BEYOND, Cell, Layout, solid_within
 from unitcad.designs.dimensions import Exit
 from unitcad.designs.limits import CREST, LEAF_WIDTH, leaf_mm
-from unitcad.designs.parts import BEYOND, Cell, Layout, solid_within
 from unitcad.moulds.base import outline, plate_bottom, plate_top, tapered
 from unitcad.moulds.layout import CORNER_RADIUS, EPS, MARK, PLINTH_DRAFT_DEG, groove_depth_of
 from unitcad.shape import Extrude, Profile, Revolve, Shape, box, cut, moved, polygon, ring, union

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 from unitcad.designs import Dimensions
+from unitcad.designs.design import BEYOND, Cell, Layout
 from unitcad.designs.limits import filament_groove
-from unitcad.designs.parts import BEYOND, Cell, Layout
 from unitcad.shape import Profile, Revolve, Shape, box, cylinder, moved, polygon, ring, turned, union
 from unitcad.spec import Spec
 

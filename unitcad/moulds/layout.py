@@ -6,7 +6,7 @@ import math
 
 from unitcad.catalogue import printers
 from unitcad.designs import Dimensions
-from unitcad.designs.parts import Cell, Layout
+from unitcad.designs.design import Cell, Layout
 from unitcad.errors import Refusal
 from unitcad.shape.lettering import HEIGHT, text_width
 from unitcad.spec import Spec

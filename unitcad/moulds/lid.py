@@ -26,9 +26,9 @@ import numpy as np
 from manifold3d import CrossSection
 
 from unitcad.designs import Dimensions
+from unitcad.designs.design import BEYOND, Layout
 from unitcad.designs.dimensions import WIRE_GAP, Exit
 from unitcad.designs.limits import EPS, down
-from unitcad.designs.parts import BEYOND, Layout
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import thick_parts, widest
 from unitcad.moulds.base import outline

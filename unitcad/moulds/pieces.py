@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_of
-from unitcad.designs.parts import BEYOND, Layout
+from unitcad.designs.design import BEYOND, Layout
 from unitcad.moulds import filament
 from unitcad.moulds.base import core, notch, tongues
 from unitcad.moulds.cup import bores, cup_blank, windows

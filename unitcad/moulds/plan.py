@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
+from unitcad.designs.design import BEYOND, Cell, Layout, Tooling
 from unitcad.designs.dimensions import poured
-from unitcad.designs.parts import BEYOND, Cell, Layout, Tooling
 from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
 from unitcad.moulds import filament, lid
 from unitcad.moulds.base import base, plate_bottom, plate_top, tongues

@@ -17,8 +17,7 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.write import BENCH
 from unitcad.report.html_page import html_page
-from unitcad.report.read_results import expect
-from unitcad.report.viewer_models import spec_in, step_pictures
+from unitcad.report.read_results import expect, spec_in, step_pictures
 from unitcad.spec import Spec, spec_hash, to_data
 
 PROGRAMS = ("dom.js", "glb.js", "bench.js")

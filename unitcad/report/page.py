@@ -13,12 +13,14 @@ from unitcad import __version__
 from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.meshcheck.findings import counted
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.plan import glb_content
+from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
 from unitcad.pipeline.write import BENCH, PAGE
 from unitcad.report import read_results
 from unitcad.report.bench_page import write_bench
-from unitcad.report.html_page import Pool, asset, html_page
+from unitcad.report.html_page import Pool, asset, compressed, html_page
 from unitcad.report.read_results import VariantRecord
-from unitcad.report.viewer_models import Modelled, model
 from unitcad.rooms import load
 from unitcad.spec import Spec
 
@@ -30,6 +32,33 @@ PROGRAMS = (
 MOST_DAMAGED = 20
 """Damaged results that are named when a page is written; the page names all."""
 STYLES = ("vendor/uplot.min.css", "app/page.css", "app/print.css")
+
+
+Modelled = Callable[[Spec], dict[str, Any]]
+"""Returns the result of `model` for a spec."""
+
+
+def model(spec: Spec) -> dict[str, Any]:
+    """Return a geometry for the page; GLB files compressed and in base 64. Lengths in mm.
+
+    Raises UnitcadError if the geometry can't be made any more.
+    """
+    moulds = MouldSet(spec)
+    plan = moulds.plan
+    return {
+        "unit": compressed(glb_content(moulds, moulds.unit)),
+        "moulds": compressed(glb_content(moulds, plan.tools)),
+        "cells": cells(moulds),
+        "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(moulds)],
+        "unit_apart": {name: list(offset) for name, offset in unit_apart(moulds).items()},
+        "moulds_apart": {name: list(offset) for name, offset in taken_apart(moulds).items()},
+    }
+
+
+def cells(moulds: MouldSet) -> list[list[float]]:
+    """Return the places of the unit's layers in the moulds: x, y (mm) and quarter turns about z, a cell each."""
+    one_sided = moulds.dimensions.sides == (1,)
+    return [[cell.x, cell.y, 2 if one_sided and cell.sides == (-1,) else 0] for cell in moulds.plan.layout.cells]
 
 
 def write_report(

@@ -6,11 +6,12 @@ file opened, and no code of a spec run. Unreadable files are named with the reas
 
 from __future__ import annotations
 
+import base64
 import csv
 import io
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +23,19 @@ from unitcad.casting.cast_record import ENDING, read_cast_record
 from unitcad.errors import Refusal, UnitcadError, misfit, missing_extra
 from unitcad.files import TEMPORARY
 from unitcad.pipeline.manifest import Manifest
+from unitcad.pipeline.plan import GEOMETRIC, build_key
 from unitcad.pipeline.write import ADDRESS, PAGE, STORE
 from unitcad.report.html_page import REFERENCE
-from unitcad.report.viewer_models import model_key, spec_in, step_pictures
 from unitcad.rooms import FileKind, file_kinds
-from unitcad.spec import Spec, to_data
+from unitcad.spec import Spec, read_toml, to_data, with_formats
+from unitcad.validation import from_data
 
 DEEPEST = 40
 """Nesting of lists and tables that a result's file may have."""
+LARGEST_PICTURE = 1_000_000
+"""Bytes of a step's picture, at most."""
+MOST_PICTURES = 500
+PNG = b"\x89PNG\r\n\x1a\n"
 
 
 class ListedVariant(Struct):
@@ -383,3 +389,29 @@ def _json(path: Path) -> dict[str, Any]:
     data = files.read_json(path, links=False)
     expect(data, dict[str, Any], path)
     return data
+
+
+def step_pictures(folder: Path, paths: Iterable[str]) -> dict[str, str]:
+    """Return the pictures of these paths in a folder as data, without files that are missing or no PNG."""
+    read: dict[str, str] = {}
+    for path in list(dict.fromkeys(path for path in paths if path))[:MOST_PICTURES]:
+        parts = Path(path).parts
+        if Path(path).is_absolute() or ".." in parts or any((folder / p).is_symlink() for p in Path(path).parents):
+            continue
+        try:
+            content = files.read(folder / path, largest=LARGEST_PICTURE, links=False)
+        except UnitcadError:
+            continue
+        if content.startswith(PNG):
+            read[path] = f"data:image/png;base64,{base64.b64encode(content).decode()}"
+    return read
+
+
+def spec_in(folder: Path) -> Spec:
+    """Read the resolved spec of a result folder. Raises UnitcadError if it can't be read."""
+    return from_data(read_toml(folder / "spec.toml", links=False))
+
+
+def model_key(spec: Spec) -> str:
+    """Return the key of a geometry, without silicones and formats: sixteen hex digits."""
+    return build_key(with_formats(spec), GEOMETRIC, False)[:16]

@@ -18,7 +18,7 @@ from unitcad.export.svg import unit_section
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
-from unitcad.report.viewer_models import cells
+from unitcad.report.page import cells
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Trusted
 from unitcad.spec import Spec, convert, to_data, to_toml

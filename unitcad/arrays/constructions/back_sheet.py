@@ -25,9 +25,8 @@ from unitcad.arrays.piece_seams import (
 from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile, stopped_ring
 from unitcad.arrays.tails import CLEAR
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, shipped
-from unitcad.designs.design import Fitting
+from unitcad.designs.design import ADHESIVE, BEYOND, Cell, Fitting, Layout, bond
 from unitcad.designs.limits import filament_groove
-from unitcad.designs.parts import ADHESIVE, BEYOND, Cell, Layout, bond
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point, nearer
 from unitcad.moulds import filament

@@ -14,8 +14,7 @@ from unitcad.arrays.constructions.back_sheet import OFF_SQUARE, UP, core_top, fi
 from unitcad.arrays.sheet import angle_deg, axis, barrel, bent, bent_stretches, inside_of_end, slice_of, strap_slot
 from unitcad.catalogue import printers
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour
-from unitcad.designs.design import Fitting
-from unitcad.designs.parts import BEYOND
+from unitcad.designs.design import BEYOND, Fitting
 from unitcad.errors import Refusal
 from unitcad.moulds.base import core
 from unitcad.moulds.cup import PIN_RADIUS, Pins, pin_holes, standing_pins

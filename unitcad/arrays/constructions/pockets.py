@@ -18,7 +18,7 @@ from unitcad.arrays.piece_seams import (
 )
 from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile
 from unitcad.designs import Dimensions, design_of, dimensions, layer_colour, unit_bodies
-from unitcad.designs.parts import Cell, Layout
+from unitcad.designs.design import Cell, Layout
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise, segment_count, thick_pieces
 from unitcad.moulds.cavities import united
