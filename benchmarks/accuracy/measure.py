@@ -25,7 +25,7 @@ from unitcad.lab.chains.line import Mains, fit_line
 from unitcad.lab.measuring import level
 
 SEED = 20240
-TRIALS, QUICK_TRIALS = 400, 100
+TRIALS, QUICK_TRIALS = 400, 40
 SCATTER = 0.05
 """Standard deviation of the logarithms of simulated repeats."""
 
