@@ -47,6 +47,7 @@ lengths = st.floats(0.25, 50).map(mm)
         ((0, 0), (1, 0)),  # no area
         ((0, 0), (2, 0), (2, 2), (1, 0), (0, 2)),  # touches itself
         ((0, 0), (3, 0), (1, 0), (3, 3)),  # folds back
+        ((0, 3), (-2, -3), (3, 1), (-3, 1), (2, -3)),  # a pentagram: it only turns left, but twice round
     ],
 )
 def test_a_profile_that_bounds_no_area_is_refused(corners: tuple) -> None:

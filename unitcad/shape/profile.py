@@ -46,7 +46,7 @@ class Profile:
         polygon = points(self, 24)
         if self.area <= 0:
             raise ProfileError(f"runs clockwise or bounds no area: {snapped}")
-        if not _is_convex(polygon) and _crosses_itself(polygon):
+        if _crosses_itself(polygon):
             raise ProfileError(f"crosses itself: {snapped}")
 
     @property
@@ -161,19 +161,6 @@ def arc_centre(p: tuple[float, float], q: tuple[float, float], bulge: float) -> 
     away = (1 - bulge**2) / (4 * bulge)
     radius = math.hypot(dx, dy) * (1 + bulge**2) / (4 * abs(bulge))
     return (p[0] + q[0]) / 2 - away * dy, (p[1] + q[1]) / 2 + away * dx, radius
-
-
-def _is_convex(polygon: np.ndarray) -> bool:
-    """Return whether a polygon turns left all the way and once round: a fast test that it can't cross itself."""
-    corners = polygon.tolist()
-    steps = [(x1 - x0, y1 - y0) for (x0, y0), (x1, y1) in zip(corners, corners[1:] + corners[:1], strict=True)]
-    turned = 0.0
-    for (ax, ay), (bx, by) in zip(steps, steps[1:] + steps[:1], strict=True):
-        cross = ax * by - ay * bx
-        if cross <= 0:
-            return False
-        turned += math.atan2(cross, ax * bx + ay * by)
-    return turned < 3 * math.pi
 
 
 def _crosses_itself(polygon: np.ndarray) -> bool:
