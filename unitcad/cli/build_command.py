@@ -128,8 +128,7 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
 
 def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:
     """Yield a line of the lengths that nobody measured, if there are any; `path`: of the spec in its file."""
-    assumed = {key: how for key, how in assumed_lengths(spec).items() if path + key not in given}
-    if assumed:
+    if assumed := assumed_lengths(spec, given, path):
         lengths = listed(f"{path}{said_of(spec, key)} ({how})" for key, how in assumed.items())
         yours = f"; build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
         yield f"measure first; assumed: {lengths}{yours}"

@@ -117,7 +117,7 @@ class MouldSet:
     def assumed(self) -> dict[str, str]:
         """The assumption about each length of these parts that nobody has measured, by its key."""
         path, spec = self.parts
-        return assumed_lengths(spec, {key.removeprefix(path) for key in self.given})
+        return assumed_lengths(spec, self.given, path)
 
     @cached_property
     def laid_later(self) -> tuple[Body, ...]:

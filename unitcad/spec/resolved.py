@@ -304,8 +304,11 @@ def motor_of(spec: Spec) -> catalogue.Motor | None:
     return None
 
 
-def assumed_lengths(spec: Spec, given: Container[str] = ()) -> dict[str, str]:
-    """Return the assumption about each length that nobody has measured, by its key, but for those `given`."""
+def assumed_lengths(spec: Spec, given: Container[str] = (), path: str = "") -> dict[str, str]:
+    """Return the assumption about each length that nobody has measured, by its key.
+
+    `given`: lengths of the user's own, by their path in a file; `path`: the path of this spec in that file.
+    """
     motor = motor_of(spec)
     sizes = [(size, getattr(motor, size)) for size in MOTOR_SIZES] if motor else []
     found = {
@@ -318,7 +321,7 @@ def assumed_lengths(spec: Spec, given: Container[str] = ()) -> dict[str, str]:
         found[key] += f": up to {number(proud, 2)} mm out of the skin's plane"
     if spec.fpcb and spec.fpcb.thickness_mm == FpcbTable().thickness_mm:
         found["fpcb.thickness_mm"] = "usual stock"
-    return {key: how for key, how in found.items() if key not in given}
+    return {key: how for key, how in found.items() if path + key not in given}
 
 
 def said_of(spec: Spec, key: str) -> str:
