@@ -43,6 +43,8 @@ COMMANDS = {
     "build unit.toml --set 'diameter_mm 15'": "--set = 'diameter_mm 15': needs the form path=value in one word, such "
     "as layers.0.wall_mm=1.0",
     "build unit.toml --set diameter_mm=14,5": "diameter_mm = '14,5': takes a number; nearest accepted: 14.5",
+    "build unit.toml --set diameter_mm='1.45 cm'": "diameter_mm = '1.45 cm': takes a number; nearest accepted: 14.5",
+    "build unit.toml --set moulds.draft_deg='2 mm'": "moulds.draft_deg = '2 mm': takes a number",
     "build unit.toml --set diameter_mm=1.45cm": "diameter_mm = '1.45cm': takes a number; nearest accepted: 14.5",
     "build unit.toml --set diameter_mm=1.4": f"diameter_mm = 1.4: {THIN}",
     "build unit.toml --set diameter_mm=-14": f"diameter_mm = -14: must be at least 1, and {THIN}",
