@@ -25,8 +25,10 @@ from shapes import (
     TICKET,
     TYPES,
     box,
+    in_format,
     mesh_xml,
     model_xml,
+    obj,
     package,
     prism,
     rels_xml,
@@ -53,10 +55,10 @@ class Case:
         return self.content.encode() if isinstance(self.content, str) else self.content
 
 
-def options(max_faces: int | None = None, printer: str | None = None, **rest: Any) -> Options:
-    """Options from plain values, as a malformed case names them."""
-    limits = Limits() if max_faces is None else Limits(max_faces=max_faces)
-    return Options(limits=limits, printer=printers()[printer] if printer else None, **rest)
+def options(printer: str | None = None, **rest: Any) -> Options:
+    """Options from plain values, as a malformed case names them; those of Limits stand among them."""
+    bounds = {key: rest.pop(key) for key in Limits.__dataclass_fields__.keys() & rest}
+    return Options(limits=Limits(**bounds), printer=printers()[printer] if printer else None, **rest)
 
 
 def cases() -> list[Case]:
@@ -220,20 +222,15 @@ def _topology() -> list[tuple]:
     flipped = cube.copy()
     flipped[0] = flipped[0][::-1]
     crack = np.concatenate([cube[1:], _halves(cube[0])])
-    crumpled = cube.copy()
-    crumpled[crumpled == 10] = 10
     noisy = box()
     noisy[0] += 2e-5
     line = np.array([[[0, 0, 0], [10, 0, 0], [5, 0, 0]]], float)
     wrong = np.tile([0.0, 0.0, 1.0], (12, 1))
-    sliver = _with_sliver()
-    loose = "".join(f"v {x} {y} {z}\n" for x, y, z in CUBE_CORNERS * 10)
-    faces = "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in CUBE_FACES)
     spread = (CUBE_CORNERS * 10)[CUBE_FACES].reshape(-1, 3)
     return [
         ("hole.stl", "T001", stl(cube[1:])),
-        ("hole.3mf", "T001", package(model_xml(f'<object id="1">{mesh_xml(faces=CUBE_FACES[1:])}</object>'))),
-        ("hole.obj", "T001", loose + faces[faces.index("\n") + 1 :]),
+        ("hole.3mf", "T001", in_format(cube[1:], "part.3mf")),
+        ("hole.obj", "T001", obj(CUBE_CORNERS * 10, CUBE_FACES[1:])),
         ("fin.stl", "T002", stl(np.concatenate([cube, fin]))),
         ("edge-to-edge.stl", "T003", stl(np.concatenate([cube, box(at=(10, 10, 0))]))),
         ("corner-to-corner.stl", "T004", stl(np.concatenate([cube, box(at=(10, 10, 10))]))),
@@ -243,13 +240,12 @@ def _topology() -> list[tuple]:
             f'<object id="1">{mesh_xml(spread, np.arange(36).reshape(-1, 3))}</object>'))),
         ("one-flipped.stl", "T007", stl(flipped)),
         ("inside-out.stl", "T008", stl(cube[:, ::-1])),
-        ("inside-out.3mf", "T008", package(model_xml(
-            f'<object id="1">{mesh_xml(faces=CUBE_FACES[:, ::-1])}</object>'))),
+        ("inside-out.3mf", "T008", in_format(cube[:, ::-1], "part.3mf")),
         ("face-twice.stl", "T009", stl(np.concatenate([cube, cube[:1]]))),
         ("two-sided.stl", "T009", stl(np.concatenate([cube[:1], cube[:1, ::-1]]))),
         ("collapsed.stl", "T010", stl(np.concatenate([cube, cube[:1, [0, 0, 1]]]))),
         ("line.stl", "T010", stl(np.concatenate([cube, line]))),
-        ("sliver.stl", "T011", stl(sliver)),
+        ("sliver.stl", "T011", stl(with_sliver())),
         ("unused.3mf", "T012", package(model_xml(
             f'<object id="1">{mesh_xml(np.concatenate([CUBE_CORNERS * 10, [[5, 5, 5]]]))}</object>'))),
         ("normals.stl", "T013", stl(cube, normals=wrong)),
@@ -263,7 +259,7 @@ def _halves(triangle: np.ndarray) -> np.ndarray:
     return np.array([[a, middle, c], [middle, b, c]])
 
 
-def _with_sliver() -> np.ndarray:
+def with_sliver() -> np.ndarray:
     """A box whose first face is split at a point that lies one float32 step off an edge."""
     cube = box(at=(3, 3, 3))
     a, b, c = cube[0]
@@ -274,25 +270,13 @@ def _with_sliver() -> np.ndarray:
 
 def _geometry() -> list[tuple]:
     cube = box()
-    sheet = box()
-    sheet[:, :, 2] *= 0
     pierced = np.concatenate([cube, box((5, 5, 20), (2.5, 2.5, -5))])
     crossed = (CUBE_CORNERS * 10).copy()
     crossed[[4, 5]] = crossed[[5, 4]] + [0, 3, 0]
     inner = box((5, 5, 5), (2.5, 2.5, 2.5))
     return [
         ("pierced.stl", "G001", stl(pierced)),
-        (
-            "pierced.3mf",
-            "G001",
-            package(
-                model_xml(
-                    "".join(
-                        ['<object id="1">', mesh_xml(pierced.reshape(-1, 3), np.arange(72).reshape(-1, 3)), "</object>"]
-                    )
-                )
-            ),
-        ),
+        ("pierced.3mf", "G001", in_format(pierced, "part.3mf")),
         ("through-edges.stl", "G001", stl(np.concatenate([cube, _ringed(2.5, 7.5, -5)]))),
         ("through-edges-only.stl", "G001", stl(np.concatenate([cube, _ringed(2.5, 7.5, 5)]))),
         ("twisted.stl", "G001", stl(crossed[CUBE_FACES])),

@@ -157,6 +157,7 @@ def package(
     types: str | None = TYPES,
     rels: str | None = ROOT_RELS,
     more: Sequence[tuple[str, str | bytes]] = (),
+    at: str = "3D/3dmodel.model",
     compression: int = zipfile.ZIP_DEFLATED,
 ) -> bytes:
     """A 3MF package; `more` are further entries, written even if a name is there already."""
@@ -166,7 +167,7 @@ def package(
         entries.append(("[Content_Types].xml", types))
     if rels is not None:
         entries.append(("_rels/.rels", rels))
-    entries.append(("3D/3dmodel.model", model_xml() if model is None else model))
+    entries.append((at, model_xml() if model is None else model))
     with zipfile.ZipFile(out, "w", compression) as archive:
         for name, content in (*entries, *more):
             archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, compression)

@@ -95,13 +95,6 @@ def test_a_tool_below_the_floor_is_warned_of(tmp_path: Path) -> None:
     assert "D001" in codes(judged(folder)["film.stl"])
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[]", '{"parts": 3}', '{"parts": [{}]}', "\x00"])
-def test_what_is_no_manifest_is_refused(tmp_path: Path, text: str) -> None:
-    (tmp_path / "manifest.json").write_text(text)
-    with pytest.raises(UnitcadError):
-        listing.read(str(tmp_path))
-
-
 OUTSIDE = [
     "../secret.stl", "unit/../../secret.stl", "unit/../base.stl", "{tmp}/secret.stl", "C:\\secret.stl",
     "\\\\host\\a.stl", "..\\secret.stl", "file-link.stl", "folder-link/secret.stl", "", ".",
