@@ -15,7 +15,6 @@ OFF = polygon_files.off(CUBE_CORNERS * 10, CUBE_FACES.tolist()).decode()
 def files() -> list[tuple]:
     """(name, code, content) each, options after it where there are any."""
     good, text = stl(box()), text_stl(box())
-    facets = text.split("\n")
     return [
         ("empty.stl", "F001", b""),
         ("empty.3mf", "F001", b""),
@@ -28,10 +27,6 @@ def files() -> list[tuple]:
         ("count-low.stl", "F002", stl(box(), count=3)),
         ("count-zero.stl", "F002", stl(box(), count=0)),
         ("ply-promises.ply", "F002", "ply\nformat ascii 1.0\nelement vertex 99999\nproperty float x\nend_header\n"),
-        ("cut-text.stl", "F003", text[: len(text) // 2]),
-        ("no-endsolid.stl", "F003", text[: text.index("endsolid")]),
-        ("stray-word.stl", "F003", text.replace("outer loop", "outer hoop", 1)),
-        ("missing-number.stl", "F003", text.replace("vertex 0 0 0", "vertex 0 0", 1)),
         ("cut.3mf", "F003", package()[:-40]),
         ("bad-crc.3mf", "F003", _flipped(package(compression=zipfile.ZIP_STORED))),
         ("cut-xml.3mf", "F003", package(model_xml()[:-20])),
@@ -61,11 +56,8 @@ def files() -> list[tuple]:
         ("trailing-text.stl", "F006", text + "made by hand\n"),
         ("trailing.3mf", "F006", package() + b"xyz"),
         ("solid-header.stl", "F007", stl(box(), header=b"solid made by a program")),
-        ("quad.stl", "F008", text.replace(facets[3], facets[3] + "\n" + facets[3], 1)),
-        ("two-corners.stl", "F008", text.replace(facets[3] + "\n", "", 1)),
         ("bom.stl", "F009", b"\xef\xbb\xbf" + text.encode()),
         ("cr-only.stl", "F009", text.replace("\n", "\r")),
-        ("utf16.stl", "F009", text.encode("utf-16")),
         ("latin1.stl", "F009", text_stl(box(), "K\u00e4se").encode("latin-1")),
         ("utf16.3mf", "F009", package(model_xml().replace("UTF-8", "UTF-16").encode("utf-16"))),
         ("latin1.3mf", "F009", package(model_xml().replace("UTF-8", "ISO-8859-1").encode("latin-1"))),

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import triangulate
-from shapes import FORMATS, box, in_format, obj, stl, text_ply, turned
+from shapes import FORMATS, box, fin, in_format, obj, stl, surface, text_ply, turned
 
 from unitcad.meshcheck import check_bytes, check_mesh
 from unitcad.meshcheck.geometry.mesh import weld_exact
@@ -132,23 +132,6 @@ def test_solids_that_share_an_edge_do_not_overlap(body: np.ndarray, apart: bool)
         assert codes(check_mesh(points, faces)) <= {"G003", "T003"}
 
 
-def _surface(field: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The faces between cells of different winding number, as many as the numbers differ, with either diagonal."""
-    padded, found = np.pad(field, 1), []
-    for axis in range(3):
-        u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
-        step = np.diff(padded, axis=axis)
-        for cell in np.argwhere(step):
-            corner = cell + np.eye(3)[axis]
-            ring = [corner, corner + u, corner + u + v, corner + v]
-            rise = step[tuple(cell)]
-            ring = ring[::-1] if rise > 0 else ring
-            for _ in range(abs(rise)):
-                k = int(rng.integers(0, 2))
-                found += [[ring[k], ring[k + 1], ring[k + 2]], [ring[k], ring[k + 2], ring[(k + 3) % 4]]]
-    return np.array(found)
-
-
 @settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
@@ -171,7 +154,7 @@ def test_every_winding_number_but_0_and_1_is_an_error(seed: int, values: tuple[i
     padded = np.pad(field, 1)
     if any(np.abs(np.diff(padded, axis=axis)).max() > 1 for axis in range(3)) or not field.any():
         return
-    body = _surface(field, rng)
+    body = surface(field, rng)
     body = turned(body, seed, 3.0, 20, bool(seed % 2)) if turn else body
     report = check_bytes(stl(body), "a.stl")
     errors = {found.code for found in report.findings if found.severity == "error"}
@@ -195,21 +178,6 @@ def test_faces_of_one_concave_polygon_are_not_accused(n: int, seed: int, turn: b
         content = in_format(body, name)
         report = check_bytes(content if isinstance(content, bytes) else content.encode(), name)
         assert codes(report) == set()
-
-
-def fin(*, other_diagonals: bool, cells: int = 1) -> np.ndarray:
-    """Two coincident sheets from the origin's upright edge outwards, 5 sqrt(2) by 10; `cells` quads each way."""
-    found = []
-    steps = np.linspace(0, 1, cells + 1)
-    for i in range(cells):
-        for j in range(cells):
-            ring = [np.array([-5 * s, -5 * s, 10 * t])
-                    for s, t in ((steps[i], steps[j]), (steps[i], steps[j + 1]),
-                                 (steps[i + 1], steps[j + 1]), (steps[i + 1], steps[j]))]  # fmt: skip
-            a, b, c, d = ring
-            found += [[a, b, c], [a, c, d]]
-            found += [[b, a, d], [b, d, c]] if other_diagonals else [[a, c, b], [a, d, c]]
-    return np.array(found)
 
 
 @pytest.mark.parametrize("cells", [1, 2, 5])

@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from shapes import CUBE_CORNERS, CUBE_FACES, box, stl
+from shapes import CUBE_CORNERS, CUBE_FACES, box, stl, surface
 
 from unitcad.geometry.components import components
 from unitcad.meshcheck import check_mesh
@@ -111,24 +111,6 @@ def test_indices_out_of_range_and_empty() -> None:
     assert check_mesh(CUBE_CORNERS * np.nan, CUBE_FACES).has("V001")
 
 
-def _voxels(solid: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The border of a set of unit cubes as triangles, outwards, in any order and with either diagonal."""
-    found = []
-    for cell in np.argwhere(solid):
-        for axis in range(3):
-            for way in (0, 1):
-                beyond = cell.copy()
-                beyond[axis] += 2 * way - 1
-                if (beyond >= 0).all() and (beyond < solid.shape).all() and solid[tuple(beyond)]:
-                    continue
-                u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
-                ring = [cell + way * np.eye(3)[axis] + w for w in (0 * u, u, u + v, v)]
-                ring = ring if way else ring[::-1]
-                k = int(rng.integers(0, 2))
-                found += [[ring[k], ring[k + 1], ring[k + 2]], [ring[k], ring[k + 2], ring[(k + 3) % 4]]]
-    return rng.permutation(np.array(found))
-
-
 def _labelled(cells: np.ndarray, steps: int) -> np.ndarray:
     """Components of cells; neighbours differ in up to `steps` coordinates."""
     found = np.zeros(cells.shape, int)
@@ -146,7 +128,7 @@ def test_shells_of_cubes_that_touch_in_edges(seed: int) -> None:
     expected = sum(int(_labelled(space, 2).max()) for space in outside)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    vertices, faces = weld_exact(_voxels(solid, rng))
+    vertices, faces = weld_exact(rng.permutation(surface(solid.astype(int), rng)))
     for points in (vertices, vertices @ turn * 7.3 + 40):
         report = check_mesh(points, faces)
         assert report.has("T003")
