@@ -16,14 +16,12 @@ import trimesh
 from casting_rules import broken_rules
 
 from tests.report.test_glb import chunks
-from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_hash, load_array
 from unitcad.arrays.array_page import patch_glb
 from unitcad.arrays.array_procedure import pocket_procedure
-from unitcad.arrays.arrayed import unit_folders
 from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.cache import MemoryStore
-from unitcad.casting.procedure import Procedure, procedure
+from unitcad.casting.procedure import procedure
 from unitcad.casting.steps import casting_summary, duration
 from unitcad.casting.views import picture_path, views
 from unitcad.errors import UnitcadError
@@ -107,19 +105,6 @@ def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
     assert drawn == {picture_path(name) for name in views(moulds)}
     assert "tray" in {item.item for item in made.bill}
     assert f"engraved b{seen(made.label)}" in " ".join(step.text for step in steps)
-
-
-@pytest.fixture(scope="module")
-def mixed() -> tuple[Array, dict[str, Procedure], Procedure]:
-    """Units of 14 and 17 mm in a list, the first point at the file's origin: array, units' procedures, its own."""
-    layout = {"kind": "list", "points_mm": [[0, 0], [22, 3], [-21, 4]]}
-    place = [{"at": "P2", "unit": "motor-10mm"}]
-    array = load_array({"name": "mixed", "array": "pockets", "unit": "encapsulating", "layout": layout, "place": place})
-    units = {}
-    for folder, unit in unit_folders(array).items():
-        spec = MouldSet(unit)
-        units[folder] = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
-    return array, units, pocket_procedure(patch_moulds(array), 6000.0, 1000.0, units)
 
 
 def test_the_bench_page_speaks_of_the_sheet(folder: Path) -> None:

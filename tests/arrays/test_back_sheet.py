@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 
 import pytest
 
+from tests.arrays.made_arrays import Change, findings, less, made, more, notch, with_tool
 from tests.moulds.faulty_sets import mesh_findings
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch import PatchMoulds, patch_moulds
-from unitcad.checks import check_moulds, mould_checks
+from unitcad.arrays.patch import patch_moulds
+from unitcad.checks import mould_checks
 from unitcad.errors import Refusal
 from unitcad.moulds.pieces import Removal
-from unitcad.shape import Shape, box, cut, cylinder, moved, union
-
-Change = Callable[[Shape], Shape]
-
-
-@cache
-def patch(*overrides: str) -> PatchMoulds:
-    return patch_moulds(load_array("forearm-patch", overrides))
-
+from unitcad.shape import box, cut, cylinder, moved
 
 VARIANTS = [
     (),
@@ -39,30 +30,21 @@ VARIANTS = [
 
 @pytest.mark.parametrize("overrides", VARIANTS, ids=[" ".join(v) for v in VARIANTS])
 def test_every_mould_check_holds(overrides: tuple[str, ...]) -> None:
-    findings = check_moulds(patch(*overrides))
-    assert [f for f in findings if not f.ok] == []
-    assert {f.code for f in findings} == set(mould_checks())
-    assert max(f.value for f in findings if f.code == "C100") < 1e-6
+    found = findings("forearm-patch", *overrides)
+    assert [f for f in found if not f.ok] == []
+    assert {f.code for f in found} == set(mould_checks())
+    assert max(f.value for f in found if f.code == "C100") < 1e-6
 
 
 @pytest.mark.parametrize("overrides", VARIANTS[:4], ids=[" ".join(v) for v in VARIANTS[:4]])
 def test_every_tool_prints_without_support(overrides: tuple[str, ...]) -> None:
-    assert mesh_findings(patch(*overrides)) == []
+    assert mesh_findings(made("forearm-patch", *overrides)) == []
 
 
 def test_the_silicone_has_the_volume_of_its_lengths() -> None:
     """Twelve notches, 3.4 wide and 2.11 high, in nine rings; the sheet 76 x 60 x 1.25, corners of 10, two slots."""
-    moulds = patch()
+    moulds = made("forearm-patch")
     layer1, layer2 = (moulds.mesh(body).volume() for body in moulds.unit)
-
-    def notch(inner: float, outer: float, half: float = 1.7) -> float:
-        """Area of a strip on one side between two circles."""
-
-        def inside(r: float) -> float:
-            return half * math.sqrt(r**2 - half**2) + r**2 * math.asin(half / r)
-
-        return inside(outer) - inside(inner)
-
     drawn = moulds.arranged.sheet
     slots = 2 * (3 * 23 + math.pi * 1.5**2)
     sheet = (76 * 60 - (4 - math.pi) * drawn.corner_mm**2 - slots) * 1.25
@@ -73,25 +55,11 @@ def test_the_silicone_has_the_volume_of_its_lengths() -> None:
 
 
 def test_a_cup_goes_on_the_pins_in_one_attitude_only() -> None:
-    pins = patch().plan.pins
+    pins = made("forearm-patch").plan.pins
     assert pins is not None
     turned = {(-x, -y) for x, y in pins.places}
     assert len(turned - set(pins.places)) == 2
     assert min(math.dist(p, q) for p in turned - set(pins.places) for q in pins.places) > pins.hole_radius
-
-
-def with_tool(moulds: PatchMoulds, name: str, change: Change) -> PatchMoulds:
-    plan = moulds.plan
-    tools = tuple(replace(tool, shape=change(tool.shape)) if tool.name == name else tool for tool in plan.tools)
-    return patch_moulds(moulds.arranged, replace(plan, tools=tools))
-
-
-def less(*tools: Shape) -> Change:
-    return lambda shape: cut(shape, tools)
-
-
-def more(*parts: Shape) -> Change:
-    return lambda shape: union((shape, *parts))
 
 
 # Units at -20, 0, 20; cup 1: bore 5.75, groove 6.75 to 8.25; cup 2: groove from 31 to 32.5 at y, pins at y = 35.45.
@@ -118,13 +86,13 @@ FAULTS: list[tuple[str, str, str, Change]] = [
 
 @pytest.mark.parametrize(("code", "tool", "what", "change"), FAULTS, ids=[f"{f[0]}-{f[1]}-{f[2]}" for f in FAULTS])
 def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Change) -> None:
-    found = mould_checks()[code].findings(with_tool(patch(), tool, change))
+    found = mould_checks()[code].findings(with_tool(made("forearm-patch"), tool, change))
     assert not all(f.ok for f in found), what
 
 
 def test_an_impossible_order_is_caught() -> None:
     """Cup 2 lifted, or the patch pushed out over the fins before the base is off."""
-    moulds = patch()
+    moulds = made("forearm-patch")
     plan, last = moulds.plan, moulds.plan.steps[-1]
     for order in (
         (*last.removals[:-2], Removal("cup2", (0, 0, 1)), last.removals[-2]),
@@ -146,23 +114,3 @@ def test_corners_of_the_circuit_that_reach_into_silicone_are_refused_before_they
         assert refused.field == "circuit.corner_mm"
         found = list(overlaps(patch_moulds(load_array(data, [f"circuit.corner_mm={refused.nearest}"]))))
     assert [f for f in found if not f.ok] == []
-
-
-@pytest.mark.parametrize(
-    ("override", "field"),
-    [
-        ("unit=embedded", "unit.design"),
-        ("unit=no-fpcb", "unit.fpcb"),
-        ("layout.pitch_mm=15", "layout.pitch_mm"),
-        ("sheet.thickness_mm=2", "sheet.thickness_mm"),
-        ("moulds.pour=injected", "moulds.pour"),
-        ("moulds.bed_x_mm=30", "moulds.bed_x_mm"),
-    ],
-)
-def test_what_can_not_be_cast_is_refused_with_what_would(override: str, field: str) -> None:
-    with pytest.raises(Refusal) as refused:
-        patch_moulds(load_array("forearm-patch", [override])).plan  # noqa: B018
-    assert refused.value.field == field
-    if refused.value.nearest is not None and field != "unit.design":
-        kept = f"{field}={refused.value.nearest}"
-        assert patch_moulds(load_array("forearm-patch", [override, kept])).plan

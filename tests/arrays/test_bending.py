@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from tests.arrays.made_arrays import made
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_page import FINEST, picture_names, wrapped
 from unitcad.arrays.array_page import bent as bent_mesh
@@ -80,7 +81,7 @@ def test_a_sheet_longer_than_its_way_round_is_refused(template: str, overrides: 
 
 def test_the_bent_sheet_has_the_flat_ones_volume() -> None:
     """Pappus: round its own middle a plate keeps its volume. The ends meet but for what is left between them."""
-    moulds = patch_moulds(load_array("wrist-band"))
+    moulds = made("wrist-band")
     array, drawn = moulds.arranged, moulds.arranged.sheet
     x0, y0, x1, y1 = drawn.outline
     plate = realise(box(x0, x1, y0, y1, drawn.low, drawn.high), 24)
@@ -96,7 +97,7 @@ def test_the_bent_sheet_has_the_flat_ones_volume() -> None:
     chord = 2 * bent.middle_radius * math.sin(bent.ends / 2 / bent.middle_radius)
     assert math.dist(*ends) == pytest.approx(chord, rel=1e-6)
     assert "pictures/patch-bent.png" in picture_names(moulds)
-    assert "pictures/patch-bent.png" not in picture_names(patch_moulds(load_array("forearm-patch")))
+    assert "pictures/patch-bent.png" not in picture_names(made("forearm-patch"))
 
 
 def test_a_bent_sheet_stretches_and_c310_compares_it() -> None:

@@ -23,7 +23,7 @@ from unitcad.arrays.circuit import (
     pad_table,
     wiring,
 )
-from unitcad.errors import Missing, Refusal
+from unitcad.errors import Refusal
 from unitcad.shape import Profile, exact_volume, mm
 from unitcad.shape.profile import arc_centre, points, sides
 
@@ -125,12 +125,6 @@ def test_the_dxf_holds_the_outline_exactly_and_has_the_same_bytes_again() -> Non
     time.sleep(1.1)
     assert circuit_dxf(wiring(made("hexagon")), outline(made("hexagon"))) == data
     assert not ezdxf.options.write_fixed_meta_data_for_testing
-
-
-def test_without_ezdxf_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "ezdxf", None)
-    with pytest.raises(Missing, match="dxf"):
-        circuit_dxf(wiring(ARRAYS["grid"]), outline(ARRAYS["grid"]))
 
 
 def test_the_kicad_board_has_one_closed_edge() -> None:

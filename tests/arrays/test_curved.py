@@ -3,38 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import partial
 
 import pytest
 
-from tests.moulds.faulty_sets import mesh_findings
+from tests.arrays.made_arrays import Change, findings, less, made, more, notch, refusal_of, with_tool
+from tests.moulds.faulty_sets import broken, mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import curved_procedure
-from unitcad.arrays.patch import PatchMoulds, patch_moulds
+from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.procedure import Procedure
-from unitcad.checks import check_moulds, mould_checks
-from unitcad.errors import Refusal
+from unitcad.checks import mould_checks
 from unitcad.moulds.pieces import CAST, Removal
-from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
+from unitcad.shape import Shape, box, cut, cylinder, moved, rotated
 
-Change = Callable[[Shape], Shape]
 R = 40.0
 
 
-@cache
-def sleeve(*overrides: str) -> PatchMoulds:
-    return patch_moulds(load_array("sleeve-curved", overrides))
-
-
-def pair() -> PatchMoulds:
-    """Two units side by side: what is quick to judge."""
-    return sleeve("layout.columns=2", "layout.rows=1")
+sleeve = partial(made, "sleeve-curved")
+pair = partial(sleeve, "layout.columns=2", "layout.rows=1")
+"""Two units side by side: what is quick to judge."""
 
 
 def test_every_mould_check_holds() -> None:
-    found = check_moulds(sleeve())
+    found = findings("sleeve-curved")
     assert [f for f in found if not f.ok] == []
     assert {f.code for f in found} == set(mould_checks())
     assert max(f.value for f in found if f.code == "C100") < 1e-6
@@ -61,8 +54,7 @@ SLOTS = {
 @pytest.mark.long
 @pytest.mark.parametrize("data", [HEX, SLOTS], ids=["hex", "strap slots"])
 def test_every_mould_check_holds_on_other_layouts(data: dict[str, object]) -> None:
-    findings = check_moulds(patch_moulds(load_array(data)))
-    assert [f for f in findings if not f.ok] == []
+    assert broken(patch_moulds(load_array(data))) == set()
 
 
 def test_every_tool_prints_without_support() -> None:
@@ -98,12 +90,6 @@ def test_the_silicone_has_the_volume_of_its_lengths() -> None:
                     total += math.sqrt(low**2 - x**2) - R - top
         return total * (2 * outer / n) ** 2
 
-    def notch(inner: float, outer: float, half: float = 1.7) -> float:
-        def inside(r: float) -> float:
-            return half * math.sqrt(r**2 - half**2) + r**2 * math.asin(half / r)
-
-        return inside(outer) - inside(inner)
-
     rings = 9 * (under(5.75, 7, 0) + under(0, 5.75, 3.36)) - 12 * notch(5.75, 7) * 2.11
     assert layer2 == pytest.approx(barrel + rings, rel=2e-3)
     assert layer1 == pytest.approx(
@@ -121,20 +107,6 @@ def test_each_unit_stands_where_its_arc_is() -> None:
         x, y, z = (x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2 + R
         assert math.atan2(x, z) == pytest.approx(place.x / middle, abs=1e-9)
         assert (math.hypot(x, z), y) == (pytest.approx(R + 1.0, abs=2e-3), pytest.approx(place.y, abs=1e-9))
-
-
-def with_tool(name: str, change: Change) -> PatchMoulds:
-    plan = pair().plan
-    tools = tuple(replace(tool, shape=change(tool.shape)) if tool.name == name else tool for tool in plan.tools)
-    return patch_moulds(pair().arranged, replace(plan, tools=tools))
-
-
-def less(*tools: Shape) -> Change:
-    return lambda shape: cut(shape, tools)
-
-
-def more(*parts: Shape) -> Change:
-    return lambda shape: union((shape, *parts))
 
 
 def at(shape: Shape, degrees: float) -> Shape:
@@ -160,7 +132,7 @@ FAULTS: list[tuple[str, str, str, Change]] = [
 
 @pytest.mark.parametrize(("code", "tool", "what", "change"), FAULTS, ids=[f"{f[0]}-{f[1]}-{f[2]}" for f in FAULTS])
 def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Change) -> None:
-    faulty = mould_checks()[code].findings(with_tool(tool, change))
+    faulty = mould_checks()[code].findings(with_tool(pair(), tool, change))
     assert not all(f.ok for f in faulty), what
 
 
@@ -182,8 +154,8 @@ def test_a_wrong_axis_or_an_impossible_order_is_caught() -> None:
     ):
         steps = [first, last]
         steps[index] = replace(steps[index], removals=removals)
-        findings = mould_checks()["C300"].findings(patch_moulds(pair().arranged, replace(plan, steps=tuple(steps))))
-        assert any(caught in f.where for f in findings if not f.ok), caught
+        found = mould_checks()["C300"].findings(patch_moulds(pair().arranged, replace(plan, steps=tuple(steps))))
+        assert any(caught in f.where for f in found if not f.ok), caught
 
 
 def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap() -> None:
@@ -194,85 +166,47 @@ def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap() -> None:
     assert any("layer1 laid in" in f.where for f in mould_checks()["C200"].findings(moulds) if not f.ok)
 
 
-@pytest.mark.parametrize(
-    ("override", "field"),
-    [
-        ("limb.radius_mm=20", "limb.radius_mm"),
-        ("limb.radius_mm=27", "limb.radius_mm"),
-        ("unit=single-encapsulating", "limb.cast"),
-        ("unit=embedded", "unit.design"),
-        ("sheet.thickness_mm=4", "sheet.thickness_mm"),
-        ("moulds.bed_z_mm=20", "moulds.bed_z_mm"),
-    ],
-)
-def test_what_can_not_be_cast_is_refused_with_what_would(override: str, field: str) -> None:
-    with pytest.raises(Refusal) as refused:
-        patch_moulds(load_array("sleeve-curved", [override])).plan  # noqa: B018
-    assert refused.value.field == field
-    assert refused.value.nearest is not None or field == "unit.design"
-    if field != "unit.design":
-        kept = f"{field}={refused.value.nearest}"
-        assert patch_moulds(load_array("sleeve-curved", [override, kept])).plan
-
-
 @pytest.fixture(scope="module")
-def made() -> Procedure:
+def procedure() -> Procedure:
     moulds = sleeve()
     return curved_procedure(moulds, [moulds.mesh(body).volume() for body in moulds.unit], 1000.0)
 
 
-def test_layer_1_is_taken_out_and_laid_in_before_the_rest_is_injected(made: Procedure) -> None:
-    first, last = ([step.title for step in pour.steps] for pour in made.pours)
+def test_layer_1_is_taken_out_and_laid_in_before_the_rest_is_injected(procedure: Procedure) -> None:
+    first, last = ([step.title for step in pour.steps] for pour in procedure.pours)
     assert first[-1] == "Cup 1 off"
     order = ["Layer 1 out", "Filament into base 2", "Wipe Layer 1", "Lay Layer 1 in", "Lid 2 on", "Inject", "Cure"]
     assert [title for title in last if title in order] == order
     assert last[-1] == "Lid 2 off"
-    assert [step.title for step in made.release] == ["Filament out", "Peel off"]
-    assert made.time_line[-1].name == "motors and circuit in"
+    assert [step.title for step in procedure.release] == ["Filament out", "Peel off"]
+    assert procedure.time_line[-1].name == "motors and circuit in"
     # What is cast flat bonds later.
-    assert all(pour.agent == () for pour in made.pours)
-    assert "No release agent" in next(step.text for step in made.pours[0].steps if step.title == "Cup 1 on")
+    assert all(pour.agent == () for pour in procedure.pours)
+    assert "No release agent" in next(step.text for step in procedure.pours[0].steps if step.title == "Cup 1 on")
 
 
-def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> None:
+def test_what_is_weighed_and_bought_is_that_of_both_pours(procedure: Procedure) -> None:
     volumes = [sleeve().mesh(body).volume() for body in sleeve().unit]
     # A sprue of 3 mm and four vents of 1 mm through the lid's 3 mm, and 0.25 mm into the sheet: the vents, which stand
     # 2.5 degrees aside, that far below its back at their outer edges.
     back = sleeve().array.radius_mm + sleeve().array.sheet.high
     lower = back - math.sqrt(back**2 - (back * math.sin(math.radians(2.5)) + 0.5) ** 2)
     volumes[1] += math.pi * (1.5**2 * 3.25 + 4 * 0.5**2 * (3.25 + lower))
-    for pour, volume in zip(made.pours, volumes, strict=True):
+    for pour, volume in zip(procedure.pours, volumes, strict=True):
         net, density = (
             next(f.value for f in pour.figures if f.name == name) for name in ("in the cavities, net", "density")
         )
         assert net == pytest.approx(volume * density / 1000, rel=1e-6)
-    items = {item.item: item.quantity for item in made.bill}
+    items = {item.item: item.quantity for item in procedure.bill}
     assert items["filament"] == items["filament, straight"] == 9
     assert (items["syringe"], items["flexible circuit"], items["lid 2"]) == (1, 1, 1)
     assert (items["degassing container"], items["narrow pliers"]) == (1, 1)
     assert "flat pliers" not in items  # for tongues that are cut
 
 
-def test_pockets_are_cast_flat() -> None:
-    asked = load_array("forearm-pockets").asked
-    with pytest.raises(Refusal) as refused:
-        load_array({**asked, "limb": {"radius_mm": 40.0, "cast": "curved"}})
-    assert (refused.value.field, refused.value.nearest) == ("limb.cast", "flat")
-
-
-@pytest.mark.parametrize(
-    ("overrides", "field"),
-    [(["layout.rows=12"], "layout.rows"), (["layout.rows=6", "moulds.bed_y_mm=100"], "moulds.bed_y_mm")],
-)
-def test_curved_tools_beyond_the_bed_are_refused_with_the_rows_or_the_bed_that_fit(
-    overrides: list[str], field: str
-) -> None:
-    """Rows where the bed is the printer's, the bed where the file asks for a smaller one; a row more does not fit."""
-    with pytest.raises(Refusal) as refused:
-        patch_moulds(load_array("sleeve-curved", overrides)).plan  # noqa: B018
-    fits = refused.value.nearest
-    assert refused.value.field == field
-    assert patch_moulds(load_array("sleeve-curved", [*overrides, f"{field}={fits}"])).plan
-    if field == "layout.rows":
-        with pytest.raises(Refusal):
-            patch_moulds(load_array("sleeve-curved", [f"layout.rows={int(str(fits)) + 1}"])).plan  # noqa: B018
+def test_curved_tools_beyond_the_bed_are_refused_with_the_rows_that_fit() -> None:
+    """A row more does not fit."""
+    refused = refusal_of("sleeve-curved", ["layout.rows=12"])
+    assert refused.field == "layout.rows"
+    assert made("sleeve-curved", f"layout.rows={refused.nearest}").plan
+    refusal_of("sleeve-curved", [f"layout.rows={int(str(refused.nearest)) + 1}"])

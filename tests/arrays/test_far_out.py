@@ -14,7 +14,7 @@ from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.arrays.sheet import slot_profile
 from unitcad.checks import check_moulds
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import UnitcadError
 
 
 @pytest.mark.parametrize("height", [2.0, 3 - 1 / 1024, 3.0, 3 + 1 / 1024, 4.0])
@@ -43,30 +43,6 @@ MADE: list[tuple[str, dict[str, Any]]] = [
 @pytest.mark.parametrize(("name", "changes"), MADE)
 def test_what_is_rare_is_made(name: str, changes: dict[str, Any]) -> None:
     assert patch_moulds(load_array(name, changes)).plan
-
-
-REFUSED: list[tuple[str, dict[str, Any], str, object]] = [
-    ("forearm-pockets", {"sheet.strap_slot_mm": [0.1, 5]}, "sheet.strap_slot_mm.0", 0.8),
-    ("forearm-patch", {"sheet.strap_slot_mm": [5, 0.1]}, "sheet.strap_slot_mm.1", 0.8),
-    ("forearm-patch", {"moulds.bed_x_mm": 57}, "moulds.bed_x_mm", 58.9),
-    ("sleeve-curved", {"limb.radius_mm": 500}, "limb.radius_mm", 339.7),
-    ("sleeve-curved", {"limb.radius_mm": 5000}, "limb.radius_mm", 339.7),
-    ("hex-19", {"layout.pitch_mm": 500}, "layout.pitch_mm", 370),
-    ("hex-19", {"layout.pitch_mm": 1e9}, "layout.pitch_mm", 370),
-    ("forearm-pockets", {"layout.pitch_mm": [20, 900]}, "layout.pitch_mm.1", 740),
-    ("forearm-pockets", {"sheet.strap_slot_mm": [1000, 20]}, "sheet.strap_slot_mm.0", 715),
-    ("wrist-band", {"limb.radius_mm": 1000}, "limb.radius_mm", None),
-]
-
-
-@pytest.mark.parametrize(("name", "changes", "field", "nearest"), REFUSED)
-def test_what_can_not_be_made_is_refused(name: str, changes: dict[str, Any], field: str, nearest: object) -> None:
-    with pytest.raises(Refusal) as refused:
-        patch_moulds(load_array(name, changes)).plan  # noqa: B018
-    assert refused.value.field == field
-    if nearest is not None:
-        assert refused.value.nearest == nearest
-    assert isinstance(refused.value.nearest, float)
 
 
 NUMBERS = {

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import pytest
 
-from unitcad.arrays.array_file import load_array
+from tests.arrays.made_arrays import Change, findings, less, made, more, with_tool
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
 from unitcad.checks import check_moulds, overlap
 from unitcad.checks.finding import MouldFinding
-from unitcad.shape import Shape, box, cut, cylinder, moved, union
-
-Change = Callable[[Shape], Shape]
+from unitcad.shape import box, cylinder, moved
 
 
 def findings_of_each_cell(moulds: PatchMoulds, monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
@@ -33,33 +28,33 @@ def shown(finding: MouldFinding) -> tuple:
 
 @pytest.mark.parametrize("name", ["wrist-band", pytest.param("sleeve-curved", marks=pytest.mark.long)])
 def test_an_array_has_the_findings_that_each_cell_has_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    moulds = patch_moulds(load_array(name))
+    moulds = made(name)
     assert len(set(moulds.cells[0])) < len(moulds.cells[0])
-    assert [shown(f) for f in check_moulds(moulds)] == findings_of_each_cell(moulds, monkeypatch)
+    assert [shown(f) for f in findings(name)] == findings_of_each_cell(moulds, monkeypatch)
 
 
 def test_the_rows_of_a_patch_are_alike() -> None:
     """A row's units differ in the ways of the circuit, left, right or both, and in nothing else."""
-    cells = patch_moulds(load_array("forearm-patch")).cells
+    cells = made("forearm-patch").cells
     assert cells[0] == cells[1]
     assert [cells[0].index(number) for number in cells[0]] == [0, 1, 2] * 3
 
 
 def test_pours_between_which_layers_are_laid_in_elsewhere_have_surroundings_of_their_own() -> None:
-    flat, curved = patch_moulds(load_array("sleeve-curved")).surroundings
+    flat, curved = made("sleeve-curved").surroundings
     assert [len(each.steps) for each in (flat, curved)] == [1, 1]
-    one, other = patch_moulds(load_array("forearm-patch")).surroundings
+    one, other = made("forearm-patch").surroundings
     assert one is other
 
 
 # Units stand at -20, 0 and 20 both ways: bores of 5.75, cores of 4.6, 2.11 high.
 FAULTS: dict[str, tuple[str, str, Change]] = {
-    "a lump in the bore of the middle": ("C100", "cup1", lambda s: union((s, box(-0.4, 0.4, 5.5, 6, 1, 2)))),
-    "a core of the middle 0.2 too high": ("C200", "base", lambda s: union((s, cylinder(3, 0, 2.31)))),
-    "a leak between two cells": ("C100", "cup1", lambda s: cut(s, [box(4, 16, 2.5, 3.1, 1, 2)])),
-    "a hole under a cell": ("C100", "base", lambda s: cut(s, [moved(cylinder(0.2, -9, 1), 25, 20)])),
-    "a knob on a core": ("C300", "base", lambda s: union((s, moved(cylinder(4.7, 1.0, 1.4), 20, 20)))),
-    "a lip in the last cup's bore": ("C200", "cup2", lambda s: union((s, box(-7.2, -6.9, 19, 21, 2.5, 2.8)))),
+    "a lump in the bore of the middle": ("C100", "cup1", more(box(-0.4, 0.4, 5.5, 6, 1, 2))),
+    "a core of the middle 0.2 too high": ("C200", "base", more(cylinder(3, 0, 2.31))),
+    "a leak between two cells": ("C100", "cup1", less(box(4, 16, 2.5, 3.1, 1, 2))),
+    "a hole under a cell": ("C100", "base", less(moved(cylinder(0.2, -9, 1), 25, 20))),
+    "a knob on a core": ("C300", "base", more(moved(cylinder(4.7, 1.0, 1.4), 20, 20))),
+    "a lip in the last cup's bore": ("C200", "cup2", more(box(-7.2, -6.9, 19, 21, 2.5, 2.8))),
 }
 
 
@@ -68,9 +63,7 @@ FAULTS: dict[str, tuple[str, str, Change]] = {
 )
 def test_a_fault_at_one_cell_is_found_as_if_each_were_judged(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     code, tool, change = FAULTS[fault]
-    plan = patch_moulds(load_array("forearm-patch")).plan
-    tools = tuple(replace(each, shape=change(each.shape)) if each.name == tool else each for each in plan.tools)
-    moulds = patch_moulds(load_array("forearm-patch"), replace(plan, tools=tools))
+    moulds = with_tool(made("forearm-patch"), tool, change)
     found = [shown(finding) for finding in check_moulds(moulds)]
     assert code in {each[0] for each in found if not each[2]}
     assert found == findings_of_each_cell(moulds, monkeypatch)

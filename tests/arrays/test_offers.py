@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from tests.arrays.made_arrays import refusal_of
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.errors import Refusal
@@ -23,10 +24,58 @@ _POINTS = {**_SHEET, "unit": "embedded", "layout": {"kind": "list", "points_mm":
 _RESIN = {"moulds.printer": "sla"}
 
 
-def refusal_of(source: Any, changes: dict[str, Any]) -> Refusal:
-    with pytest.raises(Refusal) as refused:
-        patch_moulds(load_array(source, changes)).plan  # noqa: B018
-    return refused.value
+TWELVE = {"layout.columns": 12, "moulds.cavities": [1, 1], "moulds.bed_x_mm": 30}
+OFFERED: list[tuple[str, dict[str, Any], str]] = [
+    ("forearm-patch", {"layout.pitch_mm": 15}, "layout.pitch_mm"),
+    ("forearm-patch", {"sheet.thickness_mm": 2}, "sheet.thickness_mm"),
+    ("forearm-patch", {"moulds.pour": "injected"}, "moulds.pour"),
+    ("forearm-patch", {"moulds.bed_x_mm": 30}, "moulds.bed_x_mm"),
+    ("sleeve-curved", {"limb.radius_mm": 20}, "limb.radius_mm"),
+    ("sleeve-curved", {"limb.radius_mm": 27}, "limb.radius_mm"),
+    ("sleeve-curved", {"unit": "single-encapsulating"}, "limb.cast"),
+    ("sleeve-curved", {"sheet.thickness_mm": 4}, "sheet.thickness_mm"),
+    ("sleeve-curved", {"moulds.bed_z_mm": 20}, "moulds.bed_z_mm"),
+    ("sleeve-curved", {"layout.rows": 6, "moulds.bed_y_mm": 100}, "moulds.bed_y_mm"),
+    ("wrist-band", {"moulds.bed_x_mm": 40}, "moulds.bed_x_mm"),
+    ("wrist-band", {"moulds.bed_y_mm": 40}, "moulds.bed_y_mm"),
+    ("hex-19", {"moulds.bed_x_mm": 30}, "moulds.bed_x_mm"),
+    ("hex-19", {"moulds.bed_x_mm": 60}, "moulds.bed_x_mm"),
+    ("hex-19", {"moulds.bed_y_mm": 20}, "moulds.bed_y_mm"),
+    ("forearm-pockets", {"moulds.bed_y_mm": 60}, "moulds.bed_y_mm"),  # a strap slot as long as two rows
+    ("forearm-pockets", TWELVE, "moulds.bed_x_mm"),
+]
+
+
+@pytest.mark.parametrize(("name", "changes", "field"), OFFERED)
+def test_what_can_not_be_cast_is_refused_with_what_would(name: str, changes: dict[str, Any], field: str) -> None:
+    refused = refusal_of(name, changes)
+    assert refused.field == field
+    assert patch_moulds(load_array(name, {**changes, field: refused.nearest})).plan
+    if changes == {"moulds.bed_x_mm": 60}:
+        assert "silicone" in str(refused), "what the seams would take up"
+
+
+REFUSED: list[tuple[str, dict[str, Any], str, object]] = [
+    ("forearm-patch", {"unit": "embedded"}, "unit.design", "encapsulating"),
+    ("forearm-patch", {"unit": "no-fpcb"}, "unit.fpcb", None),
+    ("sleeve-curved", {"unit": "embedded"}, "unit.design", "encapsulating"),
+    ("forearm-pockets", {"sheet.strap_slot_mm": [0.1, 5]}, "sheet.strap_slot_mm.0", 0.8),
+    ("forearm-patch", {"sheet.strap_slot_mm": [5, 0.1]}, "sheet.strap_slot_mm.1", 0.8),
+    ("forearm-patch", {"moulds.bed_x_mm": 57}, "moulds.bed_x_mm", 58.9),
+    ("sleeve-curved", {"limb.radius_mm": 500}, "limb.radius_mm", 339.7),
+    ("sleeve-curved", {"limb.radius_mm": 5000}, "limb.radius_mm", 339.7),
+    ("hex-19", {"layout.pitch_mm": 500}, "layout.pitch_mm", 370),
+    ("hex-19", {"layout.pitch_mm": 1e9}, "layout.pitch_mm", 370),
+    ("forearm-pockets", {"layout.pitch_mm": [20, 900]}, "layout.pitch_mm.1", 740),
+    ("forearm-pockets", {"sheet.strap_slot_mm": [1000, 20]}, "sheet.strap_slot_mm.0", 715),
+    ("wrist-band", {"limb.radius_mm": 1000}, "limb.radius_mm", 263.395),
+]
+
+
+@pytest.mark.parametrize(("name", "changes", "field", "nearest"), REFUSED)
+def test_what_can_not_be_made_is_refused(name: str, changes: dict[str, Any], field: str, nearest: object) -> None:
+    refused = refusal_of(name, changes)
+    assert (refused.field, refused.nearest) == (field, nearest)
 
 
 def named(limit: str, before: str, after: str) -> dict[str, Any]:
@@ -148,12 +197,6 @@ def test_of_beds_a_tenth_less_than_the_one_offered_is_refused(bed: float) -> Non
     assert refusal_of("forearm-patch", {"moulds.bed_x_mm": bed}).nearest == 58.9
     assert patch_moulds(load_array("forearm-patch", {"moulds.bed_x_mm": 58.9})).plan
     assert refusal_of("forearm-patch", {"moulds.bed_x_mm": 58.8}).field == "moulds.bed_x_mm"
-
-
-@pytest.mark.parametrize("name", ["forearm-pockets", "forearm-patch"])
-def test_a_strap_slot_as_long_as_wide_is_a_round_hole(name: str) -> None:
-    moulds = patch_moulds(load_array(name, {"sheet.strap_slot_mm": [3, 3]}))
-    assert moulds.plan
 
 
 def test_the_name_that_was_meant_is_offered_before_another_one() -> None:

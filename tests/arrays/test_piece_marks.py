@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from unitcad.arrays.array_file import array_templates, load_array
-from unitcad.arrays.patch import patch_moulds
+from tests.arrays.made_arrays import made
+from unitcad.arrays.array_file import array_templates
 from unitcad.arrays.piece_seams import Strip, on_pieces
 from unitcad.kernels.mesh import realise
 from unitcad.moulds.cuts import straight
@@ -16,7 +16,7 @@ from unitcad.shape.lettering import engraving, seen
 
 @pytest.mark.parametrize("name", array_templates())
 def test_no_label_of_an_array_holds_a_mark(name: str) -> None:
-    label = patch_moulds(load_array(name)).plan.label
+    label = made(name).plan.label
     assert len(label) == 4
     assert not set(label) & set("BCDL")
 
@@ -30,7 +30,7 @@ def test_a_label_has_no_letter_of_a_mark_and_is_shown_as_it_is_engraved() -> Non
 
 def test_every_piece_of_a_split_tool_carries_mark_label_and_number() -> None:
     """The strokes that are cut away at each piece's rim are those of its own row of texts."""
-    moulds = patch_moulds(load_array("wrist-band"))
+    moulds = made("wrist-band")
     plan, lengths = moulds.plan, moulds.spec.moulds
     for split in plan.splits:
         top = plan.steps[split.pieces[0].step - 1].rim if split.pieces[0].step else 0.0

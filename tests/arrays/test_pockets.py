@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from tests.moulds.faulty_sets import mesh_findings
+from tests.arrays.made_arrays import findings, made
+from tests.moulds.faulty_sets import broken, mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.constructions import constructions
 from unitcad.arrays.patch import patch_moulds
@@ -23,17 +24,13 @@ POCKETS = ["forearm-pockets", "hex-19"]
 
 @pytest.mark.parametrize("name", POCKETS)
 def test_every_mould_check_holds(name: str) -> None:
-    moulds = patch_moulds(load_array(name))
-    findings = check_moulds(moulds)
-    assert [f for f in findings if not f.ok] == []
-    assert {f.code for f in findings} >= {"C000", "C100", "C200", "C300", "C310", "C400", "C410"}
+    moulds, found = made(name), findings(name)
+    assert [f for f in found if not f.ok] == []
+    assert {f.code for f in found} >= {"C000", "C100", "C200", "C300", "C310", "C400", "C410"}
+    assert [f for f in found if f.code == "C200" and "sheet" in f.where], "the hold alone is shared"
+    assert mesh_findings(moulds) == []
     (cavity,) = moulds.cavities
     assert cavity.reached.volume() == pytest.approx(moulds.mesh(moulds.unit[0]).volume(), rel=BALANCE)
-
-
-@pytest.mark.parametrize("name", POCKETS)
-def test_every_tool_prints_without_support(name: str) -> None:
-    assert mesh_findings(patch_moulds(load_array(name))) == []
 
 
 def test_a_pocket_is_smaller_than_its_unit_by_the_hold() -> None:
@@ -74,14 +71,7 @@ def test_a_tail_that_leaves_at_the_sheet_is_refused() -> None:
     with pytest.raises(Refusal, match="leave at the sheet's height") as refused:
         load_array(_of("custom/film-closed", sheet={"thickness_mm": 3.3}))
     assert refused.value.field == "unit"
-    assert [f for f in check_moulds(patch_moulds(load_array(_of("custom/film-closed")))) if not f.ok] == []
-
-
-@pytest.mark.parametrize("name", POCKETS)
-def test_finished_units_share_space_with_nothing_but_the_hold(name: str) -> None:
-    found = [f for f in check_moulds(patch_moulds(load_array(name))) if f.code == "C200" and "sheet" in f.where]
-    assert found
-    assert all(f.ok for f in found)
+    assert broken(patch_moulds(load_array(_of("custom/film-closed")))) == set()
 
 
 def test_units_that_meet_each_other_or_the_sheet_are_caught() -> None:
@@ -112,13 +102,13 @@ def test_a_fault_in_the_tray_is_caught(code: str, what: str, change: Any) -> Non
     plan = constructions()["pockets"].plan(array)
     base: Shape = change(plan.tools[0].shape)
     altered = replace(plan, tools=(replace(plan.tools[0], shape=base), *plan.tools[1:]))
-    assert code in {f.code for f in check_moulds(patch_moulds(array, altered)) if not f.ok}
+    assert code in broken(patch_moulds(array, altered))
 
 
 @pytest.mark.parametrize("thickness", [0.6, 0.8, 1.0, 1.5])
 def test_the_groove_of_a_low_tray_is_whole(thickness: float) -> None:
     array = load_array("forearm-pockets", [f"sheet.thickness_mm={thickness}", "unit='single-embedded'"])
-    assert [f for f in check_moulds(patch_moulds(array)) if not f.ok] == []
+    assert broken(patch_moulds(array)) == set()
 
 
 def test_letters_as_deep_as_a_shallow_groove_are_no_groove() -> None:
@@ -126,19 +116,11 @@ def test_letters_as_deep_as_a_shallow_groove_are_no_groove() -> None:
     layout = {"kind": "grid", "columns": 1, "rows": 3, "pitch_mm": 17.54}
     data = {"name": "narrow", "array": "pockets", "unit": "encapsulating", "layout": layout}
     moulds = patch_moulds(load_array({**data, "moulds": {"groove_depth_mm": 0.3}}))
-    assert [f for f in check_moulds(moulds) if not f.ok] == []
-
-
-def test_a_tray_whose_pieces_exceed_the_bed_is_refused_with_the_bed_that_fits() -> None:
-    array = load_array("forearm-pockets", ["layout.columns=12", "moulds.bed_x_mm=30", "moulds.cavities=[1,1]"])
-    with pytest.raises(Refusal) as refused:
-        patch_moulds(array).plan  # noqa: B018
-    assert refused.value.field == "moulds.bed_x_mm"
-    assert patch_moulds(load_array(array, [f"moulds.bed_x_mm={refused.value.nearest}"])).plan
+    assert broken(moulds) == set()
 
 
 def test_a_unit_with_an_open_notch_is_held_under_its_tail() -> None:
     array = load_array("forearm-pockets", ['unit="single-embedded"', "sheet.thickness_mm=1.2"])
     low, high = array.sheet.low, array.sheet.high
     assert high - low == pytest.approx(1.2, abs=1e-3)
-    assert [f for f in check_moulds(patch_moulds(array)) if not f.ok] == []
+    assert broken(patch_moulds(array)) == set()

@@ -6,15 +6,9 @@ from typing import Any
 
 import pytest
 
+from tests.arrays.made_arrays import refusal_of
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.patch import patch_moulds
-from unitcad.errors import Refusal, unknown_key, unknown_name
-
-
-def refusal_of(source: Any, changes: list[str]) -> Refusal:
-    with pytest.raises(Refusal) as refused:
-        patch_moulds(load_array(source, changes)).plan  # noqa: B018
-    return refused.value
+from unitcad.errors import unknown_key, unknown_name
 
 
 def test_a_distance_just_too_small_is_told_with_enough_digits() -> None:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import partial
 from itertools import pairwise
 
 import pytest
 
-from tests.moulds.faulty_sets import mesh_findings
+from tests.arrays.made_arrays import findings, made
+from tests.moulds.faulty_sets import broken, mesh_findings
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.array_procedure import back_sheet_procedure
-from unitcad.arrays.patch import PatchMoulds, patch_moulds
-from unitcad.checks import check_moulds, mould_checks
+from unitcad.arrays.patch import patch_moulds
+from unitcad.checks import mould_checks
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
 from unitcad.moulds.cuts import FLANK_DEG, LARGE, ROUND, Feature, Seam, Sized, in_gaps, seams, split, straight
@@ -22,18 +23,18 @@ from unitcad.moulds.pieces import base_piece
 from unitcad.pipeline.plan import file_stem
 from unitcad.shape import Common, Shape, box, cut, moved, union
 
-
-@cache
-def band() -> PatchMoulds:
-    return patch_moulds(load_array("wrist-band"))
+band = partial(made, "wrist-band")
 
 
 def test_every_mould_check_holds_on_a_band_of_eight() -> None:
-    findings = check_moulds(band())
-    assert [f for f in findings if not f.ok] == []
-    assert {f.code for f in findings} == set(mould_checks())
-    assert max(f.value for f in findings if f.code == "C100") < 1e-6
+    found = findings("wrist-band")
+    assert [f for f in found if not f.ok] == []
+    assert {f.code for f in found} == set(mould_checks())
+    assert max(f.value for f in found if f.code == "C100") < 1e-6
+    assert mesh_findings(band()) == []
     plan = band().plan
+    stems = [file_stem(body) for body in plan.pieces]
+    assert stems[:6] == ["base-1", "base-2", "step1-cup-1", "step1-cup-2", "step2-cup-1", "step2-cup-2"]
     assert {s.tool: len(s.pieces) for s in plan.splits} == {"base": 2, "cup1": 2, "cup2": 2}
     # No seam of a cup lies over the base's; every piece of either stands on two pins or more.
     base, *cups = ([seam.at for seam in s.seams] for s in plan.splits)
@@ -45,23 +46,17 @@ def test_every_mould_check_holds_on_a_band_of_eight() -> None:
             assert sum(x0 < x < x1 for x, _ in plan.pins.places) >= 2
 
 
-def test_every_piece_prints_without_support() -> None:
-    assert mesh_findings(band()) == []
-    stems = [file_stem(body) for body in band().plan.pieces]
-    assert stems[:6] == ["base-1", "base-2", "step1-cup-1", "step1-cup-2", "step2-cup-1", "step2-cup-2"]
-
-
 def test_the_gap_is_the_play_times_the_line() -> None:
     """A plate with two seams: the pieces have its volume but for the line's length x play x height."""
     play, height, width = 0.15, 5.0, 40.0
     plate = base_piece(box(-150, 150, -width / 2, width / 2, 0, height))
-    made = split(plate, [straight(at, [(-19, 19)], play) for at in (-80, 70.5)])
-    assert len(made.seams[0].teeth) == 3
+    drawn = split(plate, [straight(at, [(-19, 19)], play) for at in (-80, 70.5)])
+    assert len(drawn.seams[0].teeth) == 3
     flank, turn = LARGE.depth / math.cos(math.radians(FLANK_DEG)), math.radians(90 + FLANK_DEG)
     tip = LARGE.neck + 2 * LARGE.depth * math.tan(math.radians(FLANK_DEG))
     rounded = 4 * ROUND * (turn - 2 * math.tan(turn / 2))
     length = width + 3 * (tip - LARGE.neck + 2 * flank + rounded)
-    solids = [realise(piece.shape, 96) for piece in made.pieces]
+    solids = [realise(piece.shape, 96) for piece in drawn.pieces]
     gap = 300 * width * height - sum(solid.volume() for solid in solids)
     assert gap == pytest.approx(2 * length * play * height, rel=2e-3)
     # Moved along x by the play, a flank would be nearer by its slope: 0.075 mm.
@@ -162,27 +157,6 @@ def test_cuts_are_few_and_clear_and_a_bed_too_small_names_the_least() -> None:
         cut_at(refused.value.nearest - 0.2)
 
 
-@pytest.mark.parametrize(
-    ("template", "overrides", "field"),
-    [
-        ("wrist-band", ["moulds.bed_x_mm=40"], "moulds.bed_x_mm"),
-        ("wrist-band", ["moulds.bed_y_mm=40"], "moulds.bed_y_mm"),
-        ("hex-19", ["moulds.bed_x_mm=30"], "moulds.bed_x_mm"),
-        ("hex-19", ["moulds.bed_y_mm=20"], "moulds.bed_y_mm"),
-        # A strap slot as long as two rows.
-        ("forearm-pockets", ["moulds.bed_y_mm=60"], "moulds.bed_y_mm"),
-    ],
-)
-def test_what_can_not_be_split_is_refused_with_the_bed_that_would_do(
-    template: str, overrides: list[str], field: str
-) -> None:
-    with pytest.raises(Refusal) as refused:
-        patch_moulds(load_array(template, overrides)).plan  # noqa: B018
-    assert refused.value.field == field
-    kept = [each for each in overrides if not each.startswith(field)]
-    assert patch_moulds(load_array(template, [*kept, f"{field}={refused.value.nearest}"])).plan
-
-
 def test_a_long_tray_is_split_too() -> None:
     moulds = patch_moulds(
         load_array("forearm-pockets", ["layout.columns=12", "layout.rows=1", "sheet.strap_slot_mm=[3,8]"])
@@ -213,14 +187,17 @@ def test_the_procedure_joins_and_seals_before_the_first_pour() -> None:
     assert not {"base", "cup 1", "cup 2"} & items
 
 
-@pytest.mark.parametrize(
-    ("like", "columns", "pitch"), [("motor-10mm", 10, 25), ("motor-10mm", 10, 24), ("encapsulating", 12, 23)]
-)
+OTHER_TAPES = [
+    pytest.param(*case, marks=pytest.mark.long) for case in (("motor-10mm", 10, 24), ("encapsulating", 12, 23))
+]
+
+
+@pytest.mark.parametrize(("like", "columns", "pitch"), [("motor-10mm", 10, 25), *OTHER_TAPES])
 def test_a_groove_that_stops_at_a_seam_leaves_no_slit(like: str, columns: int, pitch: int) -> None:
     """A seam's tooth and a notch's window stop the groove between them: a slit of 0.031 mm stayed beside a tape's."""
     layout = {"kind": "grid", "columns": columns, "rows": 1, "pitch_mm": pitch}
     data = {"name": "tape", "array": "back-sheet", "unit": {"like": like}, "layout": layout}
     moulds = patch_moulds(load_array(data))
     assert len(moulds.plan.splits) == 3
-    assert [f for f in check_moulds(moulds) if not f.ok] == []
+    assert broken(moulds) == set()
     assert mesh_findings(moulds) == []

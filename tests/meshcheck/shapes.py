@@ -110,6 +110,38 @@ def turned(
     return found[:, ::-1] if mirror else found
 
 
+def fin(*, other_diagonals: bool, cells: int = 1) -> np.ndarray:
+    """Two coincident sheets from the origin's upright edge outwards, 5 sqrt(2) by 10; `cells` quads each way."""
+    found = []
+    steps = np.linspace(0, 1, cells + 1)
+    for i in range(cells):
+        for j in range(cells):
+            ring = [np.array([-5 * s, -5 * s, 10 * t])
+                    for s, t in ((steps[i], steps[j]), (steps[i], steps[j + 1]),
+                                 (steps[i + 1], steps[j + 1]), (steps[i + 1], steps[j]))]  # fmt: skip
+            a, b, c, d = ring
+            found += [[a, b, c], [a, c, d]]
+            found += [[b, a, d], [b, d, c]] if other_diagonals else [[a, c, b], [a, d, c]]
+    return np.array(found)
+
+
+def surface(field: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The faces between cells of different winding number, as many as the numbers differ, with either diagonal."""
+    padded, found = np.pad(field, 1), []
+    for axis in range(3):
+        u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+        step = np.diff(padded, axis=axis)
+        for cell in np.argwhere(step):
+            corner = cell + np.eye(3)[axis]
+            ring = [corner, corner + u, corner + u + v, corner + v]
+            rise = step[tuple(cell)]
+            ring = ring[::-1] if rise > 0 else ring
+            for _ in range(abs(rise)):
+                k = int(rng.integers(0, 2))
+                found += [[ring[k], ring[k + 1], ring[k + 2]], [ring[k], ring[k + 2], ring[(k + 3) % 4]]]
+    return np.array(found)
+
+
 def mesh_xml(corners: np.ndarray = CUBE_CORNERS * 10, faces: np.ndarray = CUBE_FACES, per_face: str = "") -> str:
     """A <mesh> element."""
     points = "".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in corners)
@@ -157,6 +189,7 @@ def package(
     types: str | None = TYPES,
     rels: str | None = ROOT_RELS,
     more: Sequence[tuple[str, str | bytes]] = (),
+    at: str = "3D/3dmodel.model",
     compression: int = zipfile.ZIP_DEFLATED,
 ) -> bytes:
     """A 3MF package; `more` are further entries, written even if a name is there already."""
@@ -166,7 +199,7 @@ def package(
         entries.append(("[Content_Types].xml", types))
     if rels is not None:
         entries.append(("_rels/.rels", rels))
-    entries.append(("3D/3dmodel.model", model_xml() if model is None else model))
+    entries.append((at, model_xml() if model is None else model))
     with zipfile.ZipFile(out, "w", compression) as archive:
         for name, content in (*entries, *more):
             archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, compression)

@@ -155,18 +155,24 @@ def test_a_blank_that_xml_forbids_is_refused(blank: str) -> None:
         _confirm_equal(text, 10_000, 10_000)
 
 
+def _parsed(text: bytes) -> tuple[list[bytes], threemf_model.Model]:
+    """Return the pieces that the parser is given, and the model."""
+    model = threemf_model.Model("a")
+    reader, pieces = threemf_model._Reader(model, Limits(), 0), []
+
+    def watched() -> Any:
+        for piece in threemf_model.rest_for_parser([text], reader):
+            pieces.append(bytes(piece))
+            yield piece
+
+    threemf_model.stream(watched(), "a", reader.start, reader.end, reader.namespace, reader.parser)
+    return pieces, model
+
+
 def test_a_comment_full_of_tags_goes_to_the_parser_in_one_piece() -> None:
     """The parser looks through an unfinished comment again with every piece."""
     text = _model(f"<!--{20_000 * '<vertices>'}-->")
-    reader = threemf_model._Reader(threemf_model.Model("a"), Limits(), 0)
-    pieces = []
-
-    def watched(chunks: Any) -> Any:
-        for piece in threemf_model.rest_for_parser(chunks, reader):
-            pieces.append(piece)
-            yield piece
-
-    threemf_model.stream(watched([text]), "a", reader.start, reader.end, reader.namespace, reader.parser)
+    pieces, _ = _parsed(text)
     assert len(pieces) < 10
     assert b"".join(pieces) == text
 
@@ -175,25 +181,9 @@ def test_a_comment_full_of_tags_goes_to_the_parser_in_one_piece() -> None:
 def test_most_of_a_part_is_read_at_once(line_end: str) -> None:
     vertices = "".join(f'  <vertex x="{i}.5" y="-{i}" z="1e-{i % 9}"/>{line_end}' for i in range(5000))
     triangles = "".join(f'<triangle v1="{i}" v2="{i + 1}" v3="{i + 2}" />{line_end}' for i in range(4998))
-    text = (
-        f'<model xmlns="{schema.CORE}"><resources><object id="1"><mesh>{line_end}<vertices>{line_end}{vertices}'
-        f"</vertices><triangles>{triangles}</triangles></mesh></object></resources><build/></model>"
-    ).encode()
-    left = bytearray()
-
-    class Parsed(threemf_model._Reader):
-        pass
-
-    model = threemf_model.Model("a")
-    reader = Parsed(model, Limits(), 0)
-
-    def watched(chunks: Any) -> Any:
-        for piece in threemf_model.rest_for_parser(chunks, reader):
-            left.extend(piece)
-            yield piece
-
-    threemf_model.stream(watched([text]), "a", reader.start, reader.end, reader.namespace, reader.parser)
-    assert len(left.strip()) < 400 + text.count(b"\n")
+    text = _model(line_end + vertices, triangles)
+    pieces, model = _parsed(text)
+    assert len(b"".join(pieces).strip()) < 400 + text.count(b"\n")
     (mesh,) = (one.mesh for one in model.objects().values())
     assert mesh is not None
     assert np.array_equal(mesh.vertices[:, 2], [float(f"1e-{i % 9}") for i in range(5000)])

@@ -29,7 +29,7 @@ def cone(n: int, height: float = 30, cap: bool = True) -> Points:
 
 
 @pytest.mark.parametrize("cap", [True, False])
-@pytest.mark.parametrize("through", [None, 5.0, 0.3])
+@pytest.mark.parametrize("through", [None, 0.3])
 def test_faces_round_a_hub_are_judged_as_others_are(
     cap: bool, through: float | None, monkeypatch: pytest.MonkeyPatch, judge: Judge
 ) -> None:
@@ -106,7 +106,7 @@ def test_pairs_of_boxes_are_those_of_all_pairs_however_wide_a_level_is(monkeypat
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of memory there")
-@pytest.mark.parametrize("name", ["a.stl", "a.obj", "a.ply", "a.3mf", "a.glb"])
+@pytest.mark.parametrize("name", ["a.stl", "a.3mf"])
 def test_a_file_larger_than_the_memory_allows_is_refused_by_its_size(name: str, tmp_path: Path) -> None:
     with (tmp_path / name).open("wb") as file:
         file.truncate(260_000_000)

@@ -7,19 +7,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from exact_pairs import cross, dot, minus, point, reference
+from exact_pairs import counts, reference
 from shapes import CUBE_CORNERS, CUBE_FACES
 
-from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
+from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, meeting_pairs
 from unitcad.meshcheck import check_mesh
 from unitcad.meshcheck.geometry.predicates import (
     common_point,
-    coplanar,
     integers,
     meet,
-    orient2d,
-    orient2d_columns,
-    orient3d,
 )
 from unitcad.meshcheck.rules.f_file import Deadline
 from unitcad.meshcheck.rules.registry import explain
@@ -44,58 +40,6 @@ def test_triangles_meet_as_fractions_say(kind: str) -> None:
         assert expected == (bool(found.crosses[i]), bool(found.touches[i])), (a, b)
     assert compared > 500
     assert 20 < crossing < compared - 20
-
-
-def _sign(value: Fraction) -> int:
-    return (value > 0) - (value < 0)
-
-
-@pytest.mark.parametrize("scale", ["float32 near a plane", "float64 near a plane", "eighths on a plane", "wide range"])
-def test_orientation_is_never_wrong(scale: str) -> None:
-    rng = np.random.default_rng(3)
-    p = rng.normal(size=(4, 400, 3)) * (10.0 ** rng.uniform(-6, 6, (4, 400, 1)) if scale == "wide range" else 1)
-    if "near" in scale:
-        weight = rng.dirichlet([1, 1, 1], 400)
-        p[3] = sum(weight[:, k : k + 1] * p[k] for k in range(3))
-    if scale == "eighths on a plane":
-        p = np.round(p * 8) / 8
-        p[3] = p[0] + 2 * (p[1] - p[0]) - 3 * (p[2] - p[0])
-    if "float32" in scale:
-        p = p.astype(np.float32).astype(float)
-    found = orient3d(*p)
-    flat = orient2d(p[0, :, :2], p[1, :, :2], p[3, :, :2])
-    assert (orient2d_columns(p[0, :, :2].T, p[1, :, :2].T, p[3, :, :2].T) == flat).all()
-    for i in range(400):
-        a, b, c, d = (point(p[k, i]) for k in range(4))
-        u, v, w = minus(a, d), minus(b, d), minus(c, d)
-        assert found[i] == _sign(dot(cross(u, v), w))
-        s, t = minus(a, d), minus(b, d)
-        assert flat[i] == _sign(s[0] * t[1] - s[1] * t[0])
-    if scale == "eighths on a plane":
-        assert not found.any()
-
-
-def test_coplanar_overlap_by_counting_grid_points() -> None:
-    rng = np.random.default_rng(5)
-    corners = np.zeros((300, 2, 3, 3))
-    corners[..., :2] = rng.integers(0, 6, (300, 2, 3, 2))
-    area = _area(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
-    corners = corners[(area != 0).all(axis=1)]
-    share, _ = coplanar(corners[:, 0], corners[:, 1])
-    grid = np.stack(np.meshgrid(*[np.arange(0, 6, 0.02) + 0.0071] * 2), axis=-1).reshape(-1, 2)
-    inside = [[_inside(grid, triangle[:, :2]) for triangle in pair] for pair in corners]
-    counted = np.array([(a & b).any() for a, b in inside])
-    assert (share == counted).all()
-    assert 20 < share.sum() < len(share) - 20
-
-
-def _area(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-
-
-def _inside(points: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-    turn = [_area(triangle[(k + 1) % 3] - triangle[k], points - triangle[k]) for k in range(3)]
-    return (np.min(turn, axis=0) > 0) | (np.max(turn, axis=0) < 0)
 
 
 @pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 3), (5, 40), (200, 77), (300, 4)])
@@ -187,26 +131,19 @@ def test_a_wavy_torus_does_not_cross_itself_until_it_is_pushed_through() -> None
     assert "G001" in found
 
 
-@pytest.mark.parametrize("scale", [2.5, 4.0])
 @pytest.mark.parametrize("mesh", ["closed", "with holes", "with faces turned over"])
-def test_crossing_count_equals_brute_force(mesh: str, scale: float) -> None:
-    points, faces = _sphere(7)
+def test_crossing_count_equals_brute_force(mesh: str) -> None:
+    points, faces = _sphere(6)
     rng = np.random.default_rng(2)
-    points = points + rng.normal(scale=scale, size=points.shape)
+    points = points + rng.normal(scale=2.5, size=points.shape)
     some = rng.random(len(faces)) < 0.1
     if mesh == "with holes":
         faces = faces[~some]
     elif mesh == "with faces turned over":
         faces[some] = faces[some][:, ::-1]
     report = check_mesh(points, faces)
-    counted = 0
-    for i in range(len(faces)):
-        for j in range(i + 1, len(faces)):
-            if len(set(faces[i]) & set(faces[j])) < 2:
-                answer = reference(points[faces[i]], points[faces[j]])
-                counted += answer is not None and answer[0]
     crossing = next(found for found in report.findings if found.code == "G001")
-    assert crossing.count == counted > 0
+    assert crossing.count == counts(points, faces)[0] > 0
 
 
 def test_one_missing_face_does_not_make_it_slow() -> None:
@@ -219,38 +156,6 @@ def test_one_missing_face_does_not_make_it_slow() -> None:
     assert whole.findings == ()
     assert [found.code for found in opened.findings] == ["T001"]
     assert time.perf_counter() - start - closed < 10 * closed + 0.5
-
-
-def test_order_of_faces_and_vertices_does_not_matter() -> None:
-    points, faces = _sphere(16)
-    points = points + np.random.default_rng(4).normal(scale=1.0, size=points.shape)
-    first = {found.code: found.count for found in check_mesh(points, faces).findings}
-    order = np.random.default_rng(5).permutation(len(faces))
-    again = {found.code: found.count for found in check_mesh(points, faces[order][:, [1, 2, 0]]).findings}
-    assert first == again
-
-
-def test_morton_order_is_a_permutation() -> None:
-    points, faces = _sphere(10)
-    order = morton_order(frame_of(points).steps(points), faces[:, 0])
-    assert sorted(order.tolist()) == list(range(len(faces)))
-
-
-@pytest.mark.parametrize("step", [1, 2, 3])
-@pytest.mark.parametrize("tilt", [0.0, 0.4, 0.8])
-def test_a_star_that_goes_round_twice_crosses_itself(step: int, tilt: float) -> None:
-    """Double pyramids over a polygon of seven; over the star polygons {7/2} and {7/3} their sides pass through."""
-    angle = 2 * np.pi * step * np.arange(7) / 7
-    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    points = np.vstack([ring, [[0, 0, 1.5], [0, 0, -1.5]]])
-    c, s = np.cos(tilt), np.sin(tilt)
-    points = points @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-    k = np.arange(7)
-    faces = np.vstack(
-        [np.column_stack([k, (k + 1) % 7, np.full(7, 7)]), np.column_stack([(k + 1) % 7, k, np.full(7, 8)])]
-    )
-    codes = {found.code for found in check_mesh(points, faces).findings}
-    assert ("G001" in codes) == (step > 1)
 
 
 def test_a_denormal_beside_ordinary_numbers_is_decided_without_a_warning() -> None:

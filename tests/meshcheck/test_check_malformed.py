@@ -18,7 +18,6 @@ CASES = cases()
 # Rules whose files need more than bytes under a name: test_check_manifest.py and test_check_command.py have them.
 ELSEWHERE = {"F012", "M001", "M002", "M003", "M004", "M005"}
 ONE_OF_MANY = re.compile(r"(?<!object )(?<![\d.])1 (?:\w+ )?(?:\w+[^s\W]s|vertices)\b")  # "1 pairs", "1 open edges"
-UNREADABLE = {"F001", "F003", "F005", "F011", "F012"}
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])

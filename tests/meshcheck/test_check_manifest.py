@@ -51,32 +51,27 @@ def codes(report: FileReport) -> list[str]:
     return [found.code for found in report.findings]
 
 
-def test_a_good_build_passes_and_only_tools_are_held_to_the_printer(tmp_path: Path) -> None:
-    reports = judged(written(tmp_path))
-    assert {name: codes(report) for name, report in reports.items()} == {"base.stl": [], "film.stl": []}
+TWO = stl(np.concatenate([box((20, 20, 5)), box((1, 1, 1), (40, 0, 0))]))
 
 
-def test_m001_volume(tmp_path: Path) -> None:
-    assert codes(judged(written(tmp_path, volume_mm3=2003.0))["base.stl"]) == ["M001"]
-
-
-def test_m002_solids(tmp_path: Path) -> None:
-    folder = written(tmp_path)
-    two = stl(np.concatenate([box((20, 20, 5)), box((1, 1, 1), (40, 0, 0))]))
-    (folder / "base.stl").write_bytes(two)
-    assert "M002" in codes(judged(folder)["base.stl"])
-
-
-def test_m003_hash(tmp_path: Path) -> None:
-    folder = written(tmp_path)
-    (folder / "base.stl").write_bytes(stl(box((20, 20, 5)), header=b"other"))
-    assert codes(judged(folder)["base.stl"]) == ["M003"]
-
-
-def test_m004_missing(tmp_path: Path) -> None:
-    folder = written(tmp_path)
-    (folder / "base.stl").unlink()
-    assert codes(judged(folder)["base.stl"]) == ["F012", "M004"]
+@pytest.mark.parametrize(
+    ("volume", "content", "found"),
+    [
+        (2000.0, BASE, []),
+        (2003.0, BASE, ["M001"]),
+        (2000.0, TWO, ["M002", "M003"]),
+        (2000.0, stl(box((20, 20, 5)), header=b"other"), ["M003"]),
+        (2000.0, None, ["F012", "M004"]),
+    ],
+    ids=["good", "volume", "solids", "hash", "missing"],
+)
+def test_files_are_held_to_the_manifest_and_only_tools_to_the_printer(
+    tmp_path: Path, volume: float, content: bytes | None, found: list[str]
+) -> None:
+    folder = written(tmp_path, volume_mm3=volume)
+    (folder / "base.stl").unlink() if content is None else (folder / "base.stl").write_bytes(content)
+    reports = judged(folder)
+    assert {name: codes(report) for name, report in reports.items()} == {"base.stl": found, "film.stl": []}
 
 
 def test_m004_a_file_that_the_manifest_does_not_list(tmp_path: Path) -> None:
@@ -93,13 +88,6 @@ def test_a_tool_below_the_floor_is_warned_of(tmp_path: Path) -> None:
     parts["parts"][1]["role"] = "tool"
     (folder / "manifest.json").write_text(json.dumps(parts))
     assert "D001" in codes(judged(folder)["film.stl"])
-
-
-@pytest.mark.parametrize("text", ["", "{}", "[]", '{"parts": 3}', '{"parts": [{}]}', "\x00"])
-def test_what_is_no_manifest_is_refused(tmp_path: Path, text: str) -> None:
-    (tmp_path / "manifest.json").write_text(text)
-    with pytest.raises(UnitcadError):
-        listing.read(str(tmp_path))
 
 
 OUTSIDE = [

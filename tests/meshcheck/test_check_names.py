@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
-
 from conftest import Judge
-from shapes import PRODUCTION, START, THUMBNAIL, TYPES, mesh_xml, model_xml, rels_xml
+from shapes import PRODUCTION, START, THUMBNAIL, mesh_xml, model_xml, package, rels_xml
 
 
 def packed(model: str, more: dict[str, bytes], *relations: tuple[str, str]) -> bytes:
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as archive:
-        archive.writestr("[Content_Types].xml", TYPES)
-        archive.writestr("_rels/.rels", rels_xml((START, "/3D/Part_A.model"), *relations))
-        archive.writestr("3D/Part_A.model", model)
-        for name, content in more.items():
-            archive.writestr(name, content)
-    return out.getvalue()
+    rels = rels_xml((START, "/3D/Part_A.model"), *relations)
+    return package(model, rels=rels, more=list(more.items()), at="3D/Part_A.model")
 
 
 def test_places_and_messages_keep_the_case(judge: Judge) -> None:

@@ -65,7 +65,7 @@ def test_machine_formats_are_utf8_for_any_name(format_: str, tmp_path: Path) -> 
     for name in (b"k\xe4se\xff\\.stl", "Käse.stl".encode(), b"line\nbreak.stl"):
         (tmp_path / os.fsdecode(name)).write_bytes(stl(box()[1:]))
     command = [sys.executable, "-m", "unitcad", "check", ".", "--output-format", format_]
-    for encoding in ("utf-8", "ascii") if format_ == "json" else ("latin-1",):
+    for encoding in ("ascii",) if format_ == "json" else ("latin-1",):
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=60,
                               env={**os.environ, "PYTHONIOENCODING": encoding})  # fmt: skip
         assert (done.returncode, done.stderr) == (1, b"")

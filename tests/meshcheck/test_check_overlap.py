@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import triangulate
-from shapes import FORMATS, box, in_format, obj, stl, text_ply, turned
+from shapes import FORMATS, box, fin, in_format, obj, stl, surface, text_ply, turned
 
 from unitcad.meshcheck import check_bytes, check_mesh
 from unitcad.meshcheck.geometry.mesh import weld_exact
@@ -132,23 +132,6 @@ def test_solids_that_share_an_edge_do_not_overlap(body: np.ndarray, apart: bool)
         assert codes(check_mesh(points, faces)) <= {"G003", "T003"}
 
 
-def _surface(field: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The faces between cells of different winding number, as many as the numbers differ, with either diagonal."""
-    padded, found = np.pad(field, 1), []
-    for axis in range(3):
-        u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
-        step = np.diff(padded, axis=axis)
-        for cell in np.argwhere(step):
-            corner = cell + np.eye(3)[axis]
-            ring = [corner, corner + u, corner + u + v, corner + v]
-            rise = step[tuple(cell)]
-            ring = ring[::-1] if rise > 0 else ring
-            for _ in range(abs(rise)):
-                k = int(rng.integers(0, 2))
-                found += [[ring[k], ring[k + 1], ring[k + 2]], [ring[k], ring[k + 2], ring[(k + 3) % 4]]]
-    return np.array(found)
-
-
 @settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
@@ -171,7 +154,7 @@ def test_every_winding_number_but_0_and_1_is_an_error(seed: int, values: tuple[i
     padded = np.pad(field, 1)
     if any(np.abs(np.diff(padded, axis=axis)).max() > 1 for axis in range(3)) or not field.any():
         return
-    body = _surface(field, rng)
+    body = surface(field, rng)
     body = turned(body, seed, 3.0, 20, bool(seed % 2)) if turn else body
     report = check_bytes(stl(body), "a.stl")
     errors = {found.code for found in report.findings if found.severity == "error"}
@@ -197,44 +180,6 @@ def test_faces_of_one_concave_polygon_are_not_accused(n: int, seed: int, turn: b
         assert codes(report) == set()
 
 
-@pytest.mark.parametrize("form", ["ply", "obj", "off"])
-@pytest.mark.parametrize("first", range(4))
-def test_a_solid_of_concave_quads_passes_as_polygons(form: str, first: int, judge) -> None:
-    """An arrow head of quads, read from polygons, whichever corner of the concave ones is listed first."""
-    outline = [(0, 0), (10, -10), (0, 20), (-10, -10)]
-    points = [(x, y, z) for z in (0, 5) for x, y in outline]
-    caps = [[0, 3, 2, 1], [4, 5, 6, 7]]
-    faces = [cap[first:] + cap[:first] for cap in caps] + [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
-    rows = "".join(f"{x} {y} {z}\n" for x, y, z in points)
-    listed = "".join(f"4 {' '.join(map(str, face))}\n" for face in faces)
-    if form == "ply":
-        head = "ply\nformat ascii 1.0\nelement vertex 8\n" + "".join(f"property float {axis}\n" for axis in "xyz")
-        text = f"{head}element face 6\nproperty list uchar int vertex_indices\nend_header\n{rows}{listed}"
-    elif form == "off":
-        text = f"OFF\n8 6 0\n{rows}{listed}"
-    else:
-        text = "".join(f"v {x} {y} {z}\n" for x, y, z in points)
-        text += "".join(f"f {' '.join(str(k + 1) for k in face)}\n" for face in faces)
-    report = judge(text, f"part.{form}")
-    assert report.findings == ()
-    assert report.facts.volume_mm3 == pytest.approx(5 * 200)
-
-
-def fin(*, other_diagonals: bool, cells: int = 1) -> np.ndarray:
-    """Two coincident sheets from the origin's upright edge outwards, 5 sqrt(2) by 10; `cells` quads each way."""
-    found = []
-    steps = np.linspace(0, 1, cells + 1)
-    for i in range(cells):
-        for j in range(cells):
-            ring = [np.array([-5 * s, -5 * s, 10 * t])
-                    for s, t in ((steps[i], steps[j]), (steps[i], steps[j + 1]),
-                                 (steps[i + 1], steps[j + 1]), (steps[i + 1], steps[j]))]  # fmt: skip
-            a, b, c, d = ring
-            found += [[a, b, c], [a, c, d]]
-            found += [[b, a, d], [b, d, c]] if other_diagonals else [[a, c, b], [a, d, c]]
-    return np.array(found)
-
-
 @pytest.mark.parametrize("cells", [1, 2, 5])
 @pytest.mark.parametrize("place", ["attached", "beside", "alone", "on a face", "in a corner"])
 @pytest.mark.parametrize("seed", range(3))
@@ -253,28 +198,6 @@ def test_a_fin_is_an_error_whichever_way_its_quads_are_cut(cells: int, place: st
             body = turned(body, seed, 1 + seed, 10, bool(seed % 2))
         verdicts.append(check_bytes(stl(body), "a.stl").verdict)
     assert verdicts == ["error", "error"]
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_fin_whose_sides_are_cut_by_different_points_is_an_error(seed: int) -> None:
-    """One side is a fan about a point near its middle, the other a grid; the rim is the same."""
-    rng = np.random.default_rng(seed)
-    steps = np.linspace(0, 1, 4)
-    rim = [(s, 0.0) for s in steps[:-1]] + [(1.0, s) for s in steps[:-1]]
-    rim += [(s, 1.0) for s in steps[:0:-1]] + [(0.0, s) for s in steps[:0:-1]]
-    middle = tuple(0.5 + rng.uniform(-0.1, 0.1, 2))
-    front = [[middle, rim[k], rim[(k + 1) % len(rim)]] for k in range(len(rim))]
-    back = []
-    for i in range(3):
-        for j in range(3):
-            a, b = (steps[i], steps[j]), (steps[i + 1], steps[j])
-            c, d = (steps[i + 1], steps[j + 1]), (steps[i], steps[j + 1])
-            back += [[a, c, b], [a, d, c]]
-    plan = np.array(front + back)
-    sheet = plan[..., :1] * [-5, -5, 0] + plan[..., 1:] * [0, 0, 10]
-    for body in (sheet, np.concatenate([box(), sheet])):
-        moved = turned(body, seed, 1.3, 10) if seed else body
-        assert check_bytes(stl(moved), "a.stl").verdict == "error"
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-3])

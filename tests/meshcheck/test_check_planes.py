@@ -8,7 +8,7 @@ import pytest
 from unitcad.meshcheck.geometry.crossings import _flush
 from unitcad.meshcheck.geometry.mesh import area_vectors
 from unitcad.meshcheck.geometry.predicates import meet
-from unitcad.meshcheck.geometry.sieves import Contacts, Planes, planes_of
+from unitcad.meshcheck.geometry.sieves import Planes, planes_of
 
 N = 4000
 
@@ -85,27 +85,3 @@ def test_faces_on_both_sides_of_a_level_plane_do_no_more_than_touch() -> None:
     exact, rows = meet(a, b), found & solid[0] & solid[1]
     assert (rows & exact.touches).sum() > 20
     assert not (rows & (exact.crosses | exact.overlaps)).any()
-
-
-@pytest.mark.parametrize("every", [False, True])
-@pytest.mark.parametrize("shells", [3, 40, 1_000_000])
-def test_contacts_keep_the_first_pair_of_two_shells(shells: int, every: bool) -> None:
-    """In one block and over several."""
-    rng = np.random.default_rng(shells)
-    shell = rng.integers(0, shells, 5000)
-    contacts = Contacts(shells, every)
-    expected: dict[int, list[tuple[int, int]]] = {}
-    for _ in range(5):
-        i, j = rng.integers(0, 5000, (2, 3000))
-        known = set(expected) if not every else set()
-        apart = np.flatnonzero(shell[i] != shell[j])
-        keys = contacts.keys(shell[i], shell[j])
-        assert contacts.unknown(shell, i, j).tolist() == [k for k in apart.tolist() if keys[k] not in known]
-        contacts.add(shell, i, j)
-        for k in apart.tolist():
-            expected.setdefault(int(keys[k]), []).append((int(i[k]), int(j[k])))
-    keys, pairs = contacts.pairs()
-    wanted = [(key, pair) for key in sorted(expected) for pair in expected[key][: None if every else 1]]
-    assert list(zip(keys.tolist(), map(tuple, pairs.tolist()), strict=True)) == wanted
-    low, high = contacts.shells_of(keys).T
-    assert (contacts.keys(high, low) == keys).all()

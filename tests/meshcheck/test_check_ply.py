@@ -1,4 +1,4 @@
-"""Binary PLY: the header's counts against what the file holds."""
+"""PLY: the header's counts against what the file holds, and triangle strips, as the Stanford scans have them."""
 
 from __future__ import annotations
 
@@ -9,22 +9,27 @@ import pytest
 from polygon_files import ply
 from shapes import CUBE_CORNERS, CUBE_FACES
 
-ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
+CUBE = CUBE_CORNERS * 10
+# A cube of two strips; a third one turns at -1, and a fourth leads on by vertices named twice.
+AROUND = [0, 1, 2, 3, 6, 7, 4, 5, 0, 1]
+SIDES = [[0, 2, 4, 6], [1, 5, 3, 7]]
+WAYS = {
+    "three strips": [AROUND, *SIDES],
+    "one strip with breaks": [[*AROUND, -1, *SIDES[0], -1, *SIDES[1]]],
+    "one strip that leads on": [[*AROUND, 1, 0, *SIDES[0], 6, 1, *SIDES[1]]],
+}
 
 
-def cube(vertices: int = 8, faces: int = 12, order: str = "binary_little_endian", newline: str = "\n") -> bytes:
+def cube(vertices: int = 8, faces: int = 12, order: str = "<", newline: bytes = b"\n") -> bytes:
     """A cube whose header promises other numbers of vertices and faces than the 8 and 12 that follow."""
-    head = ["ply", f"format {order} 1.0", "comment of no element 7", f"element vertex {vertices}"]
-    head += [f"property float {axis}" for axis in "xyz"]
-    head += [f"element face {faces}", "property list uchar int vertex_indices", "end_header", ""]
-    sign = ORDERS[order]
-    corners = b"".join(struct.pack(sign + "3f", *corner) for corner in CUBE_CORNERS * 10)
-    return newline.join(head).encode() + corners + b"".join(struct.pack(sign + "B3i", 3, *face) for face in CUBE_FACES)
+    head, end, body = ply(CUBE, CUBE_FACES.tolist(), order, coordinate="float").partition(b"end_header\n")
+    head = (head + end).replace(b"vertex 8", b"vertex %d" % vertices).replace(b"face 12", b"face %d" % faces)
+    return head.replace(b"\n", newline) + body
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_a_sound_cube_passes(order: str, newline: str, judge) -> None:
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
+def test_a_sound_cube_passes(order: str, newline: bytes, judge) -> None:
     report = judge(cube(order=order, newline=newline), "cube.ply")
     assert report.findings == ()
     assert report.facts.volume_mm3 == pytest.approx(1000)
@@ -54,9 +59,9 @@ def test_wrong_counts_are_named(content: bytes, code: str, said: str, judge) -> 
 def test_elements_end_where_their_records_do(seed: int, judge) -> None:
     """Random elements with lists of one length, of many, and runs of each; any byte less is one too few."""
     rng = np.random.default_rng(seed)
-    sign, order = ("<", "binary_little_endian") if seed % 2 else (">", "binary_big_endian")
+    sign = "<>"[seed % 2]
     kinds = {"uchar": "B", "int16": "h", "uint": "I", "double": "d"}
-    whole = cube(order=order)
+    whole = cube(order=sign)
     head, body = whole.split(b"end_header\n")
     lines = head.decode().splitlines()
     for element in range(3):
@@ -82,7 +87,7 @@ def test_elements_end_where_their_records_do(seed: int, judge) -> None:
 
 def test_numbers_after_the_last_property_of_a_text_face_are_a_warning(judge) -> None:
     """MeshLab announces plain colours of faces and writes a list."""
-    text = ply(CUBE_CORNERS * 10, CUBE_FACES.tolist(), "").decode()
+    text = ply(CUBE, CUBE_FACES.tolist(), "").decode()
     lines = text.split("\n")
     longer = [line + " 1 1 1" if line.startswith("3 ") and line.count(" ") == 3 else line for line in lines]
     (found,) = judge("\n".join(longer), "a.ply").findings
@@ -95,3 +100,14 @@ def test_an_element_named_twice_is_refused(judge) -> None:
     head, body = cube().split(b"end_header\n")
     twice = head + b"element face 0\nproperty list uchar int vertex_indices\nend_header\n" + body
     assert "names element face twice" in judge(twice, "a.ply").findings[0].message
+
+
+@pytest.mark.parametrize("order", ["", "<", ">"])
+@pytest.mark.parametrize("way", WAYS)
+def test_strips_of_a_cube_are_a_cube(way: str, order: str, judge) -> None:
+    content = ply(CUBE, WAYS[way], order, count="int").replace(b"element face", b"element tristrips")
+    report = judge(content, "a.ply")
+    assert report.findings == ()
+    assert report.facts.triangles == 12
+    assert report.facts.volume_mm3 == pytest.approx(1000)
+    assert judge(content.replace(b"5 3 7", b"5 3 3"), "a.ply").has("T001") == (not order)

@@ -12,7 +12,7 @@ from conftest import Judge
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from polygon_files import every_way, obj, off, ply
-from shapes import CUBE_CORNERS
+from shapes import CUBE_CORNERS, turned
 
 from unitcad.meshcheck.findings import Finding
 from unitcad.meshcheck.geometry.mesh import Mesh
@@ -44,12 +44,6 @@ def prism(outline: list, turn: int, hand: int) -> tuple[np.ndarray, list[list[in
     return points, faces if hand > 0 else [face[::-1] for face in faces]
 
 
-def turned(points: np.ndarray, seed: int = 3) -> np.ndarray:
-    """The points after a rotation that leaves no coordinate plane in place."""
-    q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    return points @ (q * np.sign(np.linalg.det(q)))
-
-
 @pytest.mark.parametrize("faces", [QUADS, HALF], ids=["quads", "mixed"])
 def test_faces_of_differing_sizes_are_read_in_every_format(faces: list, judge: Judge) -> None:
     for name, content in every_way(CUBE_CORNERS * 10, faces).items():
@@ -65,7 +59,7 @@ def test_concave_polygons_are_cut_within_their_outline(outline: list, area: floa
     for turn in range(len(outline)):
         points, faces = prism(outline, turn, hand)
         for name, content in (("a.ply", ply(points, faces, "")), ("a.obj", obj(points, faces)),
-                              ("a.off", off(points, faces)), ("b.ply", ply(turned(points), faces))):  # fmt: skip
+                              ("a.off", off(points, faces)), ("b.ply", ply(turned(points, 3), faces))):  # fmt: skip
             report = judge(content, name)
             assert report.findings == (), (turn, name)
             assert report.facts.volume_mm3 == pytest.approx(5 * area, rel=1e-9)

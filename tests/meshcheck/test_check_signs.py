@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from fractions import Fraction
 
 import numpy as np
@@ -77,6 +78,7 @@ def test_signs_are_those_of_fractions(kind: str, single: bool) -> None:
     if single:
         p = p.astype(np.float32).astype(np.float64)
     solid, flat = orient3d(*p), orient2d(*p[:3, :, :2])
+    assert (predicates.orient2d_columns(*(corners.T for corners in p[:3, :, :2])) == flat).all()
     for i in range(N):
         a, b, c, d = ([Fraction(float(x)) for x in point] for point in p[:, i])
         u, v, w = ([x - y for x, y in zip(q, d, strict=True)] for q in (a, b, c))
@@ -103,3 +105,27 @@ def test_numbers_of_single_precision_need_no_integers_of_python(kind: str, monke
     p = _points(kind, np.random.default_rng(8))
     orient3d(*p.astype(np.float32).astype(np.float64))
     assert rows == 0
+
+
+def _next_to_parallel(seed: int) -> tuple[list[int], int]:
+    """Whole numbers p, q, r, s of 40 bits and their determinant p s - q r, which is -1, 0 or 1."""
+    rng = random.Random(seed)
+    q = rng.getrandbits(40) | (1 << 39) | 1
+    while True:
+        p = rng.getrandbits(40) | (1 << 39)
+        if np.gcd(p, q) == 1:
+            break
+    s = pow(p, -1, q)
+    r = (p * s - 1) // q
+    turn = rng.choice((-1, 0, 1))
+    return ([p, q, r, s] if turn > 0 else [r, s, p, q] if turn < 0 else [p, q, 2 * p, 2 * q]), turn
+
+
+@pytest.mark.parametrize("power", [-20, 0, 300])
+def test_products_that_agree_in_all_but_the_last_bit(power: int) -> None:
+    drawn = [_next_to_parallel(seed) for seed in range(500)]
+    corner = np.random.default_rng(1).integers(-(2**38), 2**38, (500, 2))
+    a = np.array([numbers[:2] for numbers, _ in drawn]) + corner
+    b = np.array([numbers[2:] for numbers, _ in drawn]) + corner
+    found = orient2d(*(np.ldexp(points.astype(np.float64), power) for points in (a, b, corner)))
+    assert found.tolist() == [turn for _, turn in drawn]

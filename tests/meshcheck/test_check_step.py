@@ -79,13 +79,13 @@ def test_a_reader_that_dies_or_prints_is_a_finding(
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     import dying
 
-    for child, code, said in (
-        (dying.aborts, "F003", "died"),
-        (dying.prints, "F012", "does not load"),
-        (dying.hangs, "F011", "not finished"),
+    for child, code, said, seconds in (
+        (dying.aborts, "F003", "died", 60),
+        (dying.prints, "F012", "does not load", 60),
+        (dying.hangs, "F011", "not finished", 1),
     ):
         monkeypatch.setattr(read_step, "MEASURE", child)
-        (found,) = check_file(path, Options(limits=Limits(seconds=5))).findings
+        (found,) = check_file(path, Options(limits=Limits(seconds=seconds))).findings
         assert found.code == code
         assert said in found.message
     assert capfd.readouterr().out == ""

@@ -43,6 +43,14 @@ def files():
     made |= {"binary.stl": stl(points[triangles]), "text.stl": text_stl(points[triangles]).encode()}
     model = model_xml(f'<object id="1">{mesh_xml(points, triangles)}</object>')
     made |= {"packed.3mf": package(model), "stored.3mf": package(model, compression=zipfile.ZIP_STORED)}
+    materials = (
+        '<basematerials id="5"><base name="a" displaycolor="#FF0000"/></basematerials>'
+        '<m:colorgroup id="6"><m:color color="#FFFFFF"/></m:colorgroup>'
+        '<m:multiproperties id="7" pids="5 6"><m:multi pindices="0 0"/></m:multiproperties>'
+        f'<object id="2" pid="7" pindex="0">{mesh_xml(points, triangles)}</object>'
+        '<object id="1"><components><component objectid="2" transform="1 0 0 0 1 0 0 0 1 5 5 5"/></components></object>'
+    )
+    made["materials.3mf"] = package(model_xml(materials), compression=zipfile.ZIP_STORED)
     small = (points * 0.001).astype("<f4")
     made["a.glb"] = packed(*scene(small, triangles.astype("<u2"), [{"mesh": 0, "rotation": [0.6, 0.0, 0.0, 0.8]}]))
     return made

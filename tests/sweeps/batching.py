@@ -1,11 +1,15 @@
 """What the batch tests share: small sweeps, and a design whose function crashes, hangs or fails on request."""
 
 import hashlib
+import io
 import json
 import os
 import subprocess
 import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+
+from unitcad.cli import main
 
 SPEC = """
 name = "ring"
@@ -82,11 +86,22 @@ def calls(folder):
     return [line.split()[0] for line in file.read_text().splitlines()] if file.exists() else []
 
 
-def unitcad(*words, **more):
-    """Run the command line in a process of its own."""
-    return subprocess.run(
-        command(*words), capture_output=True, text=True, check=False, timeout=300, **{"env": environment(), **more}
-    )
+def unitcad(*words, cwd=".", env=None):
+    """Run the command line in this process; in one of its own with an environment, or with a scheduler's client."""
+    line = command(*words)
+    if env or "--scheduler" in words:
+        return subprocess.run(
+            line, capture_output=True, text=True, check=False, timeout=300, env=env or environment(), cwd=cwd
+        )
+    out, err, argv = io.StringIO(), io.StringIO(), sys.argv
+    sys.argv = ["unitcad", *line[3:]]
+    try:
+        with redirect_stdout(out), redirect_stderr(err), chdir(cwd):
+            main()
+    except SystemExit as stop:
+        return subprocess.CompletedProcess(line, stop.code or 0, out.getvalue(), err.getvalue())
+    finally:
+        sys.argv = argv
 
 
 def command(*words):

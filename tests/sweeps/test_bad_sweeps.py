@@ -69,7 +69,7 @@ def test_words_that_can_not_be_are_refused(words, field, tmp_path, capsys, monke
     check_words_are_refused(["batch", "published", *words], field, tmp_path, capsys, monkeypatch)
 
 
-@pytest.mark.parametrize("text", FILES)
+@pytest.mark.parametrize("text", [*FILES[::3], *(pytest.param(text, marks=pytest.mark.long) for text in FILES[1:3])])
 def test_a_base_that_can_not_be_is_refused(text, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.toml").write_text(text)

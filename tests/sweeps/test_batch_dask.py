@@ -16,7 +16,7 @@ import pytest
 from batching import bytes_of, command, environment, ring_sweep, unitcad
 
 from unitcad.errors import UnitcadError
-from unitcad.sweeps.executors import Certificates, Workers
+from unitcad.sweeps.executors import Certificates, Workers, dask_executor
 
 pytest.importorskip("distributed")
 
@@ -114,7 +114,9 @@ def test_ctrl_c_takes_the_work_back_and_leaves_the_cluster(cluster, tmp_path):
     assert json.loads(again.stdout)["taken_up"] >= 2
 
 
-@pytest.mark.parametrize("listening", [False, True], ids=["nobody", "somebody-mute"])
+@pytest.mark.parametrize(
+    "listening", [pytest.param(False, marks=pytest.mark.long), True], ids=["nobody", "somebody-mute"]
+)
 def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening, tmp_path):
     with socket.socket() as mute:
         mute.bind(("127.0.0.1", 0))
@@ -142,9 +144,6 @@ def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening, 
     "sent", [b"SSH-2.0-OpenSSH_9.6p1\r\n" + b"x" * 40, b"HTTP/1.1 400 Bad Request\r\n\r\n" + b"a" * 99, b"\xff" * 64]
 )
 def test_an_answer_that_is_no_schedulers(sent):
-    from unitcad.errors import UnitcadError
-    from unitcad.sweeps.executors import dask_executor
-
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
@@ -175,7 +174,6 @@ def test_a_cluster_is_reached_from_where_an_event_loop_runs(cluster):
     assert done.stdout == "2\n", done.stderr
 
 
-pytest.importorskip("distributed")
 CERTIFICATES = Path(__file__).parent / "certificates"
 """Of two authorities, each with the certificate and key of a member; valid until 2126."""
 

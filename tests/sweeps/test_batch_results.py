@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from batching import bytes_of, calls, ring_sweep, rows, unitcad
+from batching import bytes_of, calls, environment, ring_sweep, rows, unitcad
 
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.write import build
@@ -80,19 +80,6 @@ def test_a_formula_stays_text_in_the_table(tmp_path):
     assert ",'=1+1," in (tmp_path / "o" / "variants.csv").read_text()
 
 
-def test_refused_variants_are_rows_too(tmp_path):
-    sweep = load_sweep("thickness").overridden(["diameter_mm=13.0"])
-    summary = run(sweep, tmp_path / "o", BatchOptions(("unit",), check=False, keep_going=True, limit=4),
-                  SerialExecutor(), workers=1)  # fmt: skip
-    assert summary.failed == 0
-    sweep = load_sweep("thickness").overridden(["diameter_mm=11.6", 'output.formats=["stl"]'])
-    summary = run(sweep, tmp_path / "p", BatchOptions(("unit",), check=False, keep_going=True, limit=4),
-                  SerialExecutor(), workers=1)  # fmt: skip
-    assert [row["status"] for row in rows(tmp_path / "p")] == ["ok", "ok", "refused", "refused"]
-    assert rows(tmp_path / "p")[2]["reason"].startswith("diameter_mm = 11.6:")
-    assert (summary.failed, summary.retried) == (2, 0)
-
-
 def test_the_last_line_s_sums_and_plurals(tmp_path):
     sweep = ring_sweep(tmp_path / "s", "fails", heights=[2.0, 3.0], materials=2)
     done = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0, "--keep-going")
@@ -164,7 +151,7 @@ def test_the_bar_on_a_terminal_shows_rate_reused_failed(monkeypatch):
 
 def test_cache_ls_and_gc(tmp_path, own_cache):
     sweep = ring_sweep(tmp_path / "s", heights=[2.0])
-    unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0)
+    unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0, env=environment())  # the cache has no user any more
     before = bytes_of(tmp_path / "o")
     listed = json.loads(unitcad("cache", "ls", "--json").stdout)
     assert listed["cache"] == str(own_cache)
@@ -199,7 +186,7 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path):
     assert {left["output"] for left in manifest["skipped"]} >= {"moulds", "casting", "estimate"}
     (tmp_path / "tub.py").unlink()
     again = [folder / "spec.toml", "-o", tmp_path / "out", "--formats", "stl,3mf", "--only", "unit"]
-    refused = unitcad("build", *again)
+    refused = unitcad("build", *again, env=environment())
     assert refused.returncode == 2
     assert "--allow-code" in refused.stderr
     again = unitcad("build", *again, "--allow-code")

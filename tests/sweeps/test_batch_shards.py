@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from batching import bytes_of, calls, command, environment, ring_sweep, rows, unitcad
+from batching import bytes_of, calls, environment, ring_sweep, rows, unitcad
 
 from unitcad.cache import DiskStore, shared_store
 from unitcad.errors import UnitcadError, WrongArgument
@@ -85,13 +85,10 @@ def test_shards_merged_are_the_batch_without_shards(tmp_path):
 
 def test_two_shards_at_once(tmp_path):
     """Processes of their own, on one store: what is made twice was in flight in both, so at most once in each."""
-    import subprocess
-
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=2), tmp_path / "out"
-    words = [command("batch", sweep, "-o", out, "--shard", f"{n}/2", "-j", 0, "--json") for n in (1, 2)]
+    words = ("batch", sweep, "-o", out, "-j", 0, "--json", "--shard")
     with ThreadPoolExecutor(2) as pool:
-        run = lambda line: subprocess.run(line, capture_output=True, text=True, env=environment(), check=False)  # noqa: E731
-        done = list(pool.map(run, words))
+        done = list(pool.map(lambda n: unitcad(*words, f"{n}/2", env=environment()), (1, 2)))
     assert [each.returncode for each in done] == [0, 0], done
     assert sum(json.loads(each.stdout)["ok"] for each in done) == 6
     assert max(Counter(calls(tmp_path / "s")).values()) <= 2

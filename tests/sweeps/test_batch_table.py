@@ -28,6 +28,10 @@ SWEEPS = {
         "embedded",
         {"layers.1.material": SILICONES, "layers.0.material": SILICONES, "casting.room_c": 20.0},
     ),
+    "three layers": (
+        "three-layer",
+        {**{f"layers.{i}.material": SILICONES[::3] for i in range(3)}, "layers.1.wall_mm": [1.0, 1.5]},
+    ),
     "bound axes": (
         "encapsulating",
         {"motor.part": ["LCM0720A3463F"], "diameter_mm": [14.0, 15.5], "motor.fill": [False, True]},
@@ -37,7 +41,7 @@ SWEEPS = {
         {"mode": "zip", "layers.0.material": SILICONES, "estimate.frequency_hz": [50.0, 60.0, 70.0, 80.0, 90.0]},
     ),
     "moduli": (
-        "encapsulating",
+        ["embedded", "encapsulating"],
         {"estimate.moduli": ["small-strain", "quasi-static"], "layers.0.material": ["ecoflex-00-10", "dragon-skin-30"]},
     ),
     "own silicone": (

@@ -41,10 +41,6 @@ def made(tmp_path_factory):
     return batch, sweep
 
 
-def _emptied(file, dice):
-    _anew(file, b"")
-
-
 def _cut(file, dice):
     content = file.read_bytes()
     _anew(file, content[: dice.randrange(len(content))])
@@ -54,18 +50,6 @@ def _flipped(file, dice):
     content = bytearray(file.read_bytes())
     content[dice.randrange(len(content))] ^= 1 << dice.randrange(8)
     _anew(file, bytes(content))
-
-
-def _zeroed(file, dice):
-    _anew(file, b"\0" * file.stat().st_size)
-
-
-def _longer(file, dice):
-    _anew(file, file.read_bytes() + dice.randbytes(1000))
-
-
-def _nonsense(file, dice):
-    _anew(file, b'[{"a": 1e999}]')
 
 
 def _gone(file, dice):
@@ -100,20 +84,23 @@ def _file(folder, dice):
     folder.write_text("something else")
 
 
-def _future(file, dice):
-    os.utime(file, (FAR, FAR))
-
-
 def _anew(file, content):
     """As a new file: a result is a link to the cache."""
     file.unlink()
     file.write_bytes(content)
 
 
+def _emptied(file, dice):
+    _anew(file, b"")
+
+
 ANY: dict[str, Change] = {
-    "emptied": _emptied, "cut": _cut, "flipped": _flipped, "zeros": _zeroed, "longer": _longer, "nonsense": _nonsense,
-    "gone": _gone, "linked": _linked, "dangling": _dangling, "a folder": _folder, "a pipe": _pipe,
-    "of the future": _future,
+    "emptied": _emptied, "cut": _cut, "flipped": _flipped, "gone": _gone, "linked": _linked, "dangling": _dangling,
+    "a folder": _folder, "a pipe": _pipe,
+    "zeros": lambda file, dice: _anew(file, b"\0" * file.stat().st_size),
+    "longer": lambda file, dice: _anew(file, file.read_bytes() + dice.randbytes(1000)),
+    "nonsense": lambda file, dice: _anew(file, b'[{"a": 1e999}]'),
+    "of the future": lambda file, dice: os.utime(file, (FAR, FAR)),
 }  # fmt: skip
 
 

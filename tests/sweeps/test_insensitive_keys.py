@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from tests.attenuation.test_moduli_source import left_out
+from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.models import MODELS, assessments
 from unitcad.cli import app
 from unitcad.sweeps.insensitive_keys import swept_estimate, warnings
@@ -113,6 +115,13 @@ def test_swept_lengths_that_every_measured_unit_had_alike_are_named(values, leng
     told = [line for line in warnings(found) if line.startswith("every measured unit had")]
     assert len(told) == len(set(lengths.values()))
     assert all(any(path in line and f"{length:g} mm" in line for line in told) for path, length in lengths.items())
+
+
+def test_the_typical_error_is_that_of_the_swept_source_of_moduli():
+    sweep = swept("embedded", estimate__moduli=["quasi-static"], layers__0__wall_mm=[1.2, 1.3])
+    found = swept_estimate(sweep, sweep.count)
+    assert found is not None
+    assert found.typical_error["published"] == pytest.approx(left_out(measured_table("quasi-static")), rel=1e-4)
 
 
 def test_a_control_s_wall_is_that_of_the_measured_controls():

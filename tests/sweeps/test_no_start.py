@@ -19,10 +19,10 @@ def _limited(which, limit):
     ("which", "limit"),
     [
         (resource.RLIMIT_NOFILE, 8),
-        (resource.RLIMIT_NOFILE, 10),
+        pytest.param(resource.RLIMIT_NOFILE, 10, marks=pytest.mark.long),
         (resource.RLIMIT_NOFILE, 24),
         (resource.RLIMIT_AS, 300 << 20),
-        (resource.RLIMIT_AS, 600 << 20),
+        pytest.param(resource.RLIMIT_AS, 600 << 20, marks=pytest.mark.long),
     ],
     ids=["8 descriptors", "10 descriptors", "24 descriptors", "300 MB", "600 MB"],
 )
@@ -65,6 +65,6 @@ def test_results_under_a_link_to_nothing_are_refused(words, below, tmp_path):
 
 
 def test_python_without_docstrings_works(tmp_path):
-    command = [sys.executable, "-OO", "-m", "unitcad", "estimate", "encapsulating"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    words = [sys.executable, "-OO", "-m", "unitcad", "estimate", "encapsulating"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
