@@ -134,7 +134,7 @@ def test_two_pieces_of_one_silicone_are_named_by_the_first() -> None:
     found = estimate_spec(spec)
     assert [layer["wall_mm"] for layer in found["variant"]["layers"]] == [1.4, 1.4]
     seen = found["models"]["published"]["sensitivities"]
-    assert {name for name in [*seen["by"], *seen["not_seen"]] if name.endswith(".wall_mm")} == {
+    assert {name for name in [*seen["by"], *seen["no_effect"]] if name.endswith(".wall_mm")} == {
         "layers.0.wall_mm",
         "layers.2.wall_mm",
     }

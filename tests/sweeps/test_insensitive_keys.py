@@ -90,7 +90,7 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path):
         "corrected": [],
     }
     for model, typical in told["typical_error"].items():
-        assert typical == pytest.approx(assessments()[model].left_out.geometric_mean, rel=1e-5)
+        assert typical == pytest.approx(assessments()[model].leave_one_out.geometric_mean, rel=1e-5)
     assert warning in CliRunner().invoke(app, ["batch", "thickness", "--dry-run"]).output
     quiet = CliRunner().invoke(app, ["batch", "thickness", "--dry-run", "--only", "unit"])
     assert "does not read" not in quiet.output

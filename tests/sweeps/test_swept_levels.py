@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.attenuation.test_moduli_source import left_out
+from tests.attenuation.test_moduli_source import leave_one_out
 from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.models import MODELS
 from unitcad.estimate_inputs import estimate_spec
@@ -44,4 +44,4 @@ def test_a_sweep_of_the_source_has_each_variant_s_own_levels() -> None:
     )
     found = swept_estimate(slow, slow.count)
     assert found is not None
-    assert found.typical_error["published"] == pytest.approx(left_out(measured_table("quasi-static")), rel=1e-4)
+    assert found.typical_error["published"] == pytest.approx(leave_one_out(measured_table("quasi-static")), rel=1e-4)

@@ -344,14 +344,14 @@ def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
     against, error, p = paired(judged, compared.judged[BASELINE]) if name != BASELINE else (None, None, None)
     numbers = {
         **{key: dict(zip(model.names, map(float, values), strict=False)) for key, values in constants.items()},
-        "model_error": found.sigma, "covariance": found.covariance.tolist(), "left_out": judged.score,
-        "left_out_low": low, "left_out_high": high, "own_left_out": judged.own_score,
+        "model_error": found.sigma, "covariance": found.covariance.tolist(), "leave_one_out": judged.score,
+        "leave_one_out_low": low, "leave_one_out_high": high, "own_leave_one_out": judged.own_score,
         "own_by_stored": judged.stored_score, "against_baseline": against, "against_baseline_error": error,
         "against_baseline_p": p,
     }  # fmt: skip
     return ModelFit(
         degrees_of_freedom=found.df,
-        held=f"{judged.held()} of {judged.errors.size}",
+        coverage=f"{judged.coverage()} of {judged.errors.size}",
         at_bound=compared.at_bound(name),
         **rounded(numbers, 6),
     )

@@ -17,7 +17,7 @@ from msgspec import Meta, Struct
 
 from unitcad.attenuation.curve import rounded_error
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.inputs import TissueLayer, body
+from unitcad.attenuation.inputs import TissueLayer, tissue_medium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.catalogue import Material, Printer, choose, materials, printers, tissue
 from unitcad.catalogue import entries as kinds
@@ -351,7 +351,7 @@ class Expected:
 
     `low`, `high`: each kind of input by itself at both ends. `sensitivity`: relative change at the farthest point for a
     layer thinner by `THINNER_MM`. `wall_mm`: least distance of a wall from the unit's centre for the asked echo;
-    `echo_pct`: at the actual wall, `soft_echo_pct`: there with the least loss factors. `forearm`: the body template's
+    `echo_pct`: at the actual wall, `soft_echo_pct`: there with the least loss factors. `forearm`: the template's
     curve, `factor` the mean factor between the two.
     """
 
@@ -442,7 +442,7 @@ def expected(
         thickness = [one.thickness_mm - (THINNER_MM if j == i else 0.0) for j, one in enumerate(phantom.layers)]
         cases.append(curve(thickness=thickness))
         sensitivity[layer.name] = round(float(cases[-1][-1] / value[-1] - 1), _DECIMALS)
-    arm, beyond = _curve(phantom, body(forearm), r)[0], distances > 0
+    arm, beyond = _curve(phantom, tissue_medium(forearm), r)[0], distances > 0
     factor = math.exp(float(np.mean(np.abs(np.log(value[beyond] / arm[beyond])))))
     value, low, high, arm = (tuple(one.tolist()) for one in (value, np.min(cases, 0), np.max(cases, 0), arm))
     echoes = echo_pct(phantom, recipes, wall_mm), echo_pct(phantom, recipes, wall_mm, loss=losses[0])

@@ -89,7 +89,7 @@ class Judged:
         """The same by the stored constants."""
         return None if self.by_stored is None else _factor(self.by_stored[self.own])
 
-    def held(self, content: float = 0.8) -> int:
+    def coverage(self, content: float = 0.8) -> int:
         """Return how many units are in the middle `content` of their prediction without them."""
         return int(np.sum(np.abs(self.share - 0.5) <= content / 2))
 

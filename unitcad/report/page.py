@@ -146,9 +146,9 @@ def _of_all(batch: dict[str, Any] | None, records: list[VariantRecord]) -> dict[
 
 
 def _typical(scores: Any) -> float | None:
-    """Return a model's typical factor with the unit left out from its scores in an estimate; None for anything else."""
+    """Return a model's leave-one-out error from its scores in an estimate; None for anything else."""
     try:
-        typical = scores["leave_one_unit_out"]["levels"]["geometric_mean"]
+        typical = scores["leave_one_out"]["levels"]["geometric_mean"]
     except (KeyError, TypeError):
         return None
     return typical if isinstance(typical, float) else None

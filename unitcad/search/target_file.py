@@ -135,7 +135,7 @@ class ModelsTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Inputs of the estimate."""
 
     fit: Annotated[str | None, Meta(description="lab-fit.toml of unitcad fit")] = None
-    tissue: Annotated[Name, Meta(description="body under the unit")] = "forearm"
+    tissue: Annotated[Name, Meta(description="tissue under the unit")] = "forearm"
     moduli: Annotated[
         Moduli, Meta(description="moduli of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")
     ] = "small-strain"

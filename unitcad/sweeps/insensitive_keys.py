@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from unitcad.attenuation.edge.estimates import left_out
+from unitcad.attenuation.edge.estimates import leave_one_out_errors
 from unitcad.attenuation.edge.measured import nominal
 from unitcad.attenuation.edge.models import edge_levels, stored
 from unitcad.attenuation.inputs import EstimateInput
@@ -72,7 +72,7 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
             if told and all(np.ptp(np.log(levels)) < _SAME for levels in told):
                 unread[model].append(path)
     fit = fit_of(starts[0][1])
-    errors = left_out(starts[0][1].estimate.moduli, fit)
+    errors = leave_one_out_errors(starts[0][1].estimate.moduli, fit)
     ordered = sorted(models, key=lambda model: errors[model])
     return SweptEstimate(
         {model: float(f"{errors[model]:.6g}") for model in ordered},

@@ -52,13 +52,13 @@ def sensitivities(variant: EstimateInput, levels: Levels, step: float = STEP) ->
     with np.errstate(all="ignore"):
         low, high = np.log(np.asarray(levels(ends(variant, step)), dtype=float)).reshape(-1, 2).T
     if not np.all(np.isfinite([low, high])):
-        return {"by": None, "not_seen": None, "reason": "no finite level at the middle of the inputs' ranges"}
+        return {"by": None, "no_effect": None, "reason": "no finite level at the middle of the inputs' ranges"}
     slopes = {
         name: round(float(d), _DIGITS) for name, d in zip(changed(variant), (high - low) / (2 * step), strict=True)
     }
     return {
         "by": {name: slope for name, slope in slopes.items() if slope},
-        "not_seen": [name for name, slope in slopes.items() if not slope],
+        "no_effect": [name for name, slope in slopes.items() if not slope],
     }
 
 

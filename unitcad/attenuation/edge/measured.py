@@ -173,7 +173,7 @@ def stacked(variants: Sequence[EstimateInput]) -> Units:
 
 
 def merged(variant: EstimateInput, within: float = 0.0) -> EstimateInput:
-    """Return a unit with neighbouring layers of one material as one layer: how a body is cut changes no level.
+    """Return a unit with neighbouring layers of one material as one layer: a cut between them changes no level.
 
     `within`: layers whose properties differ by less, relative, are of one material too, that of the innermost.
     """
@@ -234,7 +234,8 @@ def lengths(variants: Sequence[EstimateInput]) -> Lengths:
 
 
 def coordinates(units: Units, of: Lengths) -> np.ndarray:
-    """Return the `COORDINATES` of units, shape (rows, 12). They change continuously with the body, however it is cut.
+    """Return the `COORDINATES` of units, shape (rows, 12). They change continuously with the lengths and
+    do not depend on cuts within a layer.
 
     A border between layers counts as much as `borders` says; its place is the silicone outside it over the measured
     units'. Caps count only if a unit has them.
@@ -349,7 +350,7 @@ def _not_read(variant: EstimateInput) -> list[str]:
     motor = motors()[shared.motor]
     return [
         *(["drive"] if motor.drive is not None and variant.drive != motor.drive.value else []),
-        *(["body"] if variant.tissue_name != shared.tissue else []),
+        *(["tissue"] if variant.tissue_name != shared.tissue else []),
         *variant.unread,
     ]
 

@@ -1,12 +1,12 @@
-"""A unit on its body by finite elements: its rings, its unknowns, its levels and their range. SI.
+"""A unit on tissue by finite elements: its rings, its unknowns, its levels and their range. SI.
 
 The motor is a rigid cylinder, the circuit's pad an elastic plate. The tail and its slot, which are not round, are
 ignored. Touching parts within the unit are bonded.
 
 A force at the motor's middle drives it: upwards (an axial motor, harmonic 0) or sideways (a flat one, harmonic 1). The
 motor is a rigid cylinder with mass and, about its middle, turning inertia. A level is the amplitude of a reading over
-the amplitude of the motor's middle along the drive, in this unit and on this body. For a force that turns in the plane,
-as a flat ERM's does, every point round the unit has the amplitudes that a sideways force gives at theta = 0 (u_r, u_z)
+the amplitude of the motor's middle along the drive, in this unit on this tissue. For a force that turns in the plane,
+as that of a flat ERM, every point round the unit has the amplitudes that a sideways force gives at theta = 0 (u_r, u_z)
 and at theta = 90 degrees (u_theta).
 """
 
@@ -27,7 +27,7 @@ from scipy.stats import binom
 from unitcad.attenuation.edge.level import sensitivities, unknown
 from unitcad.attenuation.edge.measured import merged
 from unitcad.attenuation.fem.elements import Block, Contact, Fields, Solid, harmonic_mesh, motor_response
-from unitcad.attenuation.inputs import Drive, EstimateInput, Geometry, Quantity, body
+from unitcad.attenuation.inputs import Drive, EstimateInput, Geometry, Quantity, tissue_medium
 from unitcad.attenuation.layered import LayeredMedium
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LossFactor, complex_shear_modulus
 from unitcad.errors import UnitcadError, unknown_name
@@ -111,8 +111,8 @@ class Setting:
 def drawn(variant: EstimateInput, draw: Draw) -> tuple[EstimateInput, Setting]:
     """Return an input with every unknown set by a draw, and the draw's setting.
 
-    Moduli, damping, thicknesses of the body, frequency and the motor's mass lie in their ranges; the ring of air round
-    the motor is open or filled, a floor of Layer 1 under the motor is there or not, and so is the circuit. The ring is
+    Moduli, damping, thicknesses of the tissue, frequency and the motor's mass are in their ranges; the air round the
+    motor is open or filled, a floor of Layer 1 under the motor is there or not, and so is the circuit. The ring is
     filled if the motor would be loose otherwise.
     """
 
@@ -321,7 +321,7 @@ def unit_fields(
     """Solve one unit under unit motions of its motor: along z, or sideways and turning."""
     omega = 2 * math.pi * variant.frequency.middle
     blocks = [
-        *medium_blocks(body(variant.tissue), omega, radius),
+        *medium_blocks(tissue_medium(variant.tissue), omega, radius),
         *unit_blocks(variant, omega, setting.circuit_modulus),
     ]
     mesh = harmonic_mesh(blocks, fineness, radius)
@@ -340,12 +340,12 @@ MEDIAN_ERROR = (
     "cases or more; wide where bonded and resting levels lie far apart, since the median then falls between them"
 )
 NOT_KNOWN = (
-    "moduli and damping of silicones and body, thicknesses of the body, frequency, mass of the motor; whether the ring "
-    "of air beside the motor is filled, silicone lies under it, the circuit stiffens the unit, and whether skin sticks "
-    "to the unit or lets it slide"
+    "moduli and damping of silicones and tissue, thicknesses of the tissue, frequency, mass of the motor; whether the "
+    "ring of air next to the motor is filled, silicone is under it, the circuit stiffens the unit, and whether skin "
+    "sticks to the unit or lets it slide"
 )
 KIND = (
-    "finite elements of unit and body, the motor a rigid body driven by a force: axial (along z) and flat (sideways); "
+    "finite elements of unit and tissue; a force drives the rigid motor: axial (along z) and flat (sideways); "
     "amplitude along the drive over the motor's, on the skin at r = D/2 and at the unit's own outer edge, at its top"
 )
 

@@ -3,7 +3,7 @@
 A panel is a row (a, b, base, turn), complex. It runs from s = a to b, straight in s. The wavenumber is s itself, or,
 next to a branch point on the axis, base + turn s^2, in which the kernel has no root any more.
 
-If nothing is damped, or only a body that a wave hardly reaches, poles are on the axis or closer to it than any panel.
+If nothing is damped, or only a layer that a wave hardly reaches, poles are on the axis or closer to it than any panel.
 Between two wavenumbers with one such pole the path leaves the axis, over two legs on the pole's other side.
 
 A pole is where the kernel times (t - t_pole) is a polynomial of the panel's t, from -1 to 1, though the kernel is not:
@@ -227,7 +227,7 @@ def around(
     """Return which panels, all on the axis, have a detour, and the five corners of each, shape (m, 5).
 
     longest: distance from the pole to the legs' feet at most (1/m); lossier(panel, loss) finds the pole of a medium
-    with at least that loss factor in every body.
+    with at least that loss factor in every layer.
     """
     at = found.at
     inside = (np.abs(at.real) < _INNER) & (np.abs(at.imag) < _NEXT) & (found.uncertainty < _NEXT)
