@@ -10,7 +10,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded, rounded_layered
-from unitcad.attenuation.edge.measured import merged
+from unitcad.attenuation.edge.measured import merge_layers
 from unitcad.attenuation.edge.ranges import LabFit
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered import FractionalKelvinVoigt
@@ -94,7 +94,7 @@ def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInp
 
     `frequency_hz` overrides the spec's and the motor's.
     """
-    return merged(drawn_input(spec, frequency_hz))
+    return merge_layers(drawn_input(spec, frequency_hz))
 
 
 def drawn_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:

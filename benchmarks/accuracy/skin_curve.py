@@ -15,7 +15,7 @@ from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.attenuation.curve import CONTACT_MM, contact, decay, ends
 from unitcad.attenuation.fem.elements import Contact
-from unitcad.attenuation.fem.unit import Draw, Setting, drawn, unit_fields
+from unitcad.attenuation.fem.unit import Draw, Setting, draw_unknowns, unit_fields
 from unitcad.attenuation.inputs import Drive, EstimateInput, tissue_medium
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements
@@ -127,7 +127,7 @@ def bodies_in_range(variant: EstimateInput, draws: int) -> dict[Drive, tuple[flo
     """Return, by drive, which share of bodies drawn within the template's sources holds each band, and both."""
     held: dict[Drive, list[list[bool]]] = {drive: [] for drive in DRIVES}
     for i in range(draws):
-        made, _ = drawn(variant, Draw(SEED, i))
+        made, _ = draw_unknowns(variant, Draw(SEED, i))
         for drive, rows in held.items():
             found = [far(made, hertz, drive) for hertz in BANDS]
             inside = [low <= one <= high for one, (_, low, high) in zip(found, BANDS.values(), strict=True)]

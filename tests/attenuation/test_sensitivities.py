@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.curve import layered_block
-from unitcad.attenuation.edge.level import changed, nominal, sensitivities, stacked
+from unitcad.attenuation.edge.level import changed, nominal, sensitivities, stack_inputs
 from unitcad.attenuation.edge.models import MODELS, edge_levels, stored
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import load
@@ -43,7 +43,7 @@ def asked(spec, path: str) -> float | None:
 def test_slopes_are_those_of_specs_that_were_changed(name: str, model: str) -> None:
     spec = spec_of(name)
     variant = estimate_input(spec)
-    found = sensitivities(variant, lambda variants: edge_levels(stacked(variants), model))
+    found = sensitivities(variant, lambda variants: edge_levels(stack_inputs(variants), model))
     compared = 0
     for path in changed(variant):
         value = asked(spec, path)

@@ -27,7 +27,7 @@ from unitcad.files import sha256
 from unitcad.lab.campaign import check_files, read_campaign
 from unitcad.lab.fit_command import contents, fit_toml
 from unitcad.lab.fitting import fit_lab, load_fit_lab
-from unitcad.lab.shrunk_fit import Campaigns, gradients, judge, paired, shrunk
+from unitcad.lab.shrunk_fit import Campaigns, gradients, judge, paired_difference, shrunk
 from unitcad.spec import spec_hash, to_data
 from unitcad.validation import load
 
@@ -472,7 +472,7 @@ def test_intervals_that_were_measured_before():
     judged = {name: judge(MODELS[name], alone) for name in ("divider", "crossings", "published", "baseline")}
     assert [judged[name].coverage() for name in ("published", "crossings", "divider", "baseline")] == [8, 7, 7, 7]
     one, two = (np.abs(judged[name].errors) for name in ("divider", "baseline"))
-    assert paired(judged["divider"], judged["baseline"])[:2] == pytest.approx(
+    assert paired_difference(judged["divider"], judged["baseline"])[:2] == pytest.approx(
         (np.mean(one - two), stats.sem(one - two))
     )
 

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from shapes import CUBE_CORNERS, CUBE_FACES, ROOT_RELS, TYPES, box, mesh_xml, model_xml, package, stl, text_stl
 
 from unitcad.meshcheck import Limits, Options, check_file, check_mesh
-from unitcad.meshcheck.file_checks import check_files, guarded
+from unitcad.meshcheck.file_checks import check_files, check_guarded
 
 OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in CUBE_CORNERS * 10)
 OBJ += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in CUBE_FACES)
@@ -164,7 +164,7 @@ def test_expansion_is_counted_first(tmp_path: Path) -> None:
 def test_time_limit_is_a_finding(tmp_path: Path) -> None:
     path = tmp_path / "a.stl"
     path.write_bytes(stl(box()))
-    report = guarded(str(path), Options(limits=Limits(seconds=0.0)))
+    report = check_guarded(str(path), Options(limits=Limits(seconds=0.0)))
     assert report.has("F011")
     assert report.verdict == "error"
 
@@ -195,7 +195,7 @@ def test_a_worker_that_dies_names_its_file(tmp_path: Path, monkeypatch: pytest.M
 
 def test_inner_fault_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("unitcad.meshcheck.file_checks.check_file", lambda *_: 1 / 0)
-    report = guarded(str(tmp_path / "a.stl"), Options())
+    report = check_guarded(str(tmp_path / "a.stl"), Options())
     assert report.has("F011")
     assert "ZeroDivisionError" in report.findings[0].message
 

@@ -150,11 +150,11 @@ def test_a_forgotten_tongue_is_a_leak() -> None:
 
 def test_an_unpulled_tongue_holds_the_cup() -> None:
     """Out of the procedure's order: the cup can't go up while its tongue is in."""
-    from unitcad.checks.draw import blocked
+    from unitcad.checks.draw import blocked_area
 
     solids = set_of("encapsulating").solids
-    assert blocked(solids["cup1"], solids["tongue"], (0, 0, 1)) > 10
-    assert blocked(solids["tongue"], solids["cup1"], (1, 0, 0)) == 0
+    assert blocked_area(solids["cup1"], solids["tongue"], (0, 0, 1)) > 10
+    assert blocked_area(solids["tongue"], solids["cup1"], (1, 0, 0)) == 0
 
 
 def reordered(moulds: MouldSet, index: int, change: Callable[[tuple[Removal, ...]], tuple[Removal, ...]]) -> MouldSet:

@@ -13,7 +13,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline.plan import build_key
 from unitcad.pipeline.subjects import subject
 from unitcad.sweeps import load_sweep
-from unitcad.sweeps.run import counted
+from unitcad.sweeps.run import count_variants
 from unitcad.sweeps.sweep import Range, from_file, known_paths
 from unitcad.validation import load, read
 from unitcad.validation.load import shipped_files
@@ -156,8 +156,8 @@ def test_a_thousand_million_variants_are_counted_and_limited(tmp_path):
     sweep = _sweep({"diameter_mm": axis, "layers.0.wall_mm": axis, "layers.1.wall_mm": axis})
     assert sweep.count == 10**9
     with pytest.raises(Refusal, match=r"1000000000.*--limit"):
-        counted(sweep, None)
-    assert counted(sweep, 10) == 10
+        count_variants(sweep, None)
+    assert count_variants(sweep, 10) == 10
     assert sweep.values(10**9 - 1)[1] == {"diameter_mm": 20.0, "layers.0.wall_mm": 20.0, "layers.1.wall_mm": 20.0}
     file = tmp_path / "big.toml"
     file.write_text(

@@ -10,7 +10,7 @@ import numpy as np
 
 from unitcad.accuracy.measurements import REFERENCE, respond
 from unitcad.attenuation.edge.level import changed, ends
-from unitcad.attenuation.edge.measured import stacked
+from unitcad.attenuation.edge.measured import stack_inputs
 from unitcad.attenuation.edge.models import edge_levels, stored
 from unitcad.attenuation.inputs import EstimateInput, tissue_medium
 from unitcad.estimate_inputs import closed_forms, fit_of
@@ -31,7 +31,7 @@ def amplifications(spec: Spec, variant: EstimateInput) -> dict[str, Any]:
     fit = fit_of(spec)
     results = {
         f"edge level, model {model}": edge_levels(
-            stacked(moved), model, fit.constants(model) if fit else stored(variant.moduli)[model]
+            stack_inputs(moved), model, fit.constants(model) if fit else stored(variant.moduli)[model]
         )
         for model in models
     }

@@ -25,7 +25,7 @@ from unitcad.errors import Missing, Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.export.chart import coord
 from unitcad.shape import Profile
-from unitcad.text import listed, number, some
+from unitcad.text import join_words, number, some
 
 BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
 MOST_LOADED = 100
@@ -452,7 +452,9 @@ def ratio_line(one: Mapping[str, Any]) -> str:
         "worst place, root of squares": one["root_sum_of_squares"],
         "in phase": one["sum"],
     }
-    said = listed(f"{change} x {number(value, 3, zeros=True)}" for change, value in parts.items() if value is not None)
+    said = join_words(
+        f"{change} x {number(value, 3, zeros=True)}" for change, value in parts.items() if value is not None
+    )
     tissue = "" if one["same_tissue"] else " (on another tissue)"
     return (
         f"{one['array']} over {one['over']}: {said or 'nothing to compare'}{tissue}, in edge levels of their own units."

@@ -25,7 +25,7 @@ from unitcad.designs.limits import LEAF_WIDTH, farthest_push, leaf_mm, least_ski
 from unitcad.export import printing
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.moulds.cup import ROOT, SLOPE, SQUARE, drawn, leaf_slots, placed
+from unitcad.moulds.cup import ROOT, SLOPE, SQUARE, drawn, leaf_slots, place_ribs
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, turned, union
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
 from unitcad.shape.tree import Body
@@ -214,7 +214,7 @@ class Coupon:
         As in a cup, ribs and slots are drawn mouth downwards.
         """
         clearance, crest, half = self.clearance, float(self.printer.least_feature_mm), (self.plug, self.plug)
-        standing = placed(half, CORNER, -self.height, clearance, interference, crest, self.leaf)
+        standing = place_ribs(half, CORNER, -self.height, clearance, interference, crest, self.leaf)
         drawings = drawn(standing, clearance, interference, crest, self.leaf / 2 or ROOT)
         room = cut(self._taper(clearance, RELIEF, 0.25), [turned(shape, "x", 2) for shape in drawings])
         return union((room, *(turned(slot, "x", 2) for slot in leaf_slots(standing, clearance, self.leaf))))

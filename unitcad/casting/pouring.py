@@ -30,7 +30,7 @@ from unitcad.casting.figures import (
 )
 from unitcad.casting.preparation import inner
 from unitcad.casting.steps import BenchStep
-from unitcad.casting.views import fed_through, picture_path
+from unitcad.casting.views import is_fed_through, picture_path
 from unitcad.catalogue import Material
 from unitcad.designs.design import Fitting
 from unitcad.designs.parts import ADHESIVE, bond
@@ -39,7 +39,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST
 from unitcad.moulds.plan import Step
 from unitcad.spec import Spec
-from unitcad.text import listed, number, spaced
+from unitcad.text import join_words, number, spaced
 
 TACK = (
     "done if a gloved finger comes off without a pull and a fingernail's dent springs back. If not, wait half an hour"
@@ -118,7 +118,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     dry = True
     for i, fitting in enumerate(laid):
         if fitting.mix and dry:
-            yield from mixed(batch)
+            yield from mixing_steps(batch)
             dry = False
         title = f"Lay in, {i + 1} of {len(laid)}" if len(laid) > 1 else "Lay in"
         shown = "" if i else picture("laid-in")
@@ -197,9 +197,9 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     else:
         yield _cup_held(moulds, n, picture("hold"))
     if dry:
-        yield from mixed(batch)
+        yield from mixing_steps(batch)
     if step.lid:
-        yield from injected(batch, picture("inject"))
+        yield from injection_steps(batch, picture("inject"))
     else:
         if cells == 1 or len(step.layer) > 1:
             where = "the cavity stands" if len(step.layer) == 1 else "it stands"
@@ -287,7 +287,7 @@ def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
     between = [number(at - left, 2) for at in others[:-1]]
     where = ": one at either end" if others else ""
     if between:
-        where += f", {'one' if len(between) == 1 else 'the others'} {listed(between)} mm from the left one"
+        where += f", {'one' if len(between) == 1 else 'the others'} {join_words(between)} mm from the left one"
     pieces = ""
     if split:
         pieces = " Each piece of cup and base that reaches these sides has one; one over a seam holds both pieces."
@@ -342,7 +342,7 @@ def _tongue_home(moulds: MouldSet, pour: int, the_tongue: str, picture: str) -> 
     )
 
 
-def mixed(batch: Batch) -> Iterator[BenchStep]:
+def mixing_steps(batch: Batch) -> Iterator[BenchStep]:
     """Describe the way from the bottles to a mix without air."""
     mix, larger = batch.mix, ""
     if mix.mix_error_pct > MOST_ERROR_PCT:
@@ -373,7 +373,7 @@ def _mixing(pot_min: float) -> str:
     )
 
 
-def injected(batch: Batch, picture: str) -> Iterator[BenchStep]:
+def injection_steps(batch: Batch, picture: str) -> Iterator[BenchStep]:
     """Say how the mix gets into the syringe, and from there into a cavity under a lid."""
     mix = batch.mix
     refilled = " Fill it again while the mix flows." if mix.syringe_size_ml < mix.millilitres else ""
@@ -512,7 +512,7 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         if fitting.mixed:
             yield from _mixed_later(later[fitting.mixed], moulds.spec)
         title = f"Motor in, {i + 1} of {len(fittings)}" if len(fittings) > 1 else "Motor in"
-        path = picture_path("motor-home" if i or fed_through(moulds) else "motor-in")
+        path = picture_path("motor-home" if i or is_fed_through(moulds) else "motor-in")
         minutes = LAY_IN_MIN * len(moulds.plan.layout.cells)
         yield BenchStep(title, fitting.text, path, minutes=minutes, required_tools=fitting.required_tools)
     mouth, motor = ("cavity's mouth", "motor") if moulds.makes == "unit" else ("cavities' mouths", "motors")

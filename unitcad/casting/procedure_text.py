@@ -9,19 +9,19 @@ from typing import Any
 
 import msgspec
 
-from unitcad.casting.bill import Item, grouped, in_words, plural, to_csv
+from unitcad.casting.bill import Item, group_bill, in_words, plural, to_csv
 from unitcad.casting.drawings import cast_colour
 from unitcad.casting.figures import OVER_ALL
 from unitcad.casting.preparation import MEASURED_MM
 from unitcad.casting.procedure import Procedure
-from unitcad.casting.steps import BenchStep, Phase, duration, shortened
+from unitcad.casting.steps import BenchStep, Phase, duration, number_steps
 from unitcad.casting.troubles import TROUBLES, troubles_markdown
 from unitcad.export import svg
 from unitcad.json_text import all_finite
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.tree import Body
-from unitcad.text import listed, markdown, number, spaced
+from unitcad.text import join_words, markdown, number, spaced
 
 
 def _nine_digits(text: str) -> float:
@@ -46,7 +46,7 @@ def files(procedure: Procedure) -> dict[str, str]:
 
 def _shortened(procedure: Procedure) -> Procedure:
     """Return the procedure with the short texts of its steps."""
-    left = iter(shortened(_steps(procedure)))
+    left = iter(number_steps(_steps(procedure)))
 
     def next_of(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
         return tuple(islice(left, len(steps)))
@@ -110,7 +110,7 @@ def to_markdown(procedure: Procedure) -> str:
     if printing.sizes:
         section("0. Measure first", _measuring(procedure))
     section("Print", (f"- {markdown(text)}" for text in printing.how))
-    for group, items in grouped(procedure.bill).items():
+    for group, items in group_bill(procedure.bill).items():
         if group == "print":
             continue  # the plate's line names the pieces
         section(group.capitalize(), _listed_items(items))
@@ -157,9 +157,9 @@ def _listed_items(items: Iterable[Item]) -> Iterator[str]:
             plain.append(counted)
     for silicone, each in parts.items():
         equal = len(each) == 2 and each[0][:-1] == each[1][:-1]
-        yield f"- silicone {silicone}: {f'{each[0]} and as much of B' if equal else listed(each)}"
+        yield f"- silicone {silicone}: {f'{each[0]} and as much of B' if equal else join_words(each)}"
     if plain:
-        yield f"- {listed(plain)}"
+        yield f"- {join_words(plain)}"
 
 
 def _stretches(line: Sequence[Phase]) -> Iterator[str]:

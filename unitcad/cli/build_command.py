@@ -39,13 +39,13 @@ from unitcad.pipeline import step_helper
 from unitcad.pipeline.make import Subject
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest, PartRecord, row
 from unitcad.pipeline.subjects import Compound, load_subject
-from unitcad.pipeline.write import BENCH, PAGE, Built, check_slicing, held, slice_tools
+from unitcad.pipeline.write import BENCH, PAGE, Built, check_slicing, hold_folder, slice_tools
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
 from unitcad.report.read_results import check_casts
-from unitcad.spec import Spec, assumed_lengths, read_toml, said_of
+from unitcad.spec import Spec, assumed_lengths, length_text, read_toml
 from unitcad.spec.custom_code import files_named
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 from unitcad.validation import confirm_known, every_template
 from unitcad.validation.suggestions import numbers
 
@@ -130,7 +130,7 @@ def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[
     """Yield a line of the lengths that nobody measured, if there are any; `path`: of the spec in its file."""
     assumed = {key: how for key, how in assumed_lengths(spec).items() if path + key not in given}
     if assumed:
-        lengths = listed(f"{path}{said_of(spec, key)} ({how})" for key, how in assumed.items())
+        lengths = join_words(f"{path}{length_text(spec, key)} ({how})" for key, how in assumed.items())
         yours = f"; build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
         yield f"measure first; assumed: {lengths}{yours}"
 
@@ -237,7 +237,7 @@ def _build_all(
                 printing.append(slice_tools(spec.unit, result.folder, result.manifest, say))
             if paged or (result.folder / PAGE).is_file():
                 say("page")
-                with held(result.folder):
+                with hold_folder(result.folder):
                     write_report(result.folder, warn)
         results.append(result)
     if as_json:

@@ -21,7 +21,7 @@ from unitcad.estimate_inputs import FEM, estimate_spec, frequency_table_of_spec,
 from unitcad.moulds.plan import plan
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 from unitcad.validation import compound_kind, confirm_known, load
 
 
@@ -133,7 +133,7 @@ def _fem_lines(block: dict[str, Any]) -> list[str]:
         "as drawn: the unit of the spec, bonded, nominal values.",
         f"Not known, and drawn: {block['not_known']}.",
         "The level on the skin over that of the unit's own edge, as drawn: "
-        + listed(f"{number(100 * ratio, 2)} % ({drive})" for drive, ratio in block["skin_over_edge"].items())
+        + join_words(f"{number(100 * ratio, 2)} % ({drive})" for drive, ratio in block["skin_over_edge"].items())
         + ". The paper does not state which of the two it measured.",
     ]
 

@@ -21,7 +21,7 @@ from unitcad.meshcheck.rules.registry import rules
 from unitcad.rooms import file_kinds, load
 from unitcad.validation import default_template
 from unitcad.validation.load import shipped_of
-from unitcad.validation.starter import commented
+from unitcad.validation.starter import comment_template
 
 
 def init(
@@ -56,7 +56,7 @@ def init(
     kind, start = starts[template]
     schema = f"unitcad-{kind.name}.schema.json"
     try:
-        write_new(path, commented(start, stem, load(kind.model), schema).encode())
+        write_new(path, comment_template(start, stem, load(kind.model), schema).encode())
     except FileExistsError:
         raise UnitcadError(f"{path}: is there already; choose another name") from None
     except OSError as error:

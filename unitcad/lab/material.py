@@ -48,7 +48,7 @@ class Declared:
     unit: str = ""
 
 
-def declared(texts: Iterable[str]) -> dict[str, Declared]:
+def parse_column(texts: Iterable[str]) -> dict[str, Declared]:
     """Parse QUANTITY=COLUMN[:UNIT]. Raises Refusal for anything else."""
     found: dict[str, Declared] = {}
     for text in texts:

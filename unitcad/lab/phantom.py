@@ -369,7 +369,7 @@ class Expected:
 
 
 def medium(phantom: PhantomTable, recipes: Sequence[Recipe], **changed: Sequence[float]) -> LayeredMedium:
-    """Return the stack; `changed` overrides thickness (mm), modulus (kPa) or loss factor, a value each layer."""
+    """Return the stack; `changes` overrides thickness (mm), modulus (kPa) or loss factor, a value each layer."""
     usual = {
         "thickness": [layer.thickness_mm for layer in phantom.layers],
         "modulus": [one.modulus_kpa for one in recipes],
@@ -401,7 +401,7 @@ def wall_distance(phantom: PhantomTable, recipes: Sequence[Recipe]) -> float:
 def echo_pct(phantom: PhantomTable, recipes: Sequence[Recipe], wall_mm: float, **changed: Sequence[float]) -> float:
     """Return the echo at the farthest point from a wall at a distance (mm) from the unit's centre, percent.
 
-    `changed` as in `medium`.
+    `changes` as in `medium`.
     """
     return 100 * float(_echo(phantom, medium(phantom, recipes, **changed), np.array([wall_mm]))[0])
 
@@ -499,7 +499,7 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
         raise Refusal("inside_mm", inside, limit, needed)
     size = lengths(table, inside, printer)
     tools = tuple(pieces(table, size))
-    for piece in printed(tools):
+    for piece in printed_pieces(tools):
         lengths_mm = np.diff(np.reshape(bounds(realise(piece.shape, SEGMENTS)), (2, 3)), axis=0)[0]
         needed_mm, bed = (*np.sort(lengths_mm[:2]), lengths_mm[2]), _bed(printer)
         over = float(np.max(np.subtract(needed_mm, bed)[:2]))
@@ -552,6 +552,6 @@ def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
     return found
 
 
-def printed(tools: Sequence[Body]) -> list[Body]:
+def printed_pieces(tools: Sequence[Body]) -> list[Body]:
     """Return the pieces that a printer makes."""
     return [body for body in tools if body.made == "printed"]

@@ -33,7 +33,7 @@ from unitcad.lab.phantom import (
     bolts,
     load_phantom,
     phantom_set,
-    printed,
+    printed_pieces,
     stiffening,
     tissue_table,
 )
@@ -174,7 +174,7 @@ def bill(phantom: PhantomSet) -> list[Item]:
     table, found = phantom.table, pours(phantom)
     rows: list[tuple[str, float, str, str, str]] = [
         (body.name, 1, "piece", f"printed {'upside down' if body.upside_down else 'as drawn'}", phantom.printer.name)
-        for body in printed(phantom.tools)
+        for body in printed_pieces(phantom.tools)
     ]
     side = 2 * phantom.size.inner - 0.6
     rows.append(("plate", 1, "piece", "cut", f"acrylic, {side:.1f} x {side:.1f} x {table.plate_thickness_mm:g} mm"))
@@ -369,7 +369,7 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
     """Return the files of a phantom's folder by their names, the pieces as STL and one 3MF."""
     found: dict[str, bytes] = {}
     parts = []
-    for body in printed(phantom.tools):
+    for body in printed_pieces(phantom.tools):
         stage(body.name)
         ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
         found[f"moulds/{body.name}.stl"] = printing.stl(*ready, body.name)

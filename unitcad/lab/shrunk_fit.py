@@ -136,7 +136,7 @@ def judge(model: Model, campaigns: Campaigns) -> Judged:
     return Judged(errors, stdtr(df, -errors / scale), centre, scale, df, campaigns.own, by_stored)
 
 
-def paired(judged: Judged, other: Judged) -> tuple[float, float, float]:
+def paired_difference(judged: Judged, other: Judged) -> tuple[float, float, float]:
     """Return the mean difference of |ln(predicted/measured)| to another model's, its standard error, sign-flip p."""
     one, two = np.abs(judged.errors), np.abs(other.errors)
     differences = one - two

@@ -122,7 +122,7 @@ def _plan(moulds: MouldSet, path: str, draw: Callable[[], str], reads: str) -> P
     return Planned(path, lambda: draw().encode(), partial(geometry_key, moulds, reads), "drawing")
 
 
-def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:
+def check_outputs(only: Sequence[str]) -> tuple[str, ...]:
     """Return `only` in the order of OUTPUTS. Raises Refusal for an unknown one, or none."""
     for name in only:
         if name not in OUTPUTS:

@@ -11,8 +11,8 @@ from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import GEOMETRIC, build_key, glb_content
-from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
-from unitcad.report.html_page import compressed
+from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
+from unitcad.report.html_page import compress
 from unitcad.spec import Spec, read_toml, with_formats
 from unitcad.validation import from_data
 
@@ -60,12 +60,12 @@ def model(spec: Spec) -> dict[str, Any]:
     moulds = MouldSet(spec)
     plan = moulds.plan
     return {
-        "unit": compressed(glb_content(moulds, moulds.unit)),
-        "moulds": compressed(glb_content(moulds, plan.tools)),
+        "unit": compress(glb_content(moulds, moulds.unit)),
+        "moulds": compress(glb_content(moulds, plan.tools)),
         "cells": cells(moulds),
         "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(moulds)],
         "unit_apart": {name: list(offset) for name, offset in unit_apart(moulds).items()},
-        "moulds_apart": {name: list(offset) for name, offset in taken_apart(moulds).items()},
+        "moulds_apart": {name: list(offset) for name, offset in exploded_moves(moulds).items()},
     }
 
 

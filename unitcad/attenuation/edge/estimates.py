@@ -16,7 +16,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from unitcad.attenuation.curve import decay_at, layered_block
-from unitcad.attenuation.edge.level import edge_level, model_block, ranged, unknown
+from unitcad.attenuation.edge.level import edge_level, model_block, range_notes, unknown
 from unitcad.attenuation.edge.measured import (
     CLASSES,
     LENGTHS,
@@ -45,7 +45,7 @@ from unitcad.attenuation.edge.models import (
 from unitcad.attenuation.edge.ranges import LabFit, coverage, error_block, lead_of, own_block, predictive_of
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import measurements
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 
 PAPER = "the paper"
 """Who measured the catalogue's levels."""
@@ -283,14 +283,14 @@ def _details(
         yield f"{PAPER.capitalize()} measured {percent(data['elsewhere'][0]['level'])} for this unit, in its own lab."
     others = [f"{number(100 * one['level'], 3)} %" for one in data["measured"][1:]]
     if others:
-        yield f"Also measured: {listed(others)}."
+        yield f"Also measured: {join_words(others)}."
     if differs := data["nearest"]["differs_in"]:
         yield (
             f"Nearest measured unit: {data['nearest']['unit']}, {number(100 * data['nearest']['level'], 3)} %. This "
-            f"unit differs in {listed(differs)}: the range is wider for it, by an assumed slope."
+            f"unit differs in {join_words(differs)}: the range is wider for it, by an assumed slope."
         )
     if unread := data["nearest"]["not_read"]:
-        yield f"Not measured, and not in the range: {listed(unread)}."
+        yield f"Not measured, and not in the range: {join_words(unread)}."
     if len(variant.layers) == 1:
         yield "The rule gives every one-material unit the same level; 39.5, 45.2 and 60.2 % were measured."
     yield SURFACE
@@ -309,7 +309,7 @@ def _skin(layered: dict[str, Any]) -> Iterator[str]:
     places = [(r, layered["r_mm"].index(r)) for r in SKIN_MM if r in layered["r_mm"]]
     ends = {r: _range(drive["u"]["low"][i], drive["u"]["high"][i]).removesuffix(" %") for r, i in places}
     told = [f"{percent(drive['u']['value'][i])} ({ends[r]}) after {r} mm" for r, i in places]
-    yield f"On the skin ({layered['tissue']}), of the motion at the edge: {listed(told)}."
+    yield f"On the skin ({layered['tissue']}), of the motion at the edge: {join_words(told)}."
     if "far" in layered:
         yield layered["far"]
 
@@ -408,7 +408,7 @@ def estimate(
         "table_error": errors,
         "assumptions": [
             *ASSUMPTIONS,
-            *(f"A range, not a value: {note}" for note in ranged(variant)),
+            *(f"A range, not a value: {note}" for note in range_notes(variant)),
             *dict.fromkeys(_noted(variant)),
         ],
     }

@@ -33,7 +33,7 @@ from unitcad.attenuation.edge.measured import (
     lengths,
     measured_table,
     nominal,
-    stacked,
+    stack_inputs,
 )
 from unitcad.attenuation.edge.models import (
     BASELINE,
@@ -351,7 +351,7 @@ def lead_of(moduli: Moduli = "small-strain", fit: LabFit | None = None) -> Lead:
 
 def predictive_of(variants: Sequence[EstimateInput], fit: LabFit | None = None) -> Predictive:
     """Return the distribution of ln level of variants of one number of layers, at their inputs' middle values."""
-    return lead_of(variants[0].moduli, fit).predictive(stacked(variants), lengths(variants))
+    return lead_of(variants[0].moduli, fit).predictive(stack_inputs(variants), lengths(variants))
 
 
 @cache

@@ -25,7 +25,7 @@ from msgspec.structs import replace
 from scipy.stats import binom
 
 from unitcad.attenuation.edge.level import sensitivities, unknown
-from unitcad.attenuation.edge.measured import merged
+from unitcad.attenuation.edge.measured import merge_layers
 from unitcad.attenuation.fem.elements import Block, Contact, Fields, Solid, harmonic_mesh, motor_response
 from unitcad.attenuation.inputs import Drive, EstimateInput, Geometry, Quantity, tissue_medium
 from unitcad.attenuation.layered import LayeredMedium
@@ -108,7 +108,7 @@ class Setting:
     circuit_modulus: float = CIRCUIT_MODULUS[1]
 
 
-def drawn(variant: EstimateInput, draw: Draw) -> tuple[EstimateInput, Setting]:
+def draw_unknowns(variant: EstimateInput, draw: Draw) -> tuple[EstimateInput, Setting]:
     """Return an input with every unknown set by a draw, and the draw's setting.
 
     Moduli, damping, thicknesses of the tissue, frequency and the motor's mass are in their ranges; the air round the
@@ -157,14 +157,14 @@ def _geometry(geometry: Geometry, draw: Draw, mass: Quantity) -> Geometry:
     if draw.either("no circuit"):
         made = replace(made, pad=None)
     if made.floor == 0.0 and draw.either("floor"):
-        made = lifted(made, draw.between("floor thickness", *FLOORS))
+        made = lift_unit(made, draw.between("floor thickness", *FLOORS))
     held = made.pad or made.floor or made.layers[0].cap
     if draw.either("gap filled") or not held:
         made = replace(made, cavity_radius=made.motor_radius)
     return made
 
 
-def lifted(geometry: Geometry, floor: float) -> Geometry:
+def lift_unit(geometry: Geometry, floor: float) -> Geometry:
     """Return a unit on a floor of Layer 1 (m) across its cavity: everything in it lies so much higher."""
     pad = geometry.pad
     return replace(
@@ -283,7 +283,7 @@ def level(
     for field, value, names in (("drive", drive, Drive), ("reading", reading, Reading)):
         if value not in get_args(names):
             raise unknown_name(field, str(value), get_args(names))
-    made, setting = drawn(variant_input, draw) if draw else (variant_input, Setting())
+    made, setting = draw_unknowns(variant_input, draw) if draw else (variant_input, Setting())
     moved = motion(replace(made, frequency=Quantity(frequency_hz)), drive, setting, fineness)
     return amplitude(moved.skin if reading == "skin" else moved.edge, drive) / abs(moved.motor)
 
@@ -370,7 +370,7 @@ def range_block(
         "percent": list(PERCENT),
         "median_error": MEDIAN_ERROR,
     }
-    variant = merged(variant, ALIKE)
+    variant = merge_layers(variant, ALIKE)
     if reason := unknown(variant):
         return {**data, "levels": [], "reason": reason}
     cases: list[tuple[Drive, Reading]] = [(drive, at) for drive in get_args(Drive) for at in get_args(Reading)]
@@ -379,7 +379,7 @@ def range_block(
     for index in range(draws):
         say(f"finite elements: draw {index + 1} of {draws}")
         draw = Draw(seed, index, draws)
-        made, setting = drawn(variant, draw)
+        made, setting = draw_unknowns(variant, draw)
         contacts.append(setting.contact)
         for drive, at in cases:
             found[drive, at].append(level(variant, made.frequency.middle, drive, at, draw, FINENESS))
@@ -428,7 +428,7 @@ def fem_sensitivities(
 
     One finite-element solution for each end of each input serves both readings.
     """
-    variant = merged(variant, ALIKE)
+    variant = merge_layers(variant, ALIKE)
     if unknown(variant):
         return []
     drive = variant.drive

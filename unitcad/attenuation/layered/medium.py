@@ -32,7 +32,7 @@ from unitcad.attenuation.layered.propagation import (
     det,
     parameter,
     product,
-    raised,
+    raise_plane,
     shear_compliance,
     underside,
 )
@@ -344,7 +344,7 @@ class Stack:
         materials = self.materials(omega)
         planes = [underside(materials[-1], k)]
         for kind, h, above in reversed(_cut([layer.thickness for layer in self.layers], depth)):
-            planes.append(raised(materials[kind], h, k, planes[-1], with_bottom=above))
+            planes.append(raise_plane(materials[kind], h, k, planes[-1], with_bottom=above))
         return planes[::-1]
 
     def transfer(self, ways: Sequence[int], k: Array, omega: float, depth: float) -> Array:

@@ -240,7 +240,7 @@ def underside(material: Material, k: Array) -> Plane:
     return Plane(solve_waves(material, k, *vertical_rates(material, k)).down)
 
 
-def raised(material: Material, h: float, k: Array, below: Plane, with_bottom: bool = False) -> Plane:
+def raise_plane(material: Material, h: float, k: Array, below: Plane, with_bottom: bool = False) -> Plane:
     """Return the plane at a layer's top from the plane at its bottom, each wavenumber by the method that suits it."""
     below = Plane(below.states, below.states if with_bottom else None, below.summed)
     if h == 0.0:
