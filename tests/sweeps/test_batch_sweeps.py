@@ -122,7 +122,7 @@ def test_the_paper_sweep_has_every_measured_unit():
             {"mode": "zip", "diameter_mm": [14.0, 15.0], "motor.diameter_mm": [7.0, 7.1, 7.2]},
             ["diameter_mm has 2", "has 3"],
         ),
-        ({"diameter_mm": [14.0, 15.0, 14.0]}, ["14", "is there twice"]),
+        ({"diameter_mm": [14.0, 15.0, 14.0]}, ["has 14 twice", "nearest accepted: [14.0, 15.0]"]),
         ({"diameter_mm": {"start": 1.0, "stop": 2.0, "num": 0}}, ["sweep.diameter_mm.num = 0", "nearest accepted: 1"]),
         ({"diameter_mm": {"start": 1.0, "stop": 2.0}}, ["sweep.diameter_mm.num", "is required"]),
         ({"diameter_mm": {"start": 1.0, "stop": 2.0, "num": 1e12}}, ["sweep.diameter_mm.num", "takes a whole number"]),

@@ -102,7 +102,7 @@ COMMANDS = {
     "list motors part.csv": "unexpected argument: part.csv; see unitcad list --help",
     "cache gc --limit 1GB": "--limit = '1GB': takes a number (MB), such as 4096",
     "serve sweep.toml": "SPEC = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
-    "report unit.toml": "unit.toml: is not a folder",
+    "report unit.toml": "unit.toml: is a file; name the folder of a build or of a batch",
 }
 FILES = {
     ("build", 'name = "a"\ndesign = encapsulating\n'): [

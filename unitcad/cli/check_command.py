@@ -346,7 +346,9 @@ def check(
         _write(said, plain=output_format == "text")
         raise typer.Exit(code)
     if not files and manifest is None:
-        raise UnitcadError("check needs files, folders or globs, or --manifest")
+        raise UnitcadError(
+            "FILE...: is required: mesh files, folders or globs, or --manifest; see unitcad check --help"
+        )
     for pattern, codes in (configuration.value("per_file_ignores") or {}).items():
         check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
     draw = None

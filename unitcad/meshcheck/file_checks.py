@@ -88,7 +88,7 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
     kind = readers.kind_of(path.name)
     if not kind:
         known = ", ".join(sorted(readers.SUFFIXES))
-        raise F005.unreadable(f"suffix {path.suffix!r} is no mesh's; known: {known}")
+        raise F005.unreadable(f"suffix {path.suffix!r} is not a mesh format; known: {known}")
     if not data:
         raise F001.unreadable("the file is empty")
     content, wanted = readers.foreign(data[:2048]), {"3mf": "zip", "step": "STEP", "glb": "binary glTF"}.get(kind)

@@ -292,7 +292,7 @@ def side_by_side(bodies: Sequence[Body]) -> list[Body]:
     """
     groups: dict[str, list[Body]] = {}
     for body in bodies:
-        several = body.kind in ("tongue", "stub")
+        several = body.kind in ("tongue", "filament")
         groups.setdefault(f"{body.kind}{body.step}" if several else body.name.partition("-")[0], []).append(body)
     placed, end = dict[str, Body](), -math.inf
     for group in groups.values():

@@ -80,7 +80,8 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
     Geometries are made by `modelled`, none without it. Raises UnitcadError if the folder has no result.
     """
     if not folder.is_dir():
-        raise UnitcadError(f"{folder}: is not a folder")
+        found = "is a file" if folder.exists() else "no such folder"
+        raise UnitcadError(f"{folder}: {found}; name the folder of a build or of a batch")
     damaged: dict[str, str] = {}
     if read_results.is_variant(folder):
         record, spec = read_results.read_variant(folder, folder)

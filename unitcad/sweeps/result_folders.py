@@ -157,7 +157,7 @@ def _entry_of(batch: Path, wanted: str) -> JournalEntry:
                         found[entry.folder] = entry
     except OSError as error:
         why = (error.strerror or "unreadable").lower()
-        raise UnitcadError(f"{batch / JOURNAL}: {why}; --batch names the folder of a batch") from None
+        raise UnitcadError(f"{batch}: no batch here ({JOURNAL}: {why}); --batch names the folder of a batch") from None
     if not found:
         raise WrongArgument("hash", wanted, f"no variant in {batch} has a hash that begins so")
     if len(found) > 1:

@@ -147,7 +147,7 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     Raises UnitcadError if one is missing, there twice, or of another batch.
     """
     if not folders:
-        raise UnitcadError("there are no shards to merge: name their folders, or their common parent")
+        raise UnitcadError("SHARD...: is required: folders of shards, or their common parent; see unitcad batch --help")
     records: dict[int, tuple[Path, ShardRecord]] = {}
     for folder in folders:
         try:
