@@ -187,9 +187,9 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
     )
     yield BenchStep(
         f"Level {base}",
-        f"Put {base} in its final place and {lid} on it, dry. Lay a level on {lid}, along it and across, and put paper "
-        f"under a corner of {base} until it shows none; within 5 degrees is good enough, since the vents clear so "
-        f"much. Lift {lid} off; leave {base} there until it is cured.",
+        f"Put {base} in its final place and {lid} on it, dry. Lay a level on {lid}, along it and across, and shim "
+        f"the corners of {base} with paper until it reads level. Within 5 degrees is good enough for the vents. "
+        f"Lift {lid} off; leave {base} there until it is cured.",
         _picture(step, "level"),
         minutes=5.0,
         required_tools=("level", "paper"),
@@ -424,8 +424,8 @@ def pocket_procedure(
         # The sheet must not get thinner at one end by more than a dent.
         level(
             "Put the tray in its final place. Lay a level on the cores, which are as high as the wall, along the tray "
-            f"and across, and put paper under a corner until it shows none. {fall(moulds)} Leave the tray there until "
-            "it is cured."
+            f"and across, and shim the corners with paper until it reads level. {fall(moulds)} Leave the tray there "
+            "until it is cured."
         ),
     )
     poured = (

@@ -242,8 +242,8 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     if step.lid:
         yield BenchStep(
             "Lid off",
-            "Take off what held the lid down. Push the lid's edge up from below on two opposite sides, with thumbs or "
-            f"a blunt spatula, a little at a time, cup {n} held down. Lift it straight up: sprue and vents tear off. "
+            "Remove its tape or bands. Push the lid's edge up from below on two opposite sides, with thumbs "
+            f"or a blunt spatula, bit by bit, cup {n} held down. Lift it straight up: sprue and vents tear off. "
             f"Trim them flush with a knife.{' Peel off silicone that came up on the core.' if core else ''}",
             picture("lid-off"),
             minutes=LIFT_MIN,
@@ -265,8 +265,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         )
     yield BenchStep(
         f"Cup {n} off",
-        f"{'' if step.lid else 'Take off what held the cup down. '}{pried} Lift cup {n} straight up. "
-        f"{recovery(moulds, n)}",
+        f"{'' if step.lid else 'Remove its tape or bands. '}{pried} Lift cup {n} straight up. {recovery(moulds, n)}",
         picture("cup-off"),
         minutes=LIFT_MIN,
         required_tools=("blunt spatula",) if split else (),
@@ -471,13 +470,13 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
             )
         if split and inner(split):
             levered += (
-                " A piece without an outer edge hangs by the tape alone. Before you lever, stick more tape across it, "
+                " A piece without an outer edge hangs only by the tape. Before you lever, stick more tape across it, "
                 "both ways, clear of the filaments' holes. Let its neighbours get a millimetre ahead at most, and pull "
                 "at the tape under it."
             )
         yield BenchStep(
             "Base off, downwards",
-            f"Take off what held the cup down. Leave {cup} on: silicone lies over it. {levered} The {moulds.makes} "
+            f"Remove its tape or bands. Leave {cup} on: silicone lies over it. {levered} The {moulds.makes} "
             f"stays in {cup}.",
             picture_path("base-off"),
             minutes=LIFT_MIN * 2,

@@ -37,7 +37,7 @@ FOOT_MM = 0.2
 MEASURED_MM = 0.05
 """Difference of a measured length from the drawn one from which it is worth to build again (assumed)."""
 GOOD_DEG = {"a phone": 0.2, "a spirit level of 0.5 mm/m": 0.03}
-"""Tilt that is left if a level shows none (assumed): two steps of a phone; a builder's level, turned end for end."""
+"""Tilt that is left if the level reads none (assumed): two steps of a phone; a builder's level, turned end for end."""
 
 
 def slicer_settings(moulds: MouldSet) -> dict[str, str]:
@@ -238,10 +238,10 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     cup = spaced(level_on(moulds).cup)
     enough = fall(moulds)
     if lengths.pour == "injected":
-        enough = f"Within {number(TILT_DEG, 2)} degrees is good enough: so much the vents clear."
+        enough = f"Within {number(TILT_DEG, 2)} degrees is good enough for the vents."
     yield level(
         f"Put the base where it stays until the last cure, {cup} on it. Lay a level on the rim, along and across, and "
-        f"put paper under a corner of the base until it shows none. {enough} Take {cup} off."
+        f"shim the corners of the base with paper until it reads level. {enough} Take {cup} off."
     )
 
 

@@ -104,8 +104,8 @@ def to_markdown(procedure: Procedure) -> str:
 
     total, bench = duration(procedure.earliest_finish_min), duration(procedure.bench_min)
     out = "units and sheet are out of their moulds" if made == "sheet" else f"{made} is out of the mould"
-    lines.append(f"The {out} **{total}** after the print, with {bench} at the bench (assumed).")
-    lines.append(f"Faults: {TROUBLES}.\n")
+    lines.append(f"The {out} **{total}** after the print. You work {bench} of it at the bench (assumed).")
+    lines.append(f"If something goes wrong, see {TROUBLES}.\n")
     lines += [*_stretches(procedure.time_line), ""]
     if printing.sizes:
         section("0. Measure first", _measuring(procedure))
@@ -113,7 +113,7 @@ def to_markdown(procedure: Procedure) -> str:
     for group, items in group_bill(procedure.bill).items():
         if group == "print":
             continue  # the plate's line names the pieces
-        section(group.capitalize(), _listed_items(items))
+        section("Have ready" if group == "have" else group.capitalize(), _listed_items(items))
     steps("Before the first pour", procedure.preparation)
     titles = [f"{pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}" for pour in procedure.pours]
     for title, pour in zip(titles, procedure.pours, strict=True):
@@ -163,14 +163,14 @@ def _listed_items(items: Iterable[Item]) -> Iterator[str]:
 
 
 def _stretches(line: Sequence[Phase]) -> Iterator[str]:
-    """Yield a line for each stretch at the bench: its begin, its phases, its length; the wait after the last."""
+    """Yield a line for each stretch of work: its start, its phases, its length; the wait after the last."""
     names, begins, bench = list[str](), 0.0, 0.0
     for i, phase in enumerate(line, 1):
         begins = begins if names else phase.start_min
         names, bench = [*names, phase.name], bench + phase.bench_min
         if phase.wait_min or i == len(line):
             wait = f", then wait {duration(phase.wait_min)}" if phase.wait_min and i == len(line) else ""
-            yield f"- after {duration(begins)}: {', '.join(names)}, {duration(bench)}{wait}"
+            yield f"- {duration(begins)} after the start: {', '.join(names)}; {duration(bench)} of work{wait}"
             names, bench = [], 0.0
 
 
@@ -181,12 +181,12 @@ def _appendix(procedure: Procedure) -> Iterator[str]:
     yield from (" ".join(sections), "")
     for o in procedure.off_grid:
         height, by = number(o.height_mm, 3), number(o.moved_mm, 2)
-        yield f"- {spaced(o.piece)}, {o.edge}: {height} mm, which whole layers move by {by} mm"
+        yield f"- {spaced(o.piece)}, {o.edge}: {height} mm; whole layers move it by {by} mm"
     # The height over all is among the measures.
     inside = [height for height in procedure.unit_heights if height.what != OVER_ALL]
     heights = (f"{h.what} {number(h.printed_mm, 3)} for {number(h.asked_mm, 3)}" for h in inside)
     if inside:
-        yield f"- in whole layers, mm: {', '.join(heights)}"
+        yield f"- heights as printed in whole layers, mm: {', '.join(heights)}"
     yield from ("", "All figures and their sources: casting.json.", "", "</details>")
 
 

@@ -133,7 +133,7 @@ def casting_markdown(phantom: PhantomSet) -> str:
         lines += ["", *steps(_pour(phantom, pour)), ""]
     lines += ["## Marks, and out of the box", "", *steps(_release(phantom)), ""]
     lines += ["## What to expect", "", *_expectations(phantom), ""]
-    lines += ["## Needed", "", "| item | quantity | made | note |", "| --- | --- | --- | --- |"]
+    lines += ["## Buy and have ready", "", "| item | quantity | made | note |", "| --- | --- | --- | --- |"]
     lines += [f"| {i.item} | {i.quantity:.4g} {i.unit} | {i.made} | {markdown(i.note)} |" for i in bill(phantom)]
     return "\n".join(lines) + "\n"
 
@@ -180,8 +180,12 @@ def bill(phantom: PhantomSet) -> list[Item]:
     rows.append(("plate", 1, "piece", "cut", f"acrylic, {side:.1f} x {side:.1f} x {table.plate_thickness_mm:g} mm"))
     for name in dict.fromkeys(one.silicone.name for one in phantom.recipes):
         own = [p for p in found if phantom.recipes[p.layer].silicone.name == name]
-        rows.append((f"{name} part A", sum(p.part_a_g for p in own), "g", "bought", f"{len(own)} pours"))
-        rows.append((f"{name} part B", sum(p.part_b_g for p in own), "g", "bought", f"{len(own)} pours"))
+        rows.append(
+            (f"{name} part A", sum(p.part_a_g for p in own), "g", "bought", f"{len(own)} pour{'s' * (len(own) > 1)}")
+        )
+        rows.append(
+            (f"{name} part B", sum(p.part_b_g for p in own), "g", "bought", f"{len(own)} pour{'s' * (len(own) > 1)}")
+        )
     rows.append(("silicone thinner", sum(p.thinner_g for p in found), "g", "bought", "of the silicones' maker"))
     rows += [
         ("scale", 1, "piece", "at hand", f"reads {table.scale_resolution_g:g} g"),
