@@ -20,7 +20,7 @@ NAMES = sorted(templates())
 
 def test_the_templates_are_all_there() -> None:
     assert set(NAMES) >= {
-        "chain",
+        "pass-through",
         "embedded",
         "encapsulating",
         "motor-10mm",

@@ -66,7 +66,7 @@ def pictures() -> dict[str, bytes]:
     custom = HERE.parents[1] / "templates" / "custom"
     dome, film, lugs = (Variant.of(str(custom / f"{name}.toml")) for name in ("dome", "film-closed", "strap-lugs"))
     made = {f"{name}-unit.png": unit_cut_open(variant) for name, variant in variants.items()}
-    made |= {f"{name}-unit.png": unit_cut_open(Variant.of(name)) for name in ("chain", "three-layer")}
+    made |= {f"{name}-unit.png": unit_cut_open(Variant.of(name)) for name in ("pass-through", "three-layer")}
     made |= {"strap-lugs-unit.png": unit_cut_open(lugs), "film-closed-unit.png": unit_cut_open(film)}
     made["encapsulating-moulds.png"] = exploded_view(variants["encapsulating"])
     made["strap-lugs-moulds.png"] = exploded_view(lugs)

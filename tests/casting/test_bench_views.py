@@ -211,7 +211,7 @@ def test_what_strikes_off_passes_what_stands_on_the_base() -> None:
     [
         ("encapsulating",),
         ("motor-10mm",),
-        ("chain", "moulds.cavities=[1,3]"),
+        ("pass-through", "moulds.cavities=[1,3]"),
         ("encapsulating", "moulds.cavities=[2,2]"),
         ("three-layer", "moulds.printer=sla"),
     ],

@@ -579,7 +579,7 @@ def test_windows_that_resin_closes_are_cleared() -> None:
         assert faults[0] == "the window of cup1 is not cleared of resin before the post-cure"
 
 
-@pytest.mark.parametrize("name", ["encapsulating", "chain", "three-layer"])
+@pytest.mark.parametrize("name", ["encapsulating", "pass-through", "three-layer"])
 def test_tools_in_resin_have_no_warning(name: str, tmp_path: Path) -> None:
     done = build(load(name, ["moulds.printer=sla", "output.formats=['stl']"]), tmp_path, only=("moulds",))
     assert done.manifest["check"] == {"errors": 0, "warnings": 0, "findings": []}

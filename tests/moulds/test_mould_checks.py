@@ -226,7 +226,7 @@ def test_strain_within_the_margin_is_kept() -> None:
     assert max(f.value for f in findings if f.code == "C310") > 5
 
 
-@pytest.mark.parametrize("name", ["encapsulating", "chain"])
+@pytest.mark.parametrize("name", ["encapsulating", "pass-through"])
 def test_chain_pad_through_the_slot_needs_124_percent(name: str) -> None:
     """The circuit's pad of 8.4 through the slot of 3.4 by 0.4: 2 (8.4 + 0.11) over 2 (3.4 + 0.4), less one."""
     findings = check_moulds(set_of(name, "fpcb.tail_end_width_mm=8.4"))

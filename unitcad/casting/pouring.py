@@ -135,7 +135,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         yield BenchStep(
             "Grease the flanks",
             f"Before cup {n} goes on, smear petroleum jelly on {flanks}: a film that shines, no beads. It keeps "
-            "silicone out of the slits beside the cup's slots. Wipe it off everywhere else.",
+            "silicone out of the slits next to the cup's slots. Wipe it off everywhere else.",
             picture("grease"),
             minutes=1.0 * cells,
             required_tools=("petroleum jelly",),
@@ -207,7 +207,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             poured = f"Pour in a thin thread at one place until {where} over its rim{each}."
         else:
             poured = (
-                "Pour in a thin thread, first beside each unit's earlier layer until that is covered, then outwards "
+                "Pour in a thin thread, first at each unit's earlier layer until that is covered, then outwards "
                 "until the whole cavity stands over its rim."
             )
         strip = not plan.concentric and plan.dimensions.core_height > step.rim

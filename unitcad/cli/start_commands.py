@@ -58,15 +58,15 @@ def init(
     try:
         write_new(path, comment_template(start, stem, load(kind.model), schema).encode())
     except FileExistsError:
-        raise UnitcadError(f"{path}: is there already; choose another name") from None
+        raise UnitcadError(f"{path}: exists already; choose another name") from None
     except OSError as error:
         raise UnitcadError(f"{path}: {(error.strerror or 'unwritable').lower()}") from None
     if as_json:
         print_json({kind.name: str(path)})
         return
-    typer.echo(f"then: {kind.command} {path}")
+    typer.echo(f"Edit the file, then run: {kind.command} {path}")
     if not Path(schema).exists():
-        typer.echo(f"an editor checks it as you type after: unitcad schema {kind.name} -o {schema}")
+        typer.echo(f"To check it in an editor as you type, run: unitcad schema {kind.name} -o {schema}")
     typer.echo(str(path))
 
 

@@ -35,7 +35,7 @@ def design(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Try all designs at hand for a target, and rank them.
+    """Rank all available designs for a target.
 
     Each proposal has its probability of meeting the level at the edge, with a range, and the inputs that no measurement
     covers. The last line printed is the folder: the page design.html, ranking.csv, and specs to build.

@@ -298,7 +298,7 @@ def _write(path: Path, content: bytes, replace: bool) -> None:
         with contextlib.suppress(UnitcadError):  # a link, no regular file, or larger
             same = read(path, largest=len(content), links=False) == content
         if not same:
-            raise Refusal("name", path.name, "is there already; replace it, or choose another name")
+            raise Refusal("name", path.name, "exists already; replace it, or choose another name")
     write(path, content)
 
 

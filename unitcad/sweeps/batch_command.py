@@ -108,7 +108,10 @@ PAGE_UP_TO = 100
 def batch(
     ctx: typer.Context,
     sweep: Annotated[
-        str, typer.Argument(metavar="SWEEP", help="Sweep file, or name of a shipped one; or merge, and shards.")
+        str,
+        typer.Argument(
+            metavar="SWEEP", help="Sweep file, or name of a shipped one (unitcad list sweeps); merge joins shards."
+        ),
     ],
     shards: Annotated[
         list[Path] | None,
