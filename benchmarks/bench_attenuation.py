@@ -20,7 +20,7 @@ from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.curve import decay
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.models import MODELS, edge_levels
-from unitcad.attenuation.inputs import EstimateInput, TissueLayer, body
+from unitcad.attenuation.inputs import EstimateInput, TissueLayer, tissue_medium
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
@@ -66,7 +66,7 @@ def cold(rounds: int) -> None:
 def undamped(variant: EstimateInput) -> LayeredMedium:
     """The variant's body with the damping left out."""
     full: tuple[TissueLayer, ...] = variant.tissue
-    damped = body(full)
+    damped = tissue_medium(full)
     layers = [Layer(one.thickness, one.density, one.youngs_modulus, one.poisson_ratio) for one in damped.layers]
     last = damped.half_space
     return LayeredMedium(layers, HalfSpace(last.density, last.youngs_modulus, last.poisson_ratio))
@@ -94,7 +94,7 @@ def by_quad_vec(medium: LayeredMedium, lifted: bool) -> tuple[np.ndarray, float,
 def response(rounds: int) -> None:
     """Thirteen radii on the forearm at rtol 1e-6, beside quad_vec where it converges."""
     variant = estimate_input(load("encapsulating"))
-    for name, medium in (("damped", body(variant.tissue)), ("undamped", undamped(variant))):
+    for name, medium in (("damped", tissue_medium(variant.tissue)), ("undamped", undamped(variant))):
         truth = medium.response(UniformDisc(A), OMEGA, RADII, rtol=1e-9)
         scale = float(np.max(np.abs(truth.u_z)))
 

@@ -131,7 +131,9 @@ def _shown(procedure: Procedure) -> Iterator[str]:
 
 def _levelled(procedure: Procedure) -> Iterator[str]:
     """Level the mould before the first pour, and say how to see it."""
-    if not any("level" in step.text and "paper under a corner" in step.text for step in procedure.preparation):
+    if not any(
+        "level" in step.text and "corners" in step.text and "paper" in step.text for step in procedure.preparation
+    ):
         yield "nothing says how the mould is levelled"
 
 

@@ -105,7 +105,7 @@ def test_fill_closes_the_ring_of_air() -> None:
 
 def test_a_chain_is_symmetric_and_one_tail_is_not() -> None:
     chain, one = (
-        _solids(Variant.of("chain"))["fpcb"].bounding_box(),
+        _solids(Variant.of("pass-through"))["fpcb"].bounding_box(),
         _solids(Variant.of("encapsulating"))["fpcb"].bounding_box(),
     )
     assert chain[0] == -chain[3] == -17

@@ -38,7 +38,7 @@ def test_ready_mesh_is_closed_and_keeps_its_volume(name):
 
 def test_upside_down_stands_on_the_side_that_was_up():
     vertices, _ = arrays(realise(cup().shape, 96))
-    laid = printing.laid_down(vertices, True)
+    laid = printing.lay_down(vertices, True)
     assert laid[:, 2].min() == 0
     assert np.array_equal(laid[:, 0], vertices[:, 0])
     assert np.allclose(laid[:, 2], 4.61 - vertices[:, 2], atol=1 / 1024)

@@ -15,7 +15,7 @@ from unitcad.export import raster
 from unitcad.export.finding_pictures import common_line
 from unitcad.export.raster import Label, Layer, Surface
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.scenes import exploded, unit_cut_open
+from unitcad.pipeline.scenes import exploded_view, unit_cut_open
 from unitcad.pipeline.variant import Variant
 from unitcad.validation import templates
 
@@ -136,7 +136,7 @@ SETS = [(name, []) for name in sorted(templates())] + [
 ]
 
 
-@pytest.mark.parametrize("draw", [exploded, unit_cut_open])
+@pytest.mark.parametrize("draw", [exploded_view, unit_cut_open])
 @pytest.mark.parametrize(("name", "changes"), SETS)
 def test_names_in_the_pictures_of_all_templates(
     draw: Callable[[MouldSet], bytes], name: str, changes: list[str], monkeypatch: pytest.MonkeyPatch

@@ -83,10 +83,10 @@ def test_every_template_builds_and_passes_all_checks(name: str, tmp_path: Path) 
 
 
 def test_the_same_spec_gives_the_same_bytes(tmp_path: Path) -> None:
-    first = build(_mesh_only("chain"), tmp_path / "a")
+    first = build(_mesh_only("pass-through"), tmp_path / "a")
     code = (
         "from unitcad.pipeline.write import build; from unitcad.validation import load; from pathlib import Path;"
-        f"build(load('chain', ['output.formats=[\"stl\",\"3mf\"]']), Path({str(tmp_path / 'b')!r}))"
+        f"build(load('pass-through', ['output.formats=[\"stl\",\"3mf\"]']), Path({str(tmp_path / 'b')!r}))"
     )
     subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONHASHSEED": "7"})
     second = tmp_path / "b" / first.folder.name

@@ -20,7 +20,7 @@ NAMES = sorted(templates())
 
 def test_the_templates_are_all_there() -> None:
     assert set(NAMES) >= {
-        "chain",
+        "pass-through",
         "embedded",
         "encapsulating",
         "motor-10mm",
@@ -121,7 +121,7 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("layers=3", r"^layers = 3: takes a list: one \[\[layers\]\] table or more"),
         ("output.formats=stl", r"takes a list such as \[\"stl\"\]; nearest accepted: \[\"stl\"\]$"),
         ("output.formats=3", r"takes a list such as \[\"stl\"\]$"),
-        ("moulds.cavities=3", r"takes a text or a list such as \[1, 1\]; nearest accepted: \[3, 3\]$"),
+        ("moulds.cavities=3", r"takes \"fill\" or a list such as \[1, 1\]; nearest accepted: \[3, 3\]$"),
         ("layers.0=3", r"^layers\.0 = 3: takes a table"),
         (
             "layers.7.wall_mm=1.0",
@@ -130,7 +130,7 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("name=''", "must not be empty"),
         (f"name='{'x' * 121}'", "at most 120 characters"),
         ("name=2026-01-01", "date or time"),
-        ("fpcb.tail=3", r"^fpcb\.tail = 3: takes a text"),
+        ("fpcb.tail=3", r"^fpcb\.tail = 3: takes one of one, both"),
         ("moulds.cavities=[1]", r"^moulds\.cavities = .*2 entries"),
         ("moulds.cavities=[1, 1.5]", r"^moulds\.cavities\.1 = 1\.5: takes a whole number"),
         ("materials.mine=3", r"^materials\.mine = 3: takes a table"),

@@ -59,14 +59,14 @@ def test_the_cache_lives_with_locks_that_nobody_removes(tmp_path: Path, monkeypa
 
 
 def test_a_path_on_another_drive_is_shown_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert files.seen_from("a/../b/c.stl") == "b/c.stl"
-    assert files.seen_from("/x/b/c.stl", "/x/d") == "../b/c.stl"
+    assert files.path_seen_from("a/../b/c.stl") == "b/c.stl"
+    assert files.path_seen_from("/x/b/c.stl", "/x/d") == "../b/c.stl"
 
     def other_drive(path: str, start: str = ".") -> str:
         raise ValueError("path is on mount 'D:', start on mount 'C:'")
 
     monkeypatch.setattr(os.path, "relpath", other_drive)
-    assert files.seen_from("/x/b/c.stl") == "/x/b/c.stl"
+    assert files.path_seen_from("/x/b/c.stl") == "/x/b/c.stl"
 
 
 @pytest.mark.parametrize("name", ["con", "CON", "Nul.toml", "com1", "lpt9.tar.gz", "aux "])

@@ -18,13 +18,13 @@ from manifold3d import Manifold
 
 from tests.sample_bodies import LEADLESS
 from unitcad.checks import balance, draw, overlap
-from unitcad.checks.draw import blocked
+from unitcad.checks.draw import blocked_area
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST, Removal, base_piece
 from unitcad.moulds.plan import Step
-from unitcad.moulds.surroundings import cropped
+from unitcad.moulds.surroundings import crop
 from unitcad.shape import Common, Shape, box, cut, cylinder, exact_volume, moved, ring, rotated, union
 from unitcad.shape.column import Column, Standing
 from unitcad.shape.tree import Body
@@ -101,7 +101,7 @@ def test_what_blocks_a_piece_along_its_own_axis_is_the_same_area_at_any_slant(sl
     for piece, area in ((INSERT, 0.0), (union((INSERT, collar)), math.pi * (8**2 - 7**2))):
         stays = cut(cylinder(9, -3, 20), [union((MOAT, piece))])
         one, other = (mesh.realise(placed(shape, slant, (0, 0)), SEGMENTS) for shape in (piece, stays))
-        assert blocked(one, other, axis_of(slant)) == pytest.approx(area, abs=1e-9)
+        assert blocked_area(one, other, axis_of(slant)) == pytest.approx(area, abs=1e-9)
 
 
 def test_a_cast_comes_out_of_a_slanted_moat_along_its_axis_and_not_straight_up() -> None:
@@ -140,7 +140,7 @@ def test_what_a_column_is_told_to_hold_is_what_turned_solids_have_there(axis: st
         tree = union((rotated(box(-12, 12, -1, 1, -1, 1), axis, degrees), rotated(moved(CORE, 9), axis, -degrees)))
         for x, y in ((0.0, 0.0), (6.0, 5.0), (-8.0, 2.0)):
             column = Column(x, y, 3.0)
-            whole = cropped(mesh.realise(tree, SEGMENTS), column).translate((-x, -y, 0))
+            whole = crop(mesh.realise(tree, SEGMENTS), column).translate((-x, -y, 0))
             parts = [mesh.realise(part, SEGMENTS) for part in Standing([tree]).within(column)]
-            told = cropped(Manifold.compose(parts), Column(0, 0, 3.0)) if parts else Manifold()
+            told = crop(Manifold.compose(parts), Column(0, 0, 3.0)) if parts else Manifold()
             assert abs(whole.volume() + told.volume() - 2 * (whole ^ told).volume()) < 1e-6

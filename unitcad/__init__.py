@@ -123,7 +123,7 @@ def __getattr__(name: str) -> object:
     loaded = import_module(f"{__name__}.{module}")
     value = getattr(loaded, attribute) if attribute else loaded
     if attribute.endswith(("Table", "Entry")):
-        value.__doc__ = import_module(f"{__name__}.spec.fields").documented(value)
+        value.__doc__ = import_module(f"{__name__}.spec.fields").document(value)
     globals()[name] = value
     return value
 

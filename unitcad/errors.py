@@ -132,9 +132,9 @@ class Refusal(UnitcadError):
 
     def __init__(self, field: str, value: object, limit: str, nearest: object = None) -> None:
         self.field, self.value, self.limit, self.nearest = field, value, limit, nearest
-        text = f"{field}: {limit}" if value is None else f"{field} = {shown(value)}: {limit}"
+        text = f"{field}: {limit}" if value is None else f"{field} = {format_value(value)}: {limit}"
         if nearest is not None:
-            text += NEAREST + shown(nearest)
+            text += NEAREST + format_value(nearest)
         super().__init__(text)
 
     def as_dict(self) -> dict[str, object]:
@@ -212,7 +212,7 @@ def misfit(error: Exception) -> str:
     return f"{place} has a value of the wrong kind"
 
 
-def shown(value: object) -> str:
+def format_value(value: object) -> str:
     """Return a value as a refusal's sentence has it."""
     if isinstance(value, float):
         return f"{value:.6g}"

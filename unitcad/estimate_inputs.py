@@ -10,7 +10,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded, rounded_layered
-from unitcad.attenuation.edge.measured import merged
+from unitcad.attenuation.edge.measured import merge_layers
 from unitcad.attenuation.edge.ranges import LabFit
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered import FractionalKelvinVoigt
@@ -38,7 +38,7 @@ def estimate_spec(
     The model `fem` is a range for each drive and reading, under the key "fem"; it costs seconds and needs scikit-fem.
     `say` gets the progress.
 
-    Raises `Refusal` if no frequency is known, for an unknown material or tissue, and for values no body has.
+    Raises `Refusal` if no frequency is known, for an unknown material or tissue, and for values no tissue has.
     """
     variant, asked = estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models)
     data = estimate(variant, closed_forms(asked), layered, fit_of(spec))
@@ -90,11 +90,11 @@ def neighbours_of_specs(specs: Sequence[Spec], pitch_mm: float, frequencies_hz: 
 
 
 def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
-    """Return a spec's unit on its body, in SI, neighbouring layers of one silicone as one layer.
+    """Return a spec's unit on its tissue, in SI, neighbouring layers of one silicone as one layer.
 
     `frequency_hz` overrides the spec's and the motor's.
     """
-    return merged(drawn_input(spec, frequency_hz))
+    return merge_layers(drawn_input(spec, frequency_hz))
 
 
 def drawn_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
@@ -227,7 +227,7 @@ def _no_modulus(material: Material) -> str:
 
 
 def tissue_layer(layer: Tissue) -> TissueLayer:
-    """Return a body's layer in SI. Raises `Refusal` for one without a modulus."""
+    """Return a tissue's layer in SI. Raises `Refusal` for one without a modulus."""
     nu = float(layer.poisson_ratio)
     if layer.shear_modulus_kpa:
         shear = _quantity(layer.shear_modulus_kpa, 1e3)

@@ -222,7 +222,7 @@ def write_new(path: str | os.PathLike[str], content: bytes, *, sync: bool = Fals
             raise
 
 
-def seen_from(path: str | os.PathLike[str], folder: str | os.PathLike[str] = ".") -> str:
+def path_seen_from(path: str | os.PathLike[str], folder: str | os.PathLike[str] = ".") -> str:
     """Return a path as seen from a folder, with slashes; the whole path if that is on another drive of Windows."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()

@@ -88,7 +88,7 @@ def _number(size: float, digits: int, zeros: bool) -> str:
     return text.rstrip("0").rstrip(".") if "." in text and not zeros else text
 
 
-def listed(words: Iterable[str]) -> str:
+def join_words(words: Iterable[str]) -> str:
     """Return words as a list in a sentence: "base, cups and lids"."""
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last
@@ -148,7 +148,7 @@ def shown(value: object) -> str:
     return "-" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def shortened(text: str, most: int) -> str:
+def shorten(text: str, most: int) -> str:
     """Return a text of at most `most` characters, what is left out as three dots."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
 

@@ -30,7 +30,7 @@ from unitcad.attenuation.edge.models import (
     stored,
 )
 from unitcad.attenuation.fem.unit import Setting, motion
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements
 from unitcad.estimate_inputs import estimate_input
@@ -78,7 +78,7 @@ def run(quick: bool, say: Say) -> Result:
         name: NineLevels({unit: {"": float(level)} for unit, level in zip(table.names, own, strict=True)})
         for name, own in levels.items()
     }
-    marks = stars([(model.time.median, model.assessed.left_out.geometric_mean) for model in models.values()])
+    marks = stars([(model.time.median, model.assessed.leave_one_out.geometric_mean) for model in models.values()])
     comparison = Table(
         "Against nine levels and twelve ratios to controls: geometric-mean factor error (1 is exact)",
         ("model", "constants", "levels", "left out", "ratios", "left out", "directions", "time a level", "frontier"),
@@ -93,7 +93,10 @@ def run(quick: bool, say: Say) -> Result:
         "Error against the measured levels, each unit left out, against time",
         "seconds a level",
         "geometric-mean factor error less 1",
-        {name: ((model.time.median, model.assessed.left_out.geometric_mean - 1),) for name, model in models.items()},
+        {
+            name: ((model.time.median, model.assessed.leave_one_out.geometric_mean - 1),)
+            for name, model in models.items()
+        },
         frontier=True,
     )
     say("mesh convergence")
@@ -135,7 +138,7 @@ def run(quick: bool, say: Say) -> Result:
 
 def _summary(models: dict[str, _Model]) -> Summary:
     """Return the three models with the best scores for a unit that they were not fitted to, and the worst model."""
-    scored = sorted((model.assessed.left_out.geometric_mean, name) for name, model in models.items())
+    scored = sorted((model.assessed.leave_one_out.geometric_mean, name) for name, model in models.items())
     picks = tuple(
         (
             "amplitude at a unit's edge, this unit left out of the fit",
@@ -210,7 +213,7 @@ def bare_skin(finenesses: Sequence[float], repeats: int) -> tuple[Table, float]:
     """
     variant = estimate_input(load(default_template()))
     omega, disc = 2 * math.pi * variant.frequency.middle, variant.motor_diameter / 2
-    medium = body(variant.tissue)
+    medium = tissue_medium(variant.tissue)
     exact = medium.response(UniformDisc(disc), omega, _RADII, rtol=1e-9).u_z
     scale = np.max(np.abs(exact))
     calls = {n: partial(pressed_skin, medium, omega, "axial", disc, n) for n in finenesses}
@@ -243,12 +246,12 @@ def _given(levels: Sequence[float]) -> Fit:
 
 
 def _row(name: str, model: _Model) -> tuple[Cell, ...]:
-    assessed, ratios = model.assessed, model.assessed.left_out_ratios
+    assessed, ratios = model.assessed, model.assessed.leave_one_out_ratios
     return (
         name,
         model.constants,
         assessed.levels.geometric_mean,
-        assessed.left_out.geometric_mean,
+        assessed.leave_one_out.geometric_mean,
         assessed.ratios.geometric_mean,
         ratios.geometric_mean if ratios else None,
         f"{assessed.directions} of {assessed.ratios.count}",

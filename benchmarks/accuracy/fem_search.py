@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.accuracy.elements import amplitude
 from unitcad.attenuation.edge.measured import CONTROL, measured_table
-from unitcad.attenuation.fem.unit import Draw, Drive, Reading, Setting, drawn, motion
+from unitcad.attenuation.fem.unit import Draw, Drive, Reading, Setting, draw_unknowns, motion
 from unitcad.catalogue import measurements
 from unitcad.designs import shipped
 from unitcad.estimate_inputs import estimate_input
@@ -54,7 +54,7 @@ def unit_levels(unit: str, draw: Draw | None, fineness: float) -> np.ndarray:
 def _shape_levels(design: str, layers: str, draw: Draw | None, fineness: float) -> np.ndarray:
     variant, setting = estimate_input(unit_spec(design, layers)), Setting()
     if draw:
-        variant, setting = drawn(variant, draw)
+        variant, setting = draw_unknowns(variant, draw)
     free = 1 / ((2 * math.pi * variant.frequency.middle) ** 2 * variant.geometry.motor_mass.middle)
     levels = np.empty((len(DRIVES), len(READINGS), len(COMPONENTS), len(REFERENCES)))
     for i, drive in enumerate(DRIVES):

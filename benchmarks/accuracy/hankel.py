@@ -15,7 +15,7 @@ from benchmarks.accuracy import hankel_peers as peers
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
 from unitcad.accuracy.measurements import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import default_template, load
@@ -92,7 +92,7 @@ TEXT = (
 
 def cases() -> list[Case]:
     """Return the forearm, the same without damping, and the same next to incompressible with little damping."""
-    forearm = body(estimate_input(load(default_template())).tissue)
+    forearm = tissue_medium(estimate_input(load(default_template())).tissue)
     bare = [Layer(la.thickness, la.density, la.youngs_modulus, la.poisson_ratio) for la in forearm.layers]
     stiff = [Layer(la.thickness, la.density, la.youngs_modulus, 0.4999999, LossFactor(0.01)) for la in forearm.layers]
     rock = HalfSpace(forearm.half_space.density, forearm.half_space.youngs_modulus, forearm.half_space.poisson_ratio)

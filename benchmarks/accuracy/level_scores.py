@@ -21,9 +21,9 @@ from unitcad.attenuation.edge.models import (
     assessments,
     bootstrap_range,
     choice,
-    classes_out,
     in_order,
-    left_out_levels,
+    leave_one_class_out,
+    leave_one_out_levels,
     one_constant,
     pairwise,
     rules,
@@ -37,9 +37,9 @@ LEVEL = 0.05
 _SEED = 5417
 
 
-def left_out_errors(fit: Fit, table: MeasuredTable) -> np.ndarray:
+def leave_one_out_errors(fit: Fit, table: MeasuredTable) -> np.ndarray:
     """Return |ln(predicted/measured)| of each unit, predicted by constants fitted without it."""
-    return np.abs(np.log(left_out_levels(fit, table) / table.levels))
+    return np.abs(np.log(leave_one_out_levels(fit, table) / table.levels))
 
 
 def forms() -> dict[str, Fit]:
@@ -95,14 +95,14 @@ def simulated(truth: str, count: int, table: MeasuredTable) -> Study:
     told = dict.fromkeys((name for name in models if name != truth), 0)
     for _ in range(count):
         made = with_levels(table, exact * np.exp(noise * rng.standard_normal(units)))
-        errors = {name: left_out_errors(model.levels, made) for name, model in models.items()}
+        errors = {name: leave_one_out_errors(model.levels, made) for name, model in models.items()}
         low, high = np.log(bootstrap_range(errors[truth]))
         holds += bool(low <= own_score <= high)
         first += all(errors[truth].mean() <= errors[name].mean() for name in told)
         for name in told:
             behind = errors[name].mean() > errors[truth].mean()
             told[name] += bool(behind and sign_flip_p(errors[truth], errors[name]) <= LEVEL)
-        equal = [left_out_errors(_off(exact, noise, rng), made) for _ in range(2)]
+        equal = [leave_one_out_errors(_off(exact, noise, rng), made) for _ in range(2)]
         false += sign_flip_p(*equal) <= LEVEL
     shares = {name: n / count for name, n in told.items()}
     return Study(truth, noise, count, holds / count, shares, first / count, false / count)
@@ -123,8 +123,10 @@ def permutation_p(name: str, count: int, table: MeasuredTable) -> float:
     """Return how often the model's left-out score is as good on levels shuffled among the units; seeded."""
     fit = COMPARED[name].levels
     rng = np.random.default_rng(_SEED)
-    observed = left_out_errors(fit, table).mean()
-    shuffled = (left_out_errors(fit, with_levels(table, rng.permutation(table.levels))).mean() for _ in range(count))
+    observed = leave_one_out_errors(fit, table).mean()
+    shuffled = (
+        leave_one_out_errors(fit, with_levels(table, rng.permutation(table.levels))).mean() for _ in range(count)
+    )
     return (1 + sum(bool(score <= observed + 1e-12) for score in shuffled)) / (1 + count)
 
 
@@ -139,8 +141,8 @@ def score_tables(count: int) -> tuple[tuple[Table, ...], tuple[Promise, ...]]:
         (
             name,
             len(COMPARED[name].names),
-            found[name].left_out.geometric_mean,
-            "{:.2f} to {:.2f}".format(*found[name].left_out_range),
+            found[name].leave_one_out.geometric_mean,
+            "{:.2f} to {:.2f}".format(*found[name].leave_one_out_range),
             against.get(name),
             p[name],
         )
@@ -163,13 +165,13 @@ def score_tables(count: int) -> tuple[tuple[Table, ...], tuple[Promise, ...]]:
         "Every form that was tried",
         ("form", "levels", "left out", "chosen without the unit"),
         tuple(
-            (name, one.levels.geometric_mean, one.left_out.geometric_mean, chosen.chosen.count(name) or None)
+            (name, one.levels.geometric_mean, one.leave_one_out.geometric_mean, chosen.chosen.count(name) or None)
             for name, fit in forms().items()
             for one in [assess(fit, False, table)]
         ),
         "Chosen: for how many of the nine units it is the best form of the rule on the other eight.",
     )
-    by_class = classes_out()
+    by_class = leave_one_class_out()
     classes = Table(
         "Error on a class of units that the fit did not have",
         ("class left out", *order),

@@ -45,7 +45,7 @@ def run(quick: bool, say: Say) -> Result:
     judged = {}
     for name in JUDGED:
         say(f"nine units left out: {name}")
-        judged[name] = left_out(name, measured_table())
+        judged[name] = leave_one_out(name, measured_table())
     tables = [_units(name, own) for name, own in judged.items()]
     tables += [_reliability(judged), _coverage(judged)]
     promises = [
@@ -81,7 +81,7 @@ def run(quick: bool, say: Say) -> Result:
     )
 
 
-def left_out(name: str, table: MeasuredTable) -> list[Judged]:
+def leave_one_out(name: str, table: MeasuredTable) -> list[Judged]:
     """Predict each unit of a table by a model fitted to the others; a unit of unknown shape has its shapes' mean."""
     found = []
     for i, unit in enumerate(table.names):

@@ -15,8 +15,8 @@ from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.attenuation.curve import CONTACT_MM, contact, decay, ends
 from unitcad.attenuation.fem.elements import Contact
-from unitcad.attenuation.fem.unit import Draw, Setting, drawn, unit_fields
-from unitcad.attenuation.inputs import Drive, EstimateInput, body
+from unitcad.attenuation.fem.unit import Draw, Setting, draw_unknowns, unit_fields
+from unitcad.attenuation.inputs import Drive, EstimateInput, tissue_medium
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements
 from unitcad.estimate_inputs import estimate_input
@@ -119,7 +119,7 @@ def _shah(variant: EstimateInput, drive: Drive) -> Iterator[tuple[float, int, fl
 def _speed(variant: EstimateInput, hertz: float) -> float:
     """Return the phase speed of u_z of the forearm from 10 to 20 mm under a normal force, m/s."""
     r, omega = np.linspace(10e-3, 20e-3, 41), 2 * math.pi * hertz
-    found = body(variant.tissue).response(UniformDisc(variant.motor_diameter / 2.0), omega, r, rtol=1e-4)
+    found = tissue_medium(variant.tissue).response(UniformDisc(variant.motor_diameter / 2.0), omega, r, rtol=1e-4)
     return float(omega * (r[-1] - r[0]) / abs(np.unwrap(np.angle(found.u_z))[[0, -1]] @ [-1, 1]))
 
 
@@ -127,7 +127,7 @@ def bodies_in_range(variant: EstimateInput, draws: int) -> dict[Drive, tuple[flo
     """Return, by drive, which share of bodies drawn within the template's sources holds each band, and both."""
     held: dict[Drive, list[list[bool]]] = {drive: [] for drive in DRIVES}
     for i in range(draws):
-        made, _ = drawn(variant, Draw(SEED, i))
+        made, _ = draw_unknowns(variant, Draw(SEED, i))
         for drive, rows in held.items():
             found = [far(made, hertz, drive) for hertz in BANDS]
             inside = [low <= one <= high for one, (_, low, high) in zip(found, BANDS.values(), strict=True)]

@@ -12,8 +12,8 @@ from benchmarks.accuracy.fem_search import DRIVES, READINGS, drawn_levels, searc
 from benchmarks.accuracy.machine import machine
 from benchmarks.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.measurements import PROCESSOR, PROCESSOR_NOTE, interleaved
-from unitcad.attenuation.fem.unit import Draw, Drive, Setting, drawn, motion
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.fem.unit import Draw, Drive, Setting, draw_unknowns, motion
+from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.catalogue import measurements
 from unitcad.estimate_inputs import estimate_input
@@ -116,7 +116,7 @@ def _bare_skin() -> tuple[Table, float]:
     """Compare every component of both drives on bare skin with the layered solver."""
     variant = estimate_input(load(default_template()))
     omega, disc = 2 * math.pi * variant.frequency.middle, variant.motor_diameter / 2
-    medium = body(variant.tissue)
+    medium = tissue_medium(variant.tissue)
     rows, worst = [], 0.0
     cases: tuple[tuple[Drive, str], ...] = (("axial", "normal"), ("flat", "tangential"))
     for drive, direction in cases:
@@ -147,7 +147,7 @@ def _draws_by_mesh(count: int) -> tuple[float, float]:
     changes = []
     variant = estimate_input(load(default_template()))
     for index in range(count):
-        made, setting = drawn(variant, Draw(SEED, index))
+        made, setting = draw_unknowns(variant, Draw(SEED, index))
         for drive in DRIVES:
             coarse, fine = (motion(made, drive, setting, n) for n in (_USED, _FINER))
             for reading in READINGS:

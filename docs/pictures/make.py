@@ -32,7 +32,7 @@ from unitcad.arrays.patch import patch_moulds  # noqa: E402
 from unitcad.cache import MemoryStore  # noqa: E402
 from unitcad.lab.phantom import load_phantom, phantom_set  # noqa: E402
 from unitcad.lab.phantom_command import box_picture  # noqa: E402
-from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # noqa: E402
+from unitcad.pipeline.scenes import exploded_view, step_in_section, unit_cut_open  # noqa: E402
 from unitcad.pipeline.write import build  # noqa: E402
 from unitcad.report import write_report  # noqa: E402
 from unitcad.validation import compound_kind, load  # noqa: E402
@@ -66,12 +66,12 @@ def pictures() -> dict[str, bytes]:
     custom = HERE.parents[1] / "templates" / "custom"
     dome, film, lugs = (Variant.of(str(custom / f"{name}.toml")) for name in ("dome", "film-closed", "strap-lugs"))
     made = {f"{name}-unit.png": unit_cut_open(variant) for name, variant in variants.items()}
-    made |= {f"{name}-unit.png": unit_cut_open(Variant.of(name)) for name in ("chain", "three-layer")}
+    made |= {f"{name}-unit.png": unit_cut_open(Variant.of(name)) for name in ("pass-through", "three-layer")}
     made |= {"strap-lugs-unit.png": unit_cut_open(lugs), "film-closed-unit.png": unit_cut_open(film)}
-    made["encapsulating-moulds.png"] = exploded(variants["encapsulating"])
-    made["strap-lugs-moulds.png"] = exploded(lugs)
+    made["encapsulating-moulds.png"] = exploded_view(variants["encapsulating"])
+    made["strap-lugs-moulds.png"] = exploded_view(lugs)
     made["strap-lugs-pour2.png"] = step_in_section(lugs, 2)
-    made["film-closed-moulds.png"] = exploded(film)
+    made["film-closed-moulds.png"] = exploded_view(film)
     made["film-closed-pour2.png"] = step_in_section(film, 2)
     made["dome-unit.png"] = unit_cut_open(dome)
     made["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)

@@ -24,7 +24,7 @@ from unitcad.accuracy.measurements import (
     skipped_rows,
     tolerances_of,
 )
-from unitcad.attenuation.inputs import Quantity, body
+from unitcad.attenuation.inputs import Quantity, tissue_medium
 from unitcad.attenuation.layered import LayeredMedium, Response
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.cli import app
@@ -57,7 +57,9 @@ def test_the_errors_of_the_response_are_those_against_a_reference_that_shares_no
     distances = np.array([0.0, 5e-3, 30e-3])
     load_of_motor = UniformDisc(VARIANT.motor_diameter / 2, "tangential")
     omega = 2 * math.pi * VARIANT.frequency.middle
-    exact = ball_reference.response(body(VARIANT.tissue), load_of_motor, omega, VARIANT.diameter / 2 + distances)
+    exact = ball_reference.response(
+        tissue_medium(VARIANT.tissue), load_of_motor, omega, VARIANT.diameter / 2 + distances
+    )
     tight = respond(VARIANT, distances, REFERENCE)
     for rtol in RTOLS[:3]:
         found = respond(VARIANT, distances, rtol)
@@ -95,8 +97,8 @@ def test_an_extreme_design_is_named_with_its_place() -> None:
     thin[0] = changed_struct(thin[0], thickness=Quantity(1e-5))
     found = {row["what"]: row for row in extremes(SPEC, changed_struct(VARIANT, tissue=tuple(thin)))}
     named = {what for what, row in found.items() if row["extreme"]}
-    assert named == {"body: thinnest layer / its shear wavelength", "body: least 1 - 2 nu"}
-    film = found["body: thinnest layer / its shear wavelength"]
+    assert named == {"tissue: thinnest layer / its shear wavelength", "tissue: least 1 - 2 nu"}
+    film = found["tissue: thinnest layer / its shear wavelength"]
     skin = thin[0]
     speed = abs((skin.shear_modulus.middle * (1 + 1j * skin.damping.middle) / skin.density) ** 0.5)
     assert skin.damping_law == "loss_factor"

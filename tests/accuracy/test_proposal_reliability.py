@@ -10,16 +10,16 @@ from scipy.stats import beta
 
 from benchmarks.accuracy import proposal_reliability as suite
 from unitcad.attenuation.edge.measured import measured_table
-from unitcad.attenuation.edge.ranges import held
+from unitcad.attenuation.edge.ranges import coverage
 
 
 def test_a_units_own_level_does_not_enter_its_prediction() -> None:
     table = measured_table()
-    before = suite.left_out("rule", table)
+    before = suite.leave_one_out("rule", table)
     for i in (0, 4):
         levels = table.levels.copy()
         levels[i] *= 3.0
-        changed = suite.left_out("rule", replace(table, levels=levels))
+        changed = suite.leave_one_out("rule", replace(table, levels=levels))
         assert changed[i].met == before[i].met
         assert (changed[i].low, changed[i].high) == (before[i].low, before[i].high)
         assert changed[1].met != before[1].met
@@ -66,4 +66,4 @@ def test_the_suite_runs_and_keeps_its_promises() -> None:
 
 
 def test_how_many_ranges_held_is_what_an_estimate_says() -> None:
-    assert sum(one.held for one in suite.left_out("rule", measured_table())) == held()
+    assert sum(one.held for one in suite.leave_one_out("rule", measured_table())) == coverage()

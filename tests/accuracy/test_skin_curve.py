@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.accuracy import skin_curve as suite
 from unitcad.attenuation.curve import CONTACT, CONTACT_MM, contact, crosstalk_ratio, layered_block
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
@@ -51,7 +51,7 @@ def test_what_is_left_every_20_mm_is_that_of_the_solver() -> None:
     """Of a half-space whose surface wave decays as exp(-a r)/sqrt(r) far out: the fall is exp(-20 mm a)."""
     variant = suite.forearm()
     r = 1e-3 * np.array(suite.FAR_MM)
-    found = body(variant.tissue).response(UniformDisc(3.5e-3), 2 * math.pi * 50, r, rtol=1e-5)
+    found = tissue_medium(variant.tissue).response(UniformDisc(3.5e-3), 2 * math.pi * 50, r, rtol=1e-5)
     size = np.sqrt(abs(found.u_r) ** 2 + abs(found.u_z) ** 2) * np.sqrt(r)
     assert suite.far(variant, 50.0, "axial") == pytest.approx((size[-1] / size[0]) ** (1 / 3), rel=2e-3)
 

@@ -13,7 +13,7 @@ import pytest
 
 import unitcad
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import array_templates, expanded, load_array
+from unitcad.arrays.array_file import array_templates, expand, load_array
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.sheet import rounded
@@ -159,7 +159,7 @@ def test_a_unit_file_lies_beside_the_array_file(tmp_path: Path) -> None:
 
 def test_no_table_lets_the_decoder_read_beyond_its_memory() -> None:
     """A union of a fixed tuple and of numbers or texts with limits makes msgspec read other limits."""
-    data = expanded({"name": "a", "array": "pockets", "unit": default_template(), "layout": _GRID})
+    data = expand({"name": "a", "array": "pockets", "unit": default_template(), "layout": _GRID})
     for _ in range(3):
         msgspec.convert(data, AskedArray)
         for pitch in (20.0, [20.0, 21.0]):

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.robustness.test_offers_are_accepted import check_each_field, numbers
-from unitcad.arrays.array_file import array_templates, expanded, load_array
+from unitcad.arrays.array_file import array_templates, expand, load_array
 from unitcad.arrays.patch import patch_moulds
 from unitcad.spec.toml import read_toml
 
@@ -16,7 +16,7 @@ def tools_of(data):
 @pytest.mark.parametrize("name", sorted(array_templates()))
 def test_a_wild_number_of_an_array_is_refused_with_a_value_that_is_accepted(name, count):
     path = array_templates()[name]
-    base = expanded(read_toml(path), path.parent)
+    base = expand(read_toml(path), path.parent)
     tables = ("layout.", "sheet.", "body.", "circuit.")
     own = {at: value for at, value in numbers(load_array(name).asked).items() if at.startswith(tables)}
     check_each_field(base, own, tools_of, count, name)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.arrays.made_arrays import made
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_page import FINEST, picture_names, wrapped
+from unitcad.arrays.array_page import FINEST, bend_points, picture_names
 from unitcad.arrays.array_page import bent as bent_mesh
 from unitcad.arrays.crosstalk import pairs
 from unitcad.arrays.patch import patch_moulds
@@ -42,7 +42,7 @@ def test_the_back_lies_at_its_radius(template: str) -> None:
     assert array.radius_mm is not None
     assert array.middle_radius_mm is not None
     back = np.array([[7.0, 1.0, array.sheet.high]])
-    x, _, z = wrapped(back, array.radius_mm, array.middle_radius_mm)[0]
+    x, _, z = bend_points(back, array.radius_mm, array.middle_radius_mm)[0]
     assert array.back_radius_mm == pytest.approx(math.hypot(x, z), rel=1e-12)
 
 
@@ -93,7 +93,7 @@ def test_the_bent_sheet_has_the_flat_ones_volume() -> None:
     # A chord of a step s cuts s^2 / 6 R^2 off the sector under it.
     assert 1 - (FINEST / bent.middle_radius) ** 2 / 6 < volume / plate.volume() < 1
     middle = (drawn.low + drawn.high) / 2
-    ends = wrapped(np.array([[x0, 0, middle], [x1, 0, middle]]), 40, bent.middle_radius)
+    ends = bend_points(np.array([[x0, 0, middle], [x1, 0, middle]]), 40, bent.middle_radius)
     chord = 2 * bent.middle_radius * math.sin(bent.ends / 2 / bent.middle_radius)
     assert math.dist(*ends) == pytest.approx(chord, rel=1e-6)
     assert "pictures/patch-bent.png" in picture_names(moulds)

@@ -23,7 +23,7 @@ from unitcad.arrays.crosstalk import (
 )
 from unitcad.attenuation import UniformDisc
 from unitcad.attenuation.curve import crosstalk_ratio
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.receivers import neighbours_block
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec
@@ -60,7 +60,7 @@ def test_every_pair_is_what_the_solver_gives_it_alone(seed: int, other: str) -> 
     data = crosstalk(made, band=())
     for i, one in enumerate(made.places):
         variant = estimate_input(one.unit)
-        medium, omega = body(variant.tissue), 2 * np.pi * variant.frequency.middle
+        medium, omega = tissue_medium(variant.tissue), 2 * np.pi * variant.frequency.middle
         for drive in ("flat", "axial"):
             for j, to in enumerate(made.places):
                 if i == j:

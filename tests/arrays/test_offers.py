@@ -169,7 +169,7 @@ def test_a_pitch_out_of_range_is_refused_before_what_follows_from_it(name: str, 
     )
 
 
-@pytest.mark.parametrize(("unit", "tail", "pitch"), [("three-layer", 5.6, 21), ("chain", 7.1, 21.7)])
+@pytest.mark.parametrize(("unit", "tail", "pitch"), [("three-layer", 5.6, 21), ("pass-through", 7.1, 21.7)])
 def test_a_tail_too_long_is_told_the_length_and_the_pitch(unit: str, tail: float, pitch: float) -> None:
     refused = refusal_of("hex-19", {"unit": unit})
     assert (refused.field, refused.nearest) == ("unit.fpcb.tail_length_mm", tail)

@@ -12,7 +12,7 @@ import pytest
 
 from tests.moulds.faulty_sets import broken, mesh_findings
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_page import taken_apart
+from unitcad.arrays.array_page import take_apart
 from unitcad.arrays.array_procedure import back_sheet_procedure
 from unitcad.arrays.constructions.back_sheet import drawing_of
 from unitcad.arrays.patch import PatchMoulds, patch_moulds
@@ -145,7 +145,7 @@ def test_a_faulty_seam_across_y_is_caught(where: str, what: str, play: float, ch
 
 def test_pieces_of_a_grid_are_drawn_apart_both_ways() -> None:
     moulds = made("hexagon, x and y")
-    by = {body.name: offset[:2] for body, offset in taken_apart(moulds) if body.name.startswith("base")}
+    by = {body.name: offset[:2] for body, offset in take_apart(moulds) if body.name.startswith("base")}
     signs = {name: (math.copysign(1, x), math.copysign(1, y)) for name, (x, y) in by.items()}
     assert signs == {"base-1": (-1, 1), "base-2": (1, 1), "base-3": (-1, -1), "base-4": (1, -1)}
 

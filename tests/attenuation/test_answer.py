@@ -51,8 +51,8 @@ def test_the_second_line_is_the_papers_model_with_its_error_and_the_baselines() 
         level = data["models"][name]["edge_level"]["value"]
         assert found["analytic"][name]["value"] == level
         assert f"{100 * level:.2g} %" in found["lines"][1]
-    published, baseline = (scores[name].left_out.geometric_mean for name in ("published", "baseline"))
-    assert f"left out: x {published:.2f}; of four class means x {baseline:.2f}." in found["lines"][1]
+    published, baseline = (scores[name].leave_one_out.geometric_mean for name in ("published", "baseline"))
+    assert f"error: factor {published:.2f}; baseline, the means of four classes: {baseline:.2f}." in found["lines"][1]
     assert "its path of u_z through the walls" in found["lines"][1]
 
 
@@ -62,11 +62,11 @@ def test_the_answer_does_not_depend_on_the_models_that_are_asked_for() -> None:
 
 
 def test_the_rules_error_and_how_often_its_ranges_held_are_in_the_details() -> None:
-    found, best = lead("embedded"), assessments()["rule"].left_out
-    assert (found["model"], found["held"]) == ("rule", 8)
+    found, best = lead("embedded"), assessments()["rule"].leave_one_out
+    assert (found["model"], found["coverage"]) == ("rule", 8)
     assert (found["typical_error"], found["worst_error"]) == pytest.approx((best.geometric_mean, best.worst), rel=1e-6)
-    assert "four class means: x 1.3" in found["details"][0]
-    assert "it held 8 of the nine" in found["details"][1]
+    assert "baseline: 1.3" in found["details"][0]
+    assert "Coverage of the 80 % range: 8 of 9" in found["details"][1]
 
 
 def test_how_many_ranges_held_is_counted_again() -> None:
@@ -83,7 +83,7 @@ def test_how_many_ranges_held_is_counted_again() -> None:
         others = np.delete(np.arange(9), i)
         scale = np.sqrt(sum(out(others, j) ** 2 for j in others) / 7)
         held += abs(out(np.arange(9), i)) <= scale * stats.t.ppf(0.9, 6)
-    assert lead("embedded")["held"] == held
+    assert lead("embedded")["coverage"] == held
 
 
 def test_one_material_units_are_said_to_be_one_level() -> None:
@@ -139,7 +139,7 @@ def test_the_command_leads_with_two_lines_and_keeps_the_rest_for_details() -> No
     for line in found["lines"]:
         assert line in plain
     full = run(app, ["estimate", "embedded", "--details"]).output
-    tables = ("error against the table", "|u| of the skin, % of that", "1 % more of", "% of an", "a class that the fit")
+    tables = ("error against the table", "|u| of the skin, % of that", "input + 1 %", "% of an", "leave-one-class-out")
     for words in tables:
         assert words not in plain
         assert words in full

@@ -42,7 +42,7 @@ def test_contract(encapsulating):
     assert list(encapsulating["models"]) == ["rule", "divider", "published", "corrected"]
     for block in encapsulating["models"].values():
         assert {"edge_level", "hierarchical_over_control", "table_error", "assumptions"} <= set(block)
-        assert {"levels", "ratios", "directions", "leave_one_unit_out"} <= set(block["table_error"])
+        assert {"levels", "ratios", "directions", "leave_one_out"} <= set(block["table_error"])
         level = block["edge_level"]
         assert level["low"] <= level["value"] <= level["high"]
         assert [one["control"] for one in block["hierarchical_over_control"]] == [SOFT, STIFF]
@@ -67,7 +67,7 @@ def test_layered_curve(encapsulating):
     assert layered["hierarchical_over_control"] is None
     assert layered["hierarchical_over_control_reason"] == NO_RATIO
     assert layered["r_mm"] == list(range(31))
-    assert set(layered["paper_beside"]["exponential"]) == {"loss_modulus", "kelvin_voigt"}
+    assert set(layered["published_curves"]["exponential"]) == {"loss_modulus", "kelvin_voigt"}
 
 
 def test_readings_and_constraints(encapsulating):
@@ -104,7 +104,7 @@ def test_measured_in_both_prints_and_one_unit_without_a_figure():
         ("motor-10mm", (), ["motor", "diameter", "frequency"]),
         ("encapsulating", ("motor.drive=axial",), ["drive"]),
         ("encapsulating", ("layers.0.wall_mm=1.0",), ["walls"]),
-        ("encapsulating", ("estimate.tissue=rigid-plate",), ["body"]),
+        ("encapsulating", ("estimate.tissue=rigid-plate",), ["tissue"]),
         ("encapsulating", ("motor.lip_mm=0.5",), ["lip"]),
         ("encapsulating", ("skin_mm=0.5",), ["film on the skin side"]),
     ],
@@ -119,7 +119,7 @@ def test_measured_is_said_of_the_same_unit_only(template, change, differs):
     assert not any("measured" in line and "5.17" in line and "│" in line for line in shown.splitlines())
     assert "measured in the paper" not in shown.splitlines()[1]
     said = " ".join(shown.split())
-    if unread := [name for name in differs if name in ("drive", "body", "lip", "film on the skin side")]:
+    if unread := [name for name in differs if name in ("drive", "tissue", "lip", "film on the skin side")]:
         assert f"Not measured, and not in the range: {' and '.join(unread)}." in said
     else:
         assert "Nearest measured unit: encapsulating E10/D30, 5.17 %. This unit differs in" in said
@@ -283,7 +283,7 @@ def test_the_tables_of_a_person(monkeypatch):
     shown = run("encapsulating", "embedded", "--details").stdout
     assert shown.count("error against the table") == 1
     assert shown.index("chosen among") > shown.index("embedded: embedded")
-    assert shown.index("|u| of the skin") < shown.index("changes the edge level by")
+    assert shown.index("|u| of the skin") < shown.index("change of the edge level")
     for word in ("equation 6", "eta read as"):
         assert word not in run("encapsulating").stdout
         assert word.split()[0] in run("encapsulating", "--model", "published", "--details").stdout

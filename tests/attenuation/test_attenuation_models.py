@@ -13,9 +13,9 @@ from unitcad.attenuation.edge.models import (
     MODELS,
     assessments,
     choice,
-    classes_out,
     edge_levels,
     leader,
+    leave_one_class_out,
     rules,
     stored,
 )
@@ -202,7 +202,7 @@ def test_a_class_without_units_has_the_mean_of_the_others():
 
 
 @pytest.mark.parametrize(
-    ("model", "levels", "left_out", "worst", "directions"),
+    ("model", "levels", "leave_one_out", "worst", "directions"),
     [
         ("rule", None, 1.29, 1.76, None),
         ("baseline", None, 1.327, 1.76, 12),
@@ -211,11 +211,11 @@ def test_a_class_without_units_has_the_mean_of_the_others():
         ("published", None, 1.70, None, 12),
     ],
 )
-def test_what_was_found_before(model, levels, left_out, worst, directions):
+def test_what_was_found_before(model, levels, leave_one_out, worst, directions):
     """Figures that were found by other programs."""
     found = assessments()[model]
-    assert found.left_out.geometric_mean == pytest.approx(left_out, abs=0.006)
-    for own, before in ((found.levels.geometric_mean, levels), (found.left_out.worst, worst)):
+    assert found.leave_one_out.geometric_mean == pytest.approx(leave_one_out, abs=0.006)
+    for own, before in ((found.levels.geometric_mean, levels), (found.leave_one_out.worst, worst)):
         assert before is None or own == pytest.approx(before, abs=0.006)
     assert directions in (None, found.directions)
 
@@ -235,12 +235,12 @@ def test_the_rule_between_equal_moduli_and_the_measured_ratio():
 def test_the_form_is_chosen_without_the_unit_among_eleven():
     assert len(rules()) == 11
     assert choice().score.geometric_mean == pytest.approx(1.38, abs=0.01)
-    assert choice().score.geometric_mean > assessments()["rule"].left_out.geometric_mean
+    assert choice().score.geometric_mean > assessments()["rule"].leave_one_out.geometric_mean
 
 
 def test_a_class_left_out_costs_more():
     """By fits to the table without the class."""
-    table, found = measured_table(), classes_out()
+    table, found = measured_table(), leave_one_class_out()
     assert tuple(found) == CLASSES
     for i, (_, errors) in enumerate(found.items()):
         kept = [int(row) for row in np.flatnonzero(table.classes != i)]
@@ -260,7 +260,7 @@ def test_slopes_between_measured_units():
 
 
 def test_what_leads_is_the_rule_unless_a_model_is_told_apart_from_it_and_the_baseline():
-    own = {name: one.left_out_errors for name, one in assessments().items()}
+    own = {name: one.leave_one_out_errors for name, one in assessments().items()}
     assert leader(own) == "rule"
     n = np.ones(8)
     errors = {"rule": 0.4 * n, "baseline": 0.4 * n, "published": 0.1 * n, "divider": 0.2 * n}

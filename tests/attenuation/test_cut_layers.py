@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.edge.level import edge_level
-from unitcad.attenuation.edge.measured import merged
+from unitcad.attenuation.edge.measured import merge_layers
 from unitcad.attenuation.edge.models import MODELS
 from unitcad.attenuation.edge.ranges import predictive_of
 from unitcad.attenuation.fem.unit import ALIKE
@@ -111,7 +111,7 @@ def test_finite_elements_have_both_halves_of_the_law(seed: int) -> None:
     other = [nearly(whole, rng), {**whole, "layers": [piece for layer in whole["layers"] for piece in cut(layer, rng)]}]
 
     def solved(data: dict[str, Any]) -> float:
-        return finite_elements(merged(estimate_input(from_data(data)), ALIKE), 125.0, "axial", "skin", None, 0.5)
+        return finite_elements(merge_layers(estimate_input(from_data(data)), ALIKE), 125.0, "axial", "skin", None, 0.5)
 
     assert [solved(one) for one in other] == pytest.approx([solved(whole)] * 2, rel=1e-4)
 
@@ -134,7 +134,7 @@ def test_two_pieces_of_one_silicone_are_named_by_the_first() -> None:
     found = estimate_spec(spec)
     assert [layer["wall_mm"] for layer in found["variant"]["layers"]] == [1.4, 1.4]
     seen = found["models"]["published"]["sensitivities"]
-    assert {name for name in [*seen["by"], *seen["not_seen"]] if name.endswith(".wall_mm")} == {
+    assert {name for name in [*seen["by"], *seen["no_effect"]] if name.endswith(".wall_mm")} == {
         "layers.0.wall_mm",
         "layers.2.wall_mm",
     }

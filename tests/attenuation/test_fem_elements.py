@@ -13,7 +13,7 @@ from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.fem import elements as hm
 from unitcad.attenuation.fem.elements import element_matrices, motor_response
 from unitcad.attenuation.fem.unit import Setting, motion, unit_fields
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import UniformDisc
 from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
@@ -24,7 +24,7 @@ DRIVES = (("axial", "normal"), ("flat", "tangential"))
 
 
 def forearm():
-    return body(estimate_input(load("embedded")).tissue)
+    return tissue_medium(estimate_input(load("embedded")).tissue)
 
 
 def off(a, b):

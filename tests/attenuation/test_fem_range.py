@@ -15,7 +15,7 @@ from msgspec.structs import replace
 pytest.importorskip("skfem")
 
 from unitcad.attenuation.fem import unit as prior_range
-from unitcad.attenuation.fem.unit import CHOICES, DRAWS, Draw, Setting, drawn, level, motion, range_block
+from unitcad.attenuation.fem.unit import CHOICES, DRAWS, Draw, Setting, draw_unknowns, level, motion, range_block
 from unitcad.attenuation.inputs import Quantity
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimate_inputs import estimate_input, estimate_spec
@@ -25,8 +25,8 @@ UNIT = estimate_input(load("encapsulating"))
 
 
 def test_a_draw_is_its_seed_and_index_and_stays_in_the_ranges():
-    made = [drawn(UNIT, Draw(7, index))[0] for index in range(200)]
-    assert made[3] == drawn(UNIT, Draw(7, 3))[0] != drawn(UNIT, Draw(8, 3))[0]
+    made = [draw_unknowns(UNIT, Draw(7, index))[0] for index in range(200)]
+    assert made[3] == draw_unknowns(UNIT, Draw(7, 3))[0] != draw_unknowns(UNIT, Draw(8, 3))[0]
     for before, after in [
         (UNIT.frequency, [one.frequency for one in made]),
         (UNIT.tissue[1].shear_modulus, [one.tissue[1].shear_modulus for one in made]),
@@ -48,7 +48,7 @@ def test_two_units_of_one_draw_share_what_they_share():
     shared = {layer.material for layer in UNIT.layers} & {layer.material for layer in other.layers}
     assert shared
     for index in range(5):
-        one, two = (drawn(variant, Draw(1, index)) for variant in (UNIT, other))
+        one, two = (draw_unknowns(variant, Draw(1, index)) for variant in (UNIT, other))
         of_one, of_two = ({layer.material: layer.youngs_modulus for layer in made[0].layers} for made in (one, two))
         assert all(of_one[name] == of_two[name] for name in shared)
         assert one[0].tissue == two[0].tissue
@@ -58,7 +58,7 @@ def test_two_units_of_one_draw_share_what_they_share():
 def test_something_always_holds_the_motor():
     """Of open rings without a circuit and without a floor only a filled ring holds it."""
     other = estimate_input(load("embedded"))
-    made = [drawn(other, Draw(1, index))[0].geometry for index in range(100)]
+    made = [draw_unknowns(other, Draw(1, index))[0].geometry for index in range(100)]
     loose = [one for one in made if not one.pad and not one.floor]
     assert loose
     assert all(one.gap == 0 for one in loose)
@@ -66,7 +66,7 @@ def test_something_always_holds_the_motor():
 
 def test_a_floor_lifts_the_unit_and_softens_the_drive_of_the_skin():
     draws = (Draw(1, index) for index in range(50))
-    lifted = next(made for made in (drawn(UNIT, draw)[0] for draw in draws) if made.geometry.floor)
+    lifted = next(made for made in (draw_unknowns(UNIT, draw)[0] for draw in draws) if made.geometry.floor)
     floor = lifted.geometry.floor
     assert lifted.geometry.layers[-1].top == pytest.approx(UNIT.geometry.layers[-1].top + floor)
     flat = replace(

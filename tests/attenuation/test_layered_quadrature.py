@@ -7,7 +7,7 @@ import pytest
 from scipy import special
 
 from unitcad.attenuation.layered import HalfSpace, Layer, LayeredMedium, Load, LossFactor, Point, UniformDisc
-from unitcad.attenuation.layered.quadrature import evaluate, halved_towards, nodes
+from unitcad.attenuation.layered.quadrature import evaluate, halve_towards, nodes
 
 PHASE = 8.0 * np.pi
 
@@ -67,7 +67,7 @@ def test_panels_are_halved_towards_their_poles():
     panels = np.array([[8, 16, 0, 0], [16, 32, 0, 0], [32, 64, 0, 0]], dtype=complex)
     poles = np.array([11.9 + 0.2j, 15.0 - 1j, 70.0])
     at = (poles - panels[:, :2].mean(axis=1)) / ((panels[:, 1] - panels[:, 0]) / 2)
-    pieces, of = halved_towards(panels, at, np.array([3, 1, 2]))
+    pieces, of = halve_towards(panels, at, np.array([3, 1, 2]))
     found = {i: sorted(map(tuple, pieces[of == i, :2].real)) for i in range(3)}
     assert found[0] == [(8, 10), (10, 11), (11, 12), (12, 16)]
     assert found[1] == [(16, 24), (24, 32)]

@@ -5,14 +5,14 @@ import pytest
 
 from unitcad.attenuation import HalfSpace, KelvinVoigt, LayeredMedium, UniformDisc
 from unitcad.attenuation.curve import decay
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.inputs import tissue_medium
 from unitcad.attenuation.layered import MOST_SOLVED, components
 from unitcad.attenuation.receivers import Patch, influence
 from unitcad.estimate_inputs import estimate_input
 from unitcad.validation import load
 
 UNIT = estimate_input(load("encapsulating"))
-FOREARM = body(UNIT.tissue)
+FOREARM = tissue_medium(UNIT.tissue)
 SOFT = LayeredMedium([], HalfSpace(1000, 4e3, 0.49, KelvinVoigt(0.5)))
 
 

@@ -20,7 +20,7 @@ PAPER = {"rule": 1.29, "divider": 1.76, "published": 2.02, "baseline": 1.33}
 """The scores by quasi-static moduli that docs/how-to/fit.md prints."""
 
 
-def left_out(table: MeasuredTable) -> float:
+def leave_one_out(table: MeasuredTable) -> float:
     """Return the factor of the published model with a unit left out, fitted here by means."""
     off = np.log(table.levels) - np.log([np.exp(np.mean(np.log(published_path(one)))) for one in table.inputs])
     errors = [off[i] - np.mean(np.delete(off, i)) for i in range(off.size)]
@@ -31,16 +31,18 @@ def test_the_errors_are_those_of_such_moduli() -> None:
     data = estimate_spec(load("embedded", SLOW))
     found, errors = data["answer"], data["table_error"]
     for model, factor in PAPER.items():
-        told = errors[model]["leave_one_unit_out"]["levels"]["geometric_mean"]
+        told = errors[model]["leave_one_out"]["levels"]["geometric_mean"]
         assert told == pytest.approx(factor, abs=0.006)
-    own = left_out(measured_table("quasi-static"))
-    assert errors["published"]["leave_one_unit_out"]["levels"]["geometric_mean"] == pytest.approx(own, rel=1e-6)
+    own = leave_one_out(measured_table("quasi-static"))
+    assert errors["published"]["leave_one_out"]["levels"]["geometric_mean"] == pytest.approx(own, rel=1e-6)
     assert (data["variant"]["moduli"], errors["moduli"]) == ("quasi-static", "quasi-static")
-    assert found["analytic"]["published"]["left_out"] == pytest.approx(own, rel=1e-6)
-    assert "left out: x 2.02; of four class means x 1.33" in found["lines"][1]
+    assert found["analytic"]["published"]["leave_one_out"] == pytest.approx(own, rel=1e-6)
+    assert "error: factor 2.02; baseline, the means of four classes: 1.33" in found["lines"][1]
     assert any(line.startswith("Moduli of a slow pull") for line in found["details"])
     dynamic = estimate_spec(load("embedded", SLOW[:1]))
-    assert dynamic["answer"]["analytic"]["published"]["left_out"] == pytest.approx(left_out(measured_table()), rel=1e-6)
+    assert dynamic["answer"]["analytic"]["published"]["leave_one_out"] == pytest.approx(
+        leave_one_out(measured_table()), rel=1e-6
+    )
     assert not any("slow pull" in line for line in dynamic["answer"]["details"])
 
 
@@ -68,7 +70,7 @@ def test_the_level_has_the_constant_fitted_with_such_moduli() -> None:
 
 def test_the_terminal_and_the_json_say_it() -> None:
     args = ["estimate", "embedded", "--set", "estimate.moduli=quasi-static"]
-    assert "left out: x 2.0" in CliRunner().invoke(app, args).stdout
+    assert "error: factor 2.0" in CliRunner().invoke(app, args).stdout
     assert "slow pull" in CliRunner().invoke(app, [*args, "--details"]).stdout
     data = json.loads(CliRunner().invoke(app, [*args, "--json"]).stdout)
     assert data["answer"]["typical_error"] == pytest.approx(1.29, abs=0.006)

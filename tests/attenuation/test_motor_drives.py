@@ -6,14 +6,14 @@ import pytest
 from tests.sample_bodies import LEADLESS
 from unitcad.attenuation import UniformDisc
 from unitcad.attenuation.curve import layered_block
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.inputs import tissue_medium
 from unitcad.catalogue import motors
 from unitcad.errors import Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import from_data, load, read
 
 DRIVEN = {drive: estimate_input(load("encapsulating", [f"motor.drive={drive}"])) for drive in ("flat", "axial")}
-FOREARM = body(DRIVEN["flat"].tissue)
+FOREARM = tissue_medium(DRIVEN["flat"].tissue)
 BLOCKS = {drive: layered_block(variant) for drive, variant in DRIVEN.items()}
 
 

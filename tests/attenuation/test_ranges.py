@@ -11,7 +11,7 @@ from msgspec import structs
 from scipy import integrate, stats
 
 from unitcad.attenuation.edge.measured import LENGTHS, coordinates_of, measured_table, nearest
-from unitcad.attenuation.edge.models import left_out_logs, stored
+from unitcad.attenuation.edge.models import leave_one_out_logs, stored
 from unitcad.attenuation.edge.ranges import OF_THE_KIND, Predictive, lead_of, predictive_of
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.estimate_inputs import estimate_input
@@ -44,7 +44,7 @@ def test_a_distribution_is_that_of_its_density_integrated() -> None:
 def test_a_measured_unit_has_half_its_residual_and_three_quarters_of_the_variance() -> None:
     """Gaussian regression of one unit of its kind: weight 1/2, variance sigma^2 (1 - 1/4)."""
     s, q = stored()["rule"].values()
-    off = left_out_logs("rule", measured_table())
+    off = leave_one_out_logs("rule", measured_table())
     sigma = np.sqrt(np.sum(off**2) / 8)
     found = predictive_of([unit()])
     assert found.centre[0] == pytest.approx(np.log(s * q) + OF_THE_KIND * np.log(0.156 / (s * q)), abs=1e-4)
@@ -123,7 +123,7 @@ def test_the_measured_units_lie_at_the_origin_of_the_lengths() -> None:
     [
         ("motor-10mm", (), "encapsulating E10/D30", ["diameter", "motor", "height of the cavity", "frequency"]),
         ("embedded", ("layers.0.material=ecoflex-00-30",), "embedded E10/D30", ["silicones"]),
-        ("embedded", ("estimate.tissue=rigid-plate",), "embedded E10/D30", ["body"]),
+        ("embedded", ("estimate.tissue=rigid-plate",), "embedded E10/D30", ["tissue"]),
         ("encapsulating", ("layers.1.cap_mm=0.8",), "encapsulating E10/D30", ["caps"]),
         ("three-layer", (), "encapsulating E10/D30", ["number of layers", "silicones", "diameter", "walls", "caps"]),
     ],

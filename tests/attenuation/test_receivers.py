@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from unitcad.attenuation import HalfSpace, LayeredMedium, Point, UniformDisc
-from unitcad.attenuation.inputs import Quantity, body
+from unitcad.attenuation.inputs import Quantity, tissue_medium
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, neighbours_block, unit_mass
 from unitcad.cli import app
 from unitcad.designs import unit_bodies
@@ -18,7 +18,7 @@ from unitcad.kernels.mesh import realise
 from unitcad.validation import load
 
 UNIT = estimate_input(load("encapsulating"))
-FOREARM = body(UNIT.tissue)
+FOREARM = tissue_medium(UNIT.tissue)
 OMEGA = 2 * np.pi * 150
 THREE = (Patch(0, 0, 7e-3, 1.2e-3), Patch(0.016, 0, 5e-3, 0.4e-3), Patch(0.003, 0.017, 7e-3, 0.9e-3))
 MASSES = np.array([patch.mass for patch in THREE])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from benchmarks.accuracy.level_scores import forms, left_out_errors, permutation_p, simulated, with_levels
+from benchmarks.accuracy.level_scores import forms, leave_one_out_errors, permutation_p, simulated, with_levels
 from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.models import (
     COMPARED,
@@ -28,10 +28,10 @@ TABLE = measured_table()
 RNG = np.random.default_rng(3)
 
 
-def test_left_out_errors_are_those_of_single_fits() -> None:
+def test_leave_one_out_errors_are_those_of_single_fits() -> None:
     """Each mask on its own; with one constant also the closed form n/(n - 1) of the residual."""
     for name, model in COMPARED.items():
-        errors = left_out_errors(model.levels, TABLE)
+        errors = leave_one_out_errors(model.levels, TABLE)
         for i in range(9):
             mask = np.arange(9) != i
             alone = model.levels(TABLE, mask[None])[0, i]
@@ -43,7 +43,7 @@ def test_left_out_errors_are_those_of_single_fits() -> None:
 
 @pytest.mark.parametrize("name", ["rule", "divider", "baseline"])
 def test_the_range_is_scipy_s_percentile_bootstrap(name: str) -> None:
-    errors = assessments()[name].left_out_errors
+    errors = assessments()[name].leave_one_out_errors
     reference = stats.bootstrap(
         (errors,), np.mean, confidence_level=0.9, n_resamples=40_000, method="percentile", rng=np.random.default_rng(1)
     ).confidence_interval
@@ -52,7 +52,7 @@ def test_the_range_is_scipy_s_percentile_bootstrap(name: str) -> None:
 
 def test_ranges_that_were_measured_before() -> None:
     """By another program, to a hundredth or two of resampling."""
-    found = {name: one.left_out_range for name, one in assessments().items()}
+    found = {name: one.leave_one_out_range for name, one in assessments().items()}
     for name, ends in {"divider": (1.18, 1.53), "crossings": (1.22, 1.48), "published": (1.45, 2.04)}.items():
         assert found[name] == pytest.approx(ends, abs=0.015)
     p = {frozenset(pair): value for *pair, value in pairwise(assessments())}
@@ -62,7 +62,7 @@ def test_ranges_that_were_measured_before() -> None:
 
 @pytest.mark.parametrize(("a", "b"), [("rule", "divider"), ("crossings", "published"), ("published", "baseline")])
 def test_sign_flips_are_scipy_s_exact_permutation_test(a: str, b: str) -> None:
-    errors, others = (assessments()[name].left_out_errors for name in (a, b))
+    errors, others = (assessments()[name].leave_one_out_errors for name in (a, b))
     reference = stats.permutation_test(
         (errors, others),
         lambda x, y, axis: np.mean(x - y, axis=axis),
@@ -100,17 +100,17 @@ def test_the_choice_without_a_unit_is_what_loops_give() -> None:
         errors.append(error(fits[found.chosen[i]], i, (i,)))
     assert found.score.geometric_mean == pytest.approx(np.exp(np.mean(errors)), rel=1e-9)
     assert choice().score == found.score
-    assert found.score.geometric_mean > min(one.left_out.geometric_mean for one in assessments().values())
+    assert found.score.geometric_mean > min(one.leave_one_out.geometric_mean for one in assessments().values())
 
 
 def test_a_true_model_is_first_and_chosen_and_the_order_follows_the_scores() -> None:
     true = with_levels(TABLE, COMPARED["crossings"].levels(TABLE, np.ones((1, 9), dtype=bool))[0])
     found = assess_all(true)
     assert in_order(found)[0] == "crossings"
-    assert found["crossings"].left_out.geometric_mean == pytest.approx(1, abs=1e-9)
+    assert found["crossings"].leave_one_out.geometric_mean == pytest.approx(1, abs=1e-9)
     assert set(choose_without(forms(), true).chosen) == {"crossings"}
-    left_out = [found[name].left_out.geometric_mean for name in in_order(found)]
-    assert left_out == sorted(left_out)
+    leave_one_out = [found[name].leave_one_out.geometric_mean for name in in_order(found)]
+    assert leave_one_out == sorted(leave_one_out)
     estimated = estimate_spec(load("embedded"))
     assert estimated["table_error"]["order"] == in_order(assessments())
     assert list(estimated["models"]) == [n for n in in_order(assessments()) if n in estimated["models"]]
@@ -121,8 +121,8 @@ def test_a_table_of_other_units_is_scored_as_well() -> None:
     kept = [8, 0, 3, 4, 1, 6, 2]
     part = {name: tuple(getattr(TABLE, name)[i] for i in kept) for name in ("names", "designs", "layers", "inputs")}
     found = assess_all(replace(TABLE, **part, levels=TABLE.levels[kept]))
-    assert all(one.left_out.count == 7 for one in found.values())
-    assert found["rule"].left_out_errors.shape == (7,)
+    assert all(one.leave_one_out.count == 7 for one in found.values())
+    assert found["rule"].leave_one_out_errors.shape == (7,)
 
 
 def test_simulated_tables_know_the_truth_and_shuffled_ones_nothing() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation.curve import layered_block
-from unitcad.attenuation.edge.level import changed, nominal, sensitivities, stacked
+from unitcad.attenuation.edge.level import changed, nominal, sensitivities, stack_inputs
 from unitcad.attenuation.edge.models import MODELS, edge_levels, stored
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.validation import load
@@ -43,7 +43,7 @@ def asked(spec, path: str) -> float | None:
 def test_slopes_are_those_of_specs_that_were_changed(name: str, model: str) -> None:
     spec = spec_of(name)
     variant = estimate_input(spec)
-    found = sensitivities(variant, lambda variants: edge_levels(stacked(variants), model))
+    found = sensitivities(variant, lambda variants: edge_levels(stack_inputs(variants), model))
     compared = 0
     for path in changed(variant):
         value = asked(spec, path)
@@ -77,8 +77,8 @@ def test_each_input_is_seen_or_named_as_not_seen(name: str) -> None:
     for model, block in estimate_spec(spec)["models"].items():
         seen = block["sensitivities"]
         assert model in MODELS
-        assert {*seen["by"], *seen["not_seen"]} == set(changed(estimate_input(spec)))
-        assert not set(seen["by"]) & set(seen["not_seen"])
+        assert {*seen["by"], *seen["no_effect"]} == set(changed(estimate_input(spec)))
+        assert not set(seen["by"]) & set(seen["no_effect"])
     models = estimate_spec(spec)["models"]
     assert not models["rule"]["sensitivities"]["by"]  # beyond the measured ratio of moduli, or one layer alone
     assert "layers.0.wall_mm" in models["published"]["sensitivities"]["by"]
@@ -130,4 +130,4 @@ def test_the_curve_says_what_its_decay_reads() -> None:
         slope = layered_block(middle)["sensitivities"]["by"][path]
         assert slope == pytest.approx(math.log(ends[1] / ends[0]) / (2 * STEP), abs=1e-3)
     assert "layers.0.wall_mm" not in by
-    assert "not in it" in found["nothing_else"]
+    assert "not included" in found["not_included"]

@@ -78,7 +78,7 @@ def test_a_picture_shows_the_state_that_its_words_speak_of(source: tuple[str, ..
         held = False
         for step in pour.steps:
             view = shown.get(step.picture)
-            held = (held or step.title.startswith("Hold")) and "Take off" not in step.text
+            held = (held or step.title.startswith("Hold")) and "tape or bands" not in step.text
             if view is None:
                 continue
             colours = {extra.colour for extra in view.extras}
@@ -211,7 +211,7 @@ def test_what_strikes_off_passes_what_stands_on_the_base() -> None:
     [
         ("encapsulating",),
         ("motor-10mm",),
-        ("chain", "moulds.cavities=[1,3]"),
+        ("pass-through", "moulds.cavities=[1,3]"),
         ("encapsulating", "moulds.cavities=[2,2]"),
         ("three-layer", "moulds.printer=sla"),
     ],

@@ -41,11 +41,11 @@ def test_the_fit_s_own_error_stands_beside_the_stored_constants_one(visit, fitte
     for name in ("rule", "published", "corrected", "divider"):
         one = fitted.fit.model[name]
         row = next(row for row in rows if f"({name})" in row[0])
-        assert float(row[1]) == pytest.approx(one.left_out, rel=6e-3)
-        assert one.own_left_out is not None
-        assert float(row[3]) == pytest.approx(one.own_left_out, rel=6e-3)
-        assert row[5] == one.held
-    assert float(rows[-1][1]) == pytest.approx(fitted.fit.model["baseline"].left_out, rel=6e-3)
+        assert float(row[1]) == pytest.approx(one.leave_one_out, rel=6e-3)
+        assert one.own_leave_one_out is not None
+        assert float(row[3]) == pytest.approx(one.own_leave_one_out, rel=6e-3)
+        assert row[5] == one.coverage
+    assert float(rows[-1][1]) == pytest.approx(fitted.fit.model["baseline"].leave_one_out, rel=6e-3)
 
 
 def test_range_measurement_and_name_of_the_fit_are_there(visit, fitted):

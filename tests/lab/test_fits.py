@@ -27,7 +27,7 @@ from unitcad.files import sha256
 from unitcad.lab.campaign import check_files, read_campaign
 from unitcad.lab.fit_command import contents, fit_toml
 from unitcad.lab.fitting import fit_lab, load_fit_lab
-from unitcad.lab.shrunk_fit import Campaigns, gradients, judge, paired, shrunk
+from unitcad.lab.shrunk_fit import Campaigns, gradients, judge, paired_difference, shrunk
 from unitcad.spec import spec_hash, to_data
 from unitcad.validation import load
 
@@ -459,7 +459,7 @@ def test_without_a_lab_s_units_the_scores_are_the_table_s(moduli):
     alone = Campaigns(table, np.zeros(9, dtype=bool), np.zeros(9))
     judged = {name: judge(model, alone) for name, model in MODELS.items()}
     for name, one in assess_all(table).items():
-        assert np.abs(judged[name].errors) == pytest.approx(one.left_out_errors, rel=1e-6, abs=1e-9), name
+        assert np.abs(judged[name].errors) == pytest.approx(one.leave_one_out_errors, rel=1e-6, abs=1e-9), name
     before = {"small-strain": (1.33, 1.35), "quasi-static": (1.76, 1.59), "data sheet": (1.89, 1.86)}[moduli]
     scores = [judged[name].score for name in ("divider", "crossings")]
     assert scores == pytest.approx(before, abs=0.025)
@@ -470,9 +470,9 @@ def test_without_a_lab_s_units_the_scores_are_the_table_s(moduli):
 def test_intervals_that_were_measured_before():
     alone = Campaigns(TABLE, np.zeros(9, dtype=bool), np.zeros(9))
     judged = {name: judge(MODELS[name], alone) for name in ("divider", "crossings", "published", "baseline")}
-    assert [judged[name].held() for name in ("published", "crossings", "divider", "baseline")] == [8, 7, 7, 7]
+    assert [judged[name].coverage() for name in ("published", "crossings", "divider", "baseline")] == [8, 7, 7, 7]
     one, two = (np.abs(judged[name].errors) for name in ("divider", "baseline"))
-    assert paired(judged["divider"], judged["baseline"])[:2] == pytest.approx(
+    assert paired_difference(judged["divider"], judged["baseline"])[:2] == pytest.approx(
         (np.mean(one - two), stats.sem(one - two))
     )
 
@@ -522,17 +522,17 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file, t
         made = predictive(fit_of(spec), model, estimate_input(spec))  # type: ignore[arg-type]
         assert made == pytest.approx((one["degrees_of_freedom"], centre, scale), rel=1e-7)
         error = block["fit_error"]
-        assert error["left_out"]["geometric_mean"] == one["left_out"]
-        assert error["left_out"]["low"] < one["left_out"] < error["left_out"]["high"]
-        assert (error["own_left_out"], error["own_by_stored"]) == (one["own_left_out"], one["own_by_stored"])
-        assert error["held_80"] == one["held"]
-        assert error["baseline"] == fit["model"]["baseline"]["left_out"]
+        assert error["leave_one_out"]["geometric_mean"] == one["leave_one_out"]
+        assert error["leave_one_out"]["low"] < one["leave_one_out"] < error["leave_one_out"]["high"]
+        assert (error["own_leave_one_out"], error["own_by_stored"]) == (one["own_leave_one_out"], one["own_by_stored"])
+        assert error["coverage"] == one["coverage"]
+        assert error["baseline"] == fit["model"]["baseline"]["leave_one_out"]
         assert block["table_error"] == before["table_error"]  # of the stored constants, and said to be
         assert "fit_error" not in before
     assert data["table_error"]["constants"].startswith("the stored ones")
     assert "constants" not in plain["table_error"]
     assert data["fit"]["name"] == "synthetic-bench"
-    assert data["fit"]["left_out"]["baseline"]["geometric_mean"] == fit["model"]["baseline"]["left_out"]
+    assert data["fit"]["leave_one_out"]["baseline"]["geometric_mean"] == fit["model"]["baseline"]["leave_one_out"]
     assert data["fit"]["leads"] == data["answer"]["model"] == "rule"
     assert [own["value"] for own in data["own_measured"]] == [0.098]
     assert data["measured"]["level"] == plain["measured"]["level"]
@@ -587,7 +587,7 @@ def test_the_terminal_shows_fit_range_and_own_measurement(fit_file):
     assert own is not None
     by_fit = done.output.split("error by the lab's fit")[1]
     for name in ("rule", "divider", "published", "corrected"):
-        assert f"x {own.model[name].left_out:.2f}" in by_fit
+        assert f"x {own.model[name].leave_one_out:.2f}" in by_fit
     assert "9.8 %" in done.output.splitlines()[1]
     assert "By a rule fitted to 3 units of synthetic-bench and the paper's nine" in done.output
     shown = json.loads(CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--json"]).output)

@@ -23,12 +23,12 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.lab.material import (
     Specimen,
-    declared,
     evaluate,
     evaluate_dynamic,
     fit_start,
     header_of,
     moduli,
+    parse_column,
     read_curve,
     read_dynamic,
     secant,
@@ -109,7 +109,7 @@ def _layout(folder, name):
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_one_curve_in_every_layout_is_the_same_curve(name, tmp_path):
     specimen = SPECIMENS.get(name, Specimen(gauge_mm=GAUGE if "quoted" in name else None))
-    curve = read_curve(_layout(tmp_path, name), declared(DECLARED.get(name, [])), specimen)
+    curve = read_curve(_layout(tmp_path, name), parse_column(DECLARED.get(name, [])), specimen)
     assert float(np.interp(0.15, curve.strain, curve.stress)) / 0.15 == pytest.approx(EXACT_15, rel=1e-3)
     row = next(row for row in evaluate([curve], (0.12, 0.24)).rows if row.method == "secant at 15 %")
     assert row.value == pytest.approx(EXACT_15, rel=1e-3)
@@ -238,7 +238,7 @@ def test_a_reversed_or_short_curve_is_refused(tmp_path):
 )
 def test_a_wrong_declaration_is_refused(text, part):
     with pytest.raises(Refusal, match="--column") as refused:
-        declared([text])
+        parse_column([text])
     assert part in str(refused.value)
 
 
@@ -491,7 +491,7 @@ PROTOTYPE = {
 @pytest.fixture(scope="module")
 def results():
     known = catalogue.materials()
-    bare = declared(["strain=Engineering Strain:1"])  # the files give no unit
+    bare = parse_column(["strain=Engineering Strain:1"])  # the files give no unit
     return {n: evaluate([read_curve(FILES[n], bare, Specimen())], (0.12, 0.24), known[n]) for n in NAMES}
 
 

@@ -212,7 +212,7 @@ def test_a_solid_of_the_box_is_exact():
 
 
 def test_the_bill_has_what_the_procedure_asks_for():
-    text = phantom_command.casting_markdown(_skin()).split("## Needed")[0].lower()
+    text = phantom_command.casting_markdown(_skin()).split("## Buy and have ready")[0].lower()
     items = " ".join(f"{one.item} {one.note}" for one in phantom_command.bill(_skin())).lower()
     for asked in ("tape", "clips", "pen", "rubber band", "emery paper", "primer", "degas", "talc", "calliper", "blade"):
         assert asked in text or asked == "calliper", asked

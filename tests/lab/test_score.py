@@ -39,7 +39,7 @@ def test_the_levels_are_those_of_an_estimate_and_do_not_depend_on_the_figure(tmp
     assert (one["p10"], one["p90"]) == pytest.approx((expected["answer"]["p10"], expected["answer"]["p90"]), rel=1e-5)
     other = score_figure(load_figure(written(tmp_path, row.format(0.062))))
     assert other["units"][0]["levels"] == one["levels"]
-    assert (data["held"], other["held"]) == ("1 of 1", "0 of 1")
+    assert (data["coverage"], other["coverage"]) == ("1 of 1", "0 of 1")
 
 
 def test_a_unit_that_the_constants_were_fitted_to_is_not_scored(tmp_path):

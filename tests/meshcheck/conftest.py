@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from malformed import options
+from shapes import Judge
 
 from unitcad.meshcheck import FileReport, check_file
-
-Judge = Callable[..., FileReport]
 
 
 @pytest.fixture

@@ -7,8 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from conftest import Judge
-from shapes import PNG, PRODUCTION, START, THUMBNAIL, box, mesh_xml, model_xml, package, rels_xml, text_stl
+from shapes import PNG, PRODUCTION, START, THUMBNAIL, Judge, box, mesh_xml, model_xml, package, rels_xml, text_stl
 
 from unitcad.meshcheck import Options, check_file
 

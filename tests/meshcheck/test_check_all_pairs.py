@@ -70,13 +70,13 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
     found = crossings.crossings_of(top, Deadline(60).tick)
     _agree(found, kind, crossing, overlaps)
     assert {tuple(pair) for pair in found.touching().tolist()} == shells
-    return crossing, len(crossings.joined(found.covering)), len(shells)
+    return crossing, len(crossings.join_pairs(found.covering)), len(shells)
 
 
 def _agree(found: crossings.Crossings, kind: str, crossing: int, overlaps: tuple[int, int]) -> None:
-    assert len(crossings.joined(found.crossing)) == crossing
+    assert len(crossings.join_pairs(found.crossing)) == crossing
     # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.
-    covers = len(crossings.joined(found.covering))
+    covers = len(crossings.join_pairs(found.covering))
     assert (0 if kind == "slivers" else overlaps[0]) <= covers <= overlaps[1]
 
 

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Judge
-from shapes import box, stl
+from shapes import Judge, box, stl
 
 from unitcad.geometry import boxes
 from unitcad.geometry.boxes import TooMany

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import Judge
-from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, box, in_format, stl, turned
+from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, Judge, box, in_format, stl, turned
 
 Points = np.ndarray
 

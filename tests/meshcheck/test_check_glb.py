@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from conftest import Judge
 from glb_files import packed, scene
-from shapes import CUBE_CORNERS, CUBE_FACES
+from shapes import CUBE_CORNERS, CUBE_FACES, Judge
 
 from unitcad.export import glb
 from unitcad.meshcheck.findings import Finding

@@ -11,13 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Judge
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from shapes import ROOT_RELS, TYPES, box, model_xml, package, stl
+from shapes import ROOT_RELS, TYPES, Judge, box, model_xml, package, stl
 
 from unitcad.meshcheck import Options, check_file, check_mesh
-from unitcad.meshcheck.file_checks import check_files, guarded
+from unitcad.meshcheck.file_checks import check_files, check_guarded
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -101,7 +100,7 @@ def test_a_worker_that_dies_names_its_file(tmp_path: Path, monkeypatch: pytest.M
 
 def test_inner_fault_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("unitcad.meshcheck.file_checks.check_file", lambda *_: 1 / 0)
-    report = guarded(str(tmp_path / "a.stl"), Options())
+    report = check_guarded(str(tmp_path / "a.stl"), Options())
     assert report.has("F011")
     assert "ZeroDivisionError" in report.findings[0].message
 

@@ -6,8 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import Judge
-from shapes import CUBE_CORNERS, CUBE_FACES, mesh_xml, model_xml, package
+from shapes import CUBE_CORNERS, CUBE_FACES, Judge, mesh_xml, model_xml, package
 
 from unitcad.meshcheck import Limits, Options, check_bytes
 

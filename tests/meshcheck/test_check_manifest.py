@@ -119,7 +119,7 @@ def test_m005_nothing_outside_the_folder_is_read(
     plain_os_open = os.open
     monkeypatch.setattr(os, "open", lambda path, *a, **k: opened.append(str(path)) or plain_os_open(path, *a, **k))
     assert {name: codes(report) for name, report in judged(folder).items()} == {"base.stl": [], "film.stl": []}
-    (report,) = listing.unchecked(listing.read(str(folder)), [], lambda path: Options(select=("M005",)))
+    (report,) = listing.check_unread(listing.read(str(folder)), [], lambda path: Options(select=("M005",)))
     assert Path(report.path).name == "manifest.json"
     assert codes(report) == ["M005"]
     assert report.findings[0].severity == "error"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from conftest import Judge
-from shapes import PRODUCTION, START, THUMBNAIL, mesh_xml, model_xml, package, rels_xml
+from shapes import PRODUCTION, START, THUMBNAIL, Judge, mesh_xml, model_xml, package, rels_xml
 
 
 def packed(model: str, more: dict[str, bytes], *relations: tuple[str, str]) -> bytes:

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Judge
 from hypothesis import given
 from hypothesis import strategies as st
 from polygon_files import ply
-from shapes import CUBE_CORNERS, CUBE_FACES, box, mesh_xml, model_xml, package, stl
+from shapes import CUBE_CORNERS, CUBE_FACES, Judge, box, mesh_xml, model_xml, package, stl
 
 from unitcad.meshcheck.findings import Location, number
 

@@ -8,11 +8,10 @@ import itertools
 import numpy as np
 import pytest
 import trimesh
-from conftest import Judge
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from polygon_files import every_way, obj, off, ply
-from shapes import CUBE_CORNERS, turned
+from shapes import CUBE_CORNERS, Judge, turned
 
 from unitcad.meshcheck.findings import Finding
 from unitcad.meshcheck.geometry.mesh import Mesh

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import Judge
-from shapes import CUBE_CORNERS, FORMATS, box, in_format, mesh_xml, model_xml, package, stl
+from shapes import CUBE_CORNERS, FORMATS, Judge, box, in_format, mesh_xml, model_xml, package, stl
 
 
 @pytest.mark.parametrize(

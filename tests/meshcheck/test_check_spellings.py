@@ -6,9 +6,8 @@ import codecs
 
 import numpy as np
 import pytest
-from conftest import Judge
 from polygon_files import off, ply
-from shapes import CUBE_CORNERS, CUBE_FACES, box, mesh_xml, model_xml, obj, package, text_stl
+from shapes import CUBE_CORNERS, CUBE_FACES, Judge, box, mesh_xml, model_xml, obj, package, text_stl
 
 from unitcad.meshcheck import check_mesh
 from unitcad.meshcheck.readers.threemf_schema import CORE, ELEMENTS, MATERIAL

@@ -125,7 +125,7 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
     monkeypatch.setattr(g_shells, "check_mesh", lambda *_: time.sleep(60))
     path = tmp_path / "a.stl"
     path.write_bytes(_stl())
-    report = file_checks.guarded(str(path), Options(limits=Limits(seconds=1.0)))
+    report = file_checks.check_guarded(str(path), Options(limits=Limits(seconds=1.0)))
     assert {"F011", "T001", "G001"} <= {item.code for item in report.findings}
     assert next(item.message for item in report.findings if item.code == "F011") == "not finished within --timeout 1 s"
     with pytest.raises(Unreadable), file_checks._alarm(0.01):

@@ -20,7 +20,7 @@ from unitcad.casting import procedure as casting_procedure
 from unitcad.casting.figures import off_grid, unit_heights
 from unitcad.casting.pouring import Face
 from unitcad.casting.procedure import Procedure
-from unitcad.casting.steps import BenchStep, shortened
+from unitcad.casting.steps import BenchStep, number_steps
 from unitcad.catalogue import materials
 from unitcad.designs.dimensions import Exit
 from unitcad.kernels.mesh import arrays, realise
@@ -204,7 +204,7 @@ def test_a_sheet_has_no_more_words_than_a_maker_reads(source: list[str], most: i
 def test_a_sentence_that_an_earlier_pour_has_is_said_once() -> None:
     """Every step of a later pour refers to one that has its words; together they have what the whole text has."""
     made = procedure("three-layer")
-    steps = shortened([*made.preparation, *(step for pour in made.pours for step in pour.steps)])
+    steps = number_steps([*made.preparation, *(step for pour in made.pours for step in pour.steps)])
     later = [step for step in steps if step.short]
     assert len(later) > 20
     for step in later:
@@ -579,7 +579,7 @@ def test_windows_that_resin_closes_are_cleared() -> None:
         assert faults[0] == "the window of cup1 is not cleared of resin before the post-cure"
 
 
-@pytest.mark.parametrize("name", ["encapsulating", "chain", "three-layer"])
+@pytest.mark.parametrize("name", ["encapsulating", "pass-through", "three-layer"])
 def test_tools_in_resin_have_no_warning(name: str, tmp_path: Path) -> None:
     done = build(load(name, ["moulds.printer=sla", "output.formats=['stl']"]), tmp_path, only=("moulds",))
     assert done.manifest["check"] == {"errors": 0, "warnings": 0, "findings": []}

@@ -24,7 +24,7 @@ WIDER = ("encapsulating", "moulds.bore_compensation_mm=0.1")
         (*SHRUNK, "motor.lip_mm=0.5", "skin_mm=0.5"),
         ("embedded", "moulds.shrinkage_percent=0.3", "moulds.cavities=[2,2]"),
         (*WIDER, "moulds.draft_deg=1"),
-        ("chain", "moulds.bore_compensation_mm=0.2", "moulds.printer=sla", "moulds.pour=injected"),
+        ("pass-through", "moulds.bore_compensation_mm=0.2", "moulds.printer=sla", "moulds.pour=injected"),
     ],
     ids=" ".join,
 )

@@ -28,7 +28,9 @@ def wired(design: str) -> dict:
     return {**data, "wires": WIRES}
 
 
-@pytest.mark.parametrize(("name", "size", "cells"), [("embedded", 73, 9), ("encapsulating", 73, 6), ("chain", 73, 3)])
+@pytest.mark.parametrize(
+    ("name", "size", "cells"), [("embedded", 73, 9), ("encapsulating", 73, 6), ("pass-through", 73, 3)]
+)
 def test_fill_takes_what_the_bed_takes_and_no_more(name: str, size: int, cells: int) -> None:
     bed = [f"moulds.bed_{axis}_mm={size}" for axis in "xy"]
     lay = set_of(name, 'moulds.cavities="fill"', *bed).plan.layout
@@ -60,7 +62,7 @@ def accepted(spec: Spec, columns: int, rows: int) -> bool:
         ("embedded", ["diameter_mm=14.0"]),
         ("embedded", ["diameter_mm=20.3", "moulds.bed_y_mm=333"]),
         ("encapsulating", []),
-        ("chain", []),
+        ("pass-through", []),
     ],
 )
 def test_fill_has_the_most_cells_of_all_splits(name: str, settings: list[str], printer: str) -> None:
@@ -78,7 +80,9 @@ def test_a_unit_larger_than_the_bed_fills_nothing() -> None:
         set_of("embedded", 'moulds.cavities="fill"', "moulds.bed_x_mm=30")
 
 
-@pytest.mark.parametrize(("name", "asked", "nearest"), [("encapsulating", "[3,2]", [2, 2]), ("chain", "[2,3]", [1, 3])])
+@pytest.mark.parametrize(
+    ("name", "asked", "nearest"), [("encapsulating", "[3,2]", [2, 2]), ("pass-through", "[2,3]", [1, 3])]
+)
 def test_a_tail_reaches_an_edge(name: str, asked: str, nearest: list[int]) -> None:
     with pytest.raises(Refusal) as refused:
         set_of(name, f"moulds.cavities={asked}")

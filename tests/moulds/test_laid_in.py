@@ -15,7 +15,7 @@ from unitcad.checks import check_moulds
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.kernels.mesh import bounds
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
+from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
 from unitcad.pipeline.write import build
 from unitcad.shape import box, cut, moved
 from unitcad.validation import load, templates
@@ -113,7 +113,7 @@ def test_pictures_show_it_laid_in() -> None:
     first = next(i for i, (_, there) in enumerate(parts) if "motor" in there)
     assert parts[first] == ("Pour 2: motor and circuit laid in", {"base", "layer1", "motor", "fpcb"})
     assert all("motor" in there for _, there in parts[first:])
-    lifts = {name: offset[2] for name, offset in taken_apart(moulds).items()}
+    lifts = {name: offset[2] for name, offset in exploded_moves(moulds).items()}
     assert lifts["layer1"] < lifts["motor"] == lifts["fpcb"] < lifts["cup2"]
     assert list(unit_apart(moulds)) == ["layer1", "motor", "fpcb", "layer2"]
 

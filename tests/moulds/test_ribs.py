@@ -14,7 +14,7 @@ from unitcad.casting.figures import UNEVEN, eccentricity, shift_per_depth
 from unitcad.catalogue import printers
 from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
-from unitcad.moulds.base import tapered
+from unitcad.moulds.base import draw_taper
 from unitcad.moulds.cup import rib_shapes, ribs, skirt_end, slot_shapes
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Common, Shape, box, cut, union
@@ -141,7 +141,7 @@ def test_faults_of_a_leaf_are_found() -> None:
     slots, rib = slot_shapes(moulds.spec, moulds.plan.layout)[0], ribs(moulds.spec, moulds.plan.layout)[0]
     strain, room = "cup1: strain at the root of a rib's leaf", "cup1: room behind a rib's leaf"
     x, y = rib.x, rib.y
-    recess = tapered(moulds.plan.layout, moulds.spec.moulds.plinth_clearance_mm, skirt_end(moulds.spec))
+    recess = draw_taper(moulds.plan.layout, moulds.spec.moulds.plinth_clearance_mm, skirt_end(moulds.spec))
 
     def filled(*space: float) -> Callable[[Shape], Shape]:
         return lambda shape: union((shape, cut(Common((slots, box(*space))), [recess])))

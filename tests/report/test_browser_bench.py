@@ -17,7 +17,7 @@ SETS = {
     "encapsulating": (),
     "embedded": (),
     "three-layer": ("moulds.printer=sla",),
-    "chain": ("moulds.pour=injected", "moulds.cavities=[1,2]"),
+    "pass-through": ("moulds.pour=injected", "moulds.cavities=[1,2]"),
 }
 
 

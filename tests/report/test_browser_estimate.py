@@ -135,8 +135,8 @@ def test_the_inputs_that_a_model_sees(visit, estimate):
     largest = []
     for name, *shown_cells in rows:
         for cell, block in zip(shown_cells, blocks, strict=True):
-            assert (cell == "not seen") == (name not in block["by"])
-            if cell != "not seen":
+            assert (cell == "no effect") == (name not in block["by"])
+            if cell != "no effect":
                 slope, _, rest = cell.replace("−", "-").partition(" (")
                 assert float(slope) == pytest.approx(block["by"][name], rel=6e-3)
                 tested = block.get("tested", {}).get(name)

@@ -181,7 +181,7 @@ def test_the_estimate_shows_models_and_the_measured_value(visit):
     lead = visit.page.inner_text("#estimate .lead")
     assert lead.startswith("5.2 % of the motor's amplitude at the edge (measured in the paper). Expect 3.1 to 6.8 %.")
     visit.page.get_by_text("How sure?").click()
-    assert "each left out: x 1.3 typical" in visit.page.inner_text("#estimate .lead-notes")
+    assert "factor 1.3 typical" in visit.page.inner_text("#estimate .lead-notes")
     visit.page.click("#estimate summary:has-text('Tables')")
     text = visit.page.inner_text("#estimate")
     for words in (

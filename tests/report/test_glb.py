@@ -81,10 +81,10 @@ def test_colours_are_linear():
 
 
 def test_a_box_is_shaded_flat_and_a_wall_smooth():
-    vertices, normals, _ = glb.shaded(*arrays(realise(box(0, 1, 0, 2, 0, 3), 24)))
+    vertices, normals, _ = glb.shading_normals(*arrays(realise(box(0, 1, 0, 2, 0, 3), 24)))
     assert len(vertices) == 24
     assert np.abs(normals).max(axis=1) == pytest.approx(1)
-    vertices, normals, _ = glb.shaded(*arrays(realise(cylinder(5, 0, 4), 60)))
+    vertices, normals, _ = glb.shading_normals(*arrays(realise(cylinder(5, 0, 4), 60)))
     wall = np.abs(normals[:, 2]) < 0.5
     outward = vertices[wall, :2] / np.linalg.norm(vertices[wall, :2], axis=1, keepdims=True)
     assert normals[wall, :2] == pytest.approx(outward, abs=1e-4)

@@ -10,7 +10,7 @@ from PIL import Image
 
 from unitcad.export.raster import Surface, draw
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.pipeline.scenes import moments, pictures, taken_apart, unit_apart
+from unitcad.pipeline.scenes import exploded_moves, moments, pictures, unit_apart
 from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.write import build
 from unitcad.shape import box
@@ -102,11 +102,11 @@ def test_moments_of_casting():
     ]
 
 
-@pytest.mark.parametrize("name", ["embedded", "three-layer", "chain"])
+@pytest.mark.parametrize("name", ["embedded", "three-layer", "pass-through"])
 def test_taken_apart_nothing_meets(name):
     variant = Variant.of(name)
     for offsets, bodies in (
-        (taken_apart(variant), (*variant.unit, *variant.plan.tools)),
+        (exploded_moves(variant), (*variant.unit, *variant.plan.tools)),
         (unit_apart(variant), variant.unit),
     ):
         solids = {b.name: variant.mesh(b).translate(offsets[b.name]) for b in bodies if b.name in offsets}

@@ -95,7 +95,7 @@ def test_a_mass_is_shown_as_exactly_as_its_limit() -> None:
 def test_another_diameter_and_a_unit_that_was_not_tried_are_explained(quiet: Inversion) -> None:
     why = explain(quiet, "motor-10mm")["reasons"]
     assert any("diameters from 14 to 15.2 mm are tried (vary.diameter_mm), not 17" in line for line in why)
-    head = explanation_lines(explain(quiet, "chain"))[0]
+    head = explanation_lines(explain(quiet, "pass-through"))[0]
     assert head.endswith(" if it were tried")
     layers = explanation_lines(explain(quiet, "three-layer"))
     assert any("vary.layers has no 3" in line for line in layers)

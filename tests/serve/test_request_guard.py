@@ -228,7 +228,7 @@ def test_specs_are_saved_in_the_folder_alone(tmp_path, text):
         assert (tmp_path / "mine.toml").read_text() == text
         status, content, _ = own.send("/save", {"text": text + "# more\n", "name": "mine.toml"})
         assert status == 422
-        assert "is there already" in content.decode()
+        assert "exists already" in content.decode()
         assert (tmp_path / "mine.toml").read_text() == text
         assert own.send("/save", {"text": text + "# more\n", "name": "mine.toml", "replace": True})[0] == 200
         assert (tmp_path / "mine.toml").read_text().endswith("# more\n")

@@ -139,9 +139,9 @@ def test_large_specs_go_by_the_store(tmp_path):
     store = SharedStore(str(tmp_path / "store"))
     store.claim()
     spec = "".join(random.Random(1).choices("0123456789", k=100_000))  # as the triangles of a body: hard to deflate
-    packed = record_packs.packed_specs(store, [spec, spec])
+    packed = record_packs.pack_specs(store, [spec, spec])
     assert isinstance(packed, str)
-    assert record_packs.unpacked_specs(store, packed) == [spec, spec]
+    assert record_packs.unpack_specs(store, packed) == [spec, spec]
 
 
 def test_a_put_that_fails_is_tried_again(address, tmp_path, monkeypatch):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from tests.attenuation.test_moduli_source import left_out
+from tests.attenuation.test_moduli_source import leave_one_out
 from unitcad.attenuation.edge.measured import measured_table
 from unitcad.attenuation.edge.models import MODELS, assessments
 from unitcad.cli import app
@@ -92,7 +92,7 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path):
         "corrected": [],
     }
     for model, typical in told["typical_error"].items():
-        assert typical == pytest.approx(assessments()[model].left_out.geometric_mean, rel=1e-5)
+        assert typical == pytest.approx(assessments()[model].leave_one_out.geometric_mean, rel=1e-5)
     assert warning in CliRunner().invoke(app, ["batch", "thickness", "--dry-run"]).output
     quiet = CliRunner().invoke(app, ["batch", "thickness", "--dry-run", "--only", "unit"])
     assert "does not read" not in quiet.output
@@ -121,7 +121,7 @@ def test_the_typical_error_is_that_of_the_swept_source_of_moduli():
     sweep = swept("embedded", estimate__moduli=["quasi-static"], layers__0__wall_mm=[1.2, 1.3])
     found = swept_estimate(sweep, sweep.count)
     assert found is not None
-    assert found.typical_error["published"] == pytest.approx(left_out(measured_table("quasi-static")), rel=1e-4)
+    assert found.typical_error["published"] == pytest.approx(leave_one_out(measured_table("quasi-static")), rel=1e-4)
 
 
 def test_a_control_s_wall_is_that_of_the_measured_controls():

@@ -98,13 +98,13 @@ COMMANDS = {
     "list motor": "KIND = 'motor': unknown name; closest: motors; nearest accepted: 'motors'",
     "schema sweeps": "KIND = 'sweeps': unknown name; closest: sweep; nearest accepted: 'sweep'",
     "init 'my unit'": "NAME = 'my unit': must be letters, digits, dots and dashes; nearest accepted: 'my-unit'",
-    "init unit": "unit.toml: is there already; choose another name",
+    "init unit": "unit.toml: exists already; choose another name",
     "coupon prusa": "PRINTER = 'prusa': unknown name; closest: prusa-mk4, prusa-mk3s; nearest accepted: 'prusa-mk4'",
     "coupon fdm-0.4 -o part.csv": "part.csv: is a file, not a folder; choose another with -o",
     "list motors part.csv": "unexpected argument: part.csv; see unitcad list --help",
     "cache gc --limit 1GB": "--limit = '1GB': takes a number (MB), such as 4096",
     "serve sweep.toml": "SPEC = 'sweep.toml': is a sweep: run unitcad batch sweep.toml",
-    "report unit.toml": "unit.toml: is not a folder",
+    "report unit.toml": "unit.toml: is a file; name the folder of a build or of a batch",
 }
 FILES = {
     ("build", 'name = "a"\ndesign = encapsulating\n'): [

@@ -10,9 +10,9 @@ import numpy as np
 
 from unitcad.accuracy.measurements import REFERENCE, respond
 from unitcad.attenuation.edge.level import changed, ends
-from unitcad.attenuation.edge.measured import stacked
+from unitcad.attenuation.edge.measured import stack_inputs
 from unitcad.attenuation.edge.models import edge_levels, stored
-from unitcad.attenuation.inputs import EstimateInput, body
+from unitcad.attenuation.inputs import EstimateInput, tissue_medium
 from unitcad.estimate_inputs import closed_forms, fit_of
 from unitcad.spec import Spec
 
@@ -31,7 +31,7 @@ def amplifications(spec: Spec, variant: EstimateInput) -> dict[str, Any]:
     fit = fit_of(spec)
     results = {
         f"edge level, model {model}": edge_levels(
-            stacked(moved), model, fit.constants(model) if fit else stored(variant.moduli)[model]
+            stack_inputs(moved), model, fit.constants(model) if fit else stored(variant.moduli)[model]
         )
         for model in models
     }
@@ -51,7 +51,7 @@ def _moves(name: str, variant: EstimateInput, values: Any) -> dict[str, Any]:
 
 
 def _motions(variants: Sequence[EstimateInput]) -> np.ndarray:
-    """Return |u| at the unit's edge and `_FAR` from it of each variant; those of one body are solved once."""
+    """Return |u| at the unit's edge and `_FAR` from it of each variant; those on one tissue are solved once."""
     solved: dict[str, np.ndarray] = {}
     keys = [repr((one.tissue, one.frequency, one.motor_diameter, one.diameter)) for one in variants]
     for key, one in zip(keys, variants, strict=True):
@@ -63,7 +63,7 @@ def _motions(variants: Sequence[EstimateInput]) -> np.ndarray:
 
 def extremes(spec: Spec, variant: EstimateInput) -> list[dict[str, Any]]:
     """Return the properties that may make the design stiff or extreme: a number, its place, and its threshold."""
-    medium = body(variant.tissue)
+    medium = tissue_medium(variant.tissue)
     omega = 2.0 * math.pi * variant.frequency.middle
     bodies = list(zip((*medium.layers, medium.half_space), variant.tissue, medium.materials(omega), strict=True))
     lengths = {t.name: abs(2 * math.pi * (m.shear / b.density) ** 0.5 / omega) for b, t, m in bodies}
@@ -77,15 +77,15 @@ def extremes(spec: Spec, variant: EstimateInput) -> list[dict[str, Any]]:
     low = [min(one, key=one.__getitem__, default="no layer") for one in (loss, free, film, lengths)]
     rows: list[tuple[str, float, str, float, bool]] = [
         (
-            "body: modulus, largest over least",
+            "tissue: modulus, largest over least",
             stiffest[0].youngs_modulus / softest[0].youngs_modulus,
             f"{stiffest[1].name} over {softest[1].name}",
             1e8,
             True,
         ),
-        ("body: least tan delta", loss[low[0]], low[0], 1e-3, False),
-        ("body: least 1 - 2 nu", free[low[1]], low[1], 1e-4, False),
-        ("body: thinnest layer / its shear wavelength", film.get(low[2], math.inf), low[2], 1e-3, False),
+        ("tissue: least tan delta", loss[low[0]], low[0], 1e-3, False),
+        ("tissue: least 1 - 2 nu", free[low[1]], low[1], 1e-4, False),
+        ("tissue: thinnest layer / its shear wavelength", film.get(low[2], math.inf), low[2], 1e-3, False),
         (
             "motor's radius / least shear wavelength",
             variant.motor_diameter / 2 / lengths[low[3]],

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from unitcad.attenuation.inputs import EstimateInput, body
+from unitcad.attenuation.inputs import EstimateInput, tissue_medium
 from unitcad.attenuation.layered import Response
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.cache import MemoryStore
@@ -215,7 +215,9 @@ def respond(variant: EstimateInput, distances: Any, rtol: float) -> Response:
     """Return the skin's response to the motor's drive at distances (m) from the unit's edge."""
     load = UniformDisc(variant.motor_diameter / 2.0, "tangential" if variant.drive == "flat" else "normal")
     omega = 2.0 * math.pi * variant.frequency.middle
-    return body(variant.tissue).response(load, omega, variant.diameter / 2.0 + np.asarray(distances), rtol=rtol)
+    return tissue_medium(variant.tissue).response(
+        load, omega, variant.diameter / 2.0 + np.asarray(distances), rtol=rtol
+    )
 
 
 def response_rows(variant: EstimateInput, repeats: int = 3) -> list[dict[str, Any]]:

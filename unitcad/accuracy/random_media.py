@@ -78,7 +78,7 @@ def _ordinary(rng: np.random.Generator) -> LayeredMedium:
 
 
 def _forearm(rng: np.random.Generator) -> tuple[list[Layer], HalfSpace]:
-    """Draw the catalogue's kind of body: skin, fat, muscle on bone, each modulus within a factor of two."""
+    """Draw the catalogue's kind of tissue: skin, fat, muscle on bone, each modulus within a factor of two."""
 
     def about(value: float) -> float:
         return value * _between(rng, 0.5, 2.0)
@@ -142,7 +142,7 @@ def _undamped(rng: np.random.Generator) -> LayeredMedium:
 
 
 def _partly_damped(rng: np.random.Generator) -> LayeredMedium:
-    """Draw an ordinary medium or a wide contrast with at least one layer and about half of its bodies undamped."""
+    """Draw an ordinary medium or a wide contrast with at least one layer and about half of its layers undamped."""
     medium = _ordinary(rng) if rng.random() < 0.5 else _wide_contrast(rng)
     while not medium.layers:
         medium = _ordinary(rng)

@@ -13,7 +13,7 @@ from unitcad import text
 from unitcad.arguments import path, texts
 from unitcad.pipeline.subjects import load_subject
 from unitcad.pipeline.variant import Variant
-from unitcad.pipeline.write import PAGE, Built, held
+from unitcad.pipeline.write import PAGE, Built, hold_folder
 from unitcad.pipeline.write import build as build_whole
 from unitcad.report import write_report
 from unitcad.spec import Spec
@@ -64,7 +64,7 @@ class BuildResult(Built):
         return {part["name"]: part["volume_mm3"] for part in self.manifest["parts"]}
 
     def __repr__(self) -> str:
-        folder = text.shortened(self.folder.name, 80)
+        folder = text.shorten(self.folder.name, 80)
         return f"BuildResult({folder}: {', '.join(f'{count} {noun}' for noun, count in self._counts)})"
 
     def _repr_html_(self) -> str:
@@ -147,7 +147,7 @@ def build(
         wanted = load_subject(wanted.of, {"output.formats": texts("formats", formats)})
     built = build_whole(wanted.of, into, only=outputs, check=check, say=say)
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
-        with held(built.folder):
+        with hold_folder(built.folder):
             write_report(built.folder)
     return BuildResult(built.folder, built.manifest, built.sha256, wanted.unit)
 

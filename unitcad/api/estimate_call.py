@@ -70,7 +70,7 @@ class EdgeEstimate:
 
     def __repr__(self) -> str:
         levels = ", ".join(f"{model} {text.shown(level)}" for model, level in self.edge.items())
-        name = text.shortened(str(self.data["variant"]["name"]), 40)
+        name = text.shorten(str(self.data["variant"]["name"]), 40)
         return f"EdgeEstimate({name!r}: {self.frequency_hz:g} Hz; edge over motor: {levels})"
 
     def _repr_html_(self) -> str:

@@ -21,7 +21,7 @@ from unitcad.arrays.circuit import outline
 from unitcad.arrays.constructions import Construction, construction_of
 from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
 from unitcad.arrays.layouts.ring import RingTable
-from unitcad.arrays.offers import offered
+from unitcad.arrays.offers import suggest_for_array
 from unitcad.arrays.sheet import middle_radius, sheet_of
 from unitcad.arrays.tails import Blocked, angles
 from unitcad.designs.limits import up
@@ -34,9 +34,9 @@ from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import fields_of
 from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import line_of, text_of
-from unitcad.text import listed
+from unitcad.text import join_words
 from unitcad.validation import custom_templates, default_template, from_data, templates
-from unitcad.validation.load import changed, named_file, override, shipped_files
+from unitcad.validation.load import apply_changes, named_file, override, shipped_files
 from unitcad.validation.plain_data import ABSENT, Changes, at, changes_of
 from unitcad.validation.suggestions import every_fault, numbers
 
@@ -62,19 +62,19 @@ def with_changes(
         path = (change.partition("=")[0] if isinstance(change, str) else change[0]).strip()
         unit = _UNIT.fullmatch(path)
         if unit is None:
-            whole = changed(whole, [change])
+            whole = apply_changes(whole, [change])
         elif unit[2] in (None, "like"):
-            value = at(changed({}, [change]), path)
+            value = at(apply_changes({}, [change]), path)
             if unit[2]:
                 own = at(file, unit[1])
                 value = {**(own if isinstance(own, dict) else {}), "like": value}
-            whole = changed(whole, [(unit[1], unit_data(value, unit[1], Path()))])
+            whole = apply_changes(whole, [(unit[1], unit_data(value, unit[1], Path()))])
         else:
             inside.append(change)
-    return changed(whole, inside)
+    return apply_changes(whole, inside)
 
 
-def expanded(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
+def expand(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
     """Return an array's plain data with the whole spec of each unit in it. Raises Refusal for a unit not found."""
     whole = copy.deepcopy(dict(data))
     if "unit" in whole:
@@ -105,15 +105,15 @@ def unit_data(given: Any, field: str, folder: Path) -> Any:
         if not path.is_file():
             raise Refusal(at_field, given["like"], f"there is no file {path}")
     base = with_source(read_toml(path), path.parent)
-    return merged(base, with_source(own, folder))
+    return merge_tables(base, with_source(own, folder))
 
 
-def merged(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+def merge_tables(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     """Return a table with the keys of another in place of its own, and so the tables in it."""
     result = dict(base)
     for key, value in own.items():
         there = result.get(key)
-        result[key] = merged(there, value) if isinstance(there, dict) and isinstance(value, dict) else value
+        result[key] = merge_tables(there, value) if isinstance(there, dict) and isinstance(value, dict) else value
     return result
 
 
@@ -128,7 +128,7 @@ def layout_of(asked: AskedArray) -> tuple[Any, LayoutKind]:
     own = set(fields_of(kind.table))
     of_others = {key for each in layouts().values() for key in fields_of(each.table)} - own
     if foreign := [key for key in asked.layout if key in of_others]:
-        keys = listed([f"layout.{key}" for key in foreign])
+        keys = join_words([f"layout.{key}" for key in foreign])
         limit = f"unknown key; a layout of the kind {name!r} has no such keys: leave out {keys}"
         raise UnknownKey(f"layout.{foreign[0]}", asked.layout[foreign[0]], limit)
     return convert(asked.layout, kind.table, "layout"), kind
@@ -199,7 +199,7 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
     else:
         path = named_file(os.fspath(source), array_templates(), "array", WrongArgument)
         data, folder = read_toml(path), path.parent
-    written = expanded(data, folder)
+    written = expand(data, folder)
     whole = with_changes(written, data, changes_of(set))
     try:
         return array_of(whole, lay_tails=lay_tails)
@@ -207,7 +207,11 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
         sound = sound_array(whole)
         every = every_fault(first, whole, partial(array_of, lay_tails=lay_tails), sound)
         if len(every) == 1:
-            every = [offered(first, whole, makeable_array if lay_tails else partial(array_of, lay_tails=False), sound)]
+            every = [
+                suggest_for_array(
+                    first, whole, makeable_array if lay_tails else partial(array_of, lay_tails=False), sound
+                )
+            ]
         if path is not None:
             for one in every:
                 _locate(one, path, data, written, whole)
@@ -217,7 +221,7 @@ def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True
 
 def sound_array(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the whole data of a shipped array: of the same construction and kind of layout, if there is one."""
-    shipped = [expanded(read_toml(path), path.parent) for path in array_templates().values()]
+    shipped = [expand(read_toml(path), path.parent) for path in array_templates().values()]
     alike = [one for one in shipped if one["layout"]["kind"] == at(data, "layout.kind")] or shipped
     return next((one for one in alike if one["array"] == data.get("array")), alike[0])
 
@@ -225,11 +229,11 @@ def sound_array(data: Mapping[str, Any]) -> dict[str, Any]:
 def makeable_array(data: Mapping[str, Any]) -> Array:
     """Return the array of plain data as `array_of` does. Raises Refusal also if no tools or circuit can be made."""
     array = array_of(data)
-    made_plan(array)
+    plan_tools(array)
     return array
 
 
-def made_plan(array: Array) -> Plan:
+def plan_tools(array: Array) -> Plan:
     """Return tools and pours. Raises Refusal for tools that can't be made, and for a circuit that does not fit."""
     way = construction_of(array.construction, array.cast)
     made = way.plan(array)
@@ -379,7 +383,7 @@ def _unit(given: str | dict[str, Any], field: str, data: Mapping[str, Any]) -> S
     whole = {"name": f"{data['name']}-unit", **given}
     for table in _OVERRIDES:
         if data.get(table):
-            whole[table] = merged(whole.get(table) or {}, data[table])
+            whole[table] = merge_tables(whole.get(table) or {}, data[table])
     try:
         return from_data(with_source(whole, Path()))
     except Refusal as refusal:
@@ -419,7 +423,7 @@ def _check_held(
 def _accepted(data: Mapping[str, Any], field: str, value: object) -> bool:
     """Tell whether plain data is accepted with another value in a field."""
     try:
-        array_of(changed(data, [(field, value)]))
+        array_of(apply_changes(data, [(field, value)]))
     except UnitcadError:
         return False
     return True

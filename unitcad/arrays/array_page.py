@@ -30,7 +30,7 @@ from unitcad.moulds.plan import Plan, Step
 from unitcad.pipeline.manifest import Manifest
 from unitcad.pipeline.plan import glb_content, glb_part, joint_glb
 from unitcad.pipeline.write import BENCH, PAGE
-from unitcad.report.html_page import VIEW, compressed, drawing, picture, plain_page
+from unitcad.report.html_page import VIEW, compress, drawing, picture, plain_page
 from unitcad.report.read_results import expect
 from unitcad.shape import union
 from unitcad.shape.tree import Body
@@ -42,12 +42,12 @@ BELOW = 14.0
 
 
 def array_model(array: Array) -> dict[str, Any]:
-    """Return an array for the page in the form of `viewer_models.model`: the patch; tools with their silicone.
+    """Return an array for the page in the form of `page.model`: the patch; tools with their silicone.
 
     Raises UnitcadError if the tools can't be made any more.
     """
     model = {**patch_model(array), **tools_model(array)}
-    return model | {key: compressed(model[key]) for key in ("unit", "moulds")}
+    return model | {key: compress(model[key]) for key in ("unit", "moulds")}
 
 
 def patch_model(array: Array) -> dict[str, Any]:
@@ -98,12 +98,12 @@ def tools_model(array: Array) -> dict[str, Any]:
     Lengths in mm. Raises UnitcadError if the tools can't be made.
     """
     moulds = patch_moulds(array).blank
-    plan, apart = moulds.plan, dict(taken_apart(moulds))
+    plan, apart = moulds.plan, dict(take_apart(moulds))
     pieces = {name: [piece.name for piece in plan.pieces_of(name)] for step in plan.steps for name in step.tools}
     bodies = {body.step: body.name for body in moulds.unit}
 
     def flat(step: Step) -> str:
-        return "-flat" if laid_elsewhere(plan, step) else ""
+        return "-flat" if is_moved_later(plan, step) else ""
 
     return {
         "moulds": glb_content(moulds, list(apart)),
@@ -405,10 +405,10 @@ def bent(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
         vertices, faces = arrays(solid)
         return np.asarray(vertices, float) + np.array([0.0, 0.0, radius]), np.asarray(faces, np.int64)
     vertices, faces = arrays(solid.refine_to_length(FINEST))
-    return wrapped(np.asarray(vertices, float), radius, middle), np.asarray(faces, np.int64)
+    return bend_points(np.asarray(vertices, float), radius, middle), np.asarray(faces, np.int64)
 
 
-def wrapped(points: np.ndarray, radius: float, middle: float) -> np.ndarray:
+def bend_points(points: np.ndarray, radius: float, middle: float) -> np.ndarray:
     """Return points (n, 3) of the flat frame, bent around a limb (mm)."""
     angle, distance = points[:, 0] / middle, radius + points[:, 2]
     return np.column_stack([distance * np.sin(angle), points[:, 1], distance * np.cos(angle)])
@@ -453,7 +453,7 @@ def pictures(moulds: PatchMoulds) -> dict[str, bytes]:
     drawn = {
         f"{FOLDER}/patch-skin-side.png": draw(patch, SKIN_SIDE, SIZE),
         f"{FOLDER}/patch-back.png": draw(patch, BACK, SIZE),
-        f"{FOLDER}/tools.png": draw([_solid(moulds, *moved) for moved in taken_apart(moulds)], ABOVE, SIZE),
+        f"{FOLDER}/tools.png": draw([_solid(moulds, *moved) for moved in take_apart(moulds)], ABOVE, SIZE),
     }
     if moulds.arranged.radius_mm is not None:
         drawn[WORN] = draw(list(_worn_bodies(moulds)), ALONG, SIZE)
@@ -473,7 +473,7 @@ def _worn_bodies(moulds: PatchMoulds) -> Iterator[Surface]:
         yield Surface(*bent(array, moulds.mesh(body)), body.colour)
 
 
-def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:
+def take_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:
     """Yield tools and cast layers and how far each is moved (mm) to be shown apart.
 
     One over the other in the order of the pours; the pieces of a tool next to each other.
@@ -495,7 +495,7 @@ def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float,
                 yield piece, (aside[0] * GAP, aside[1] * GAP, float(up))
 
 
-def laid_elsewhere(plan: Plan, step: Step) -> bool:
+def is_moved_later(plan: Plan, step: Step) -> bool:
     """Tell whether a pour's silicone is taken out and inserted into the last pour at another place."""
     last = plan.steps[-1]
     return step.index < last.index and not set(step.layer) <= set(last.earlier)
@@ -507,11 +507,11 @@ def _of_pour(moulds: PatchMoulds, step: Step) -> Iterator[tuple[Body, ...]]:
     own = (*plan.standing(step, "base"), *plan.standing(step, "filament"))
     yield tuple(tool for tool in own if tool.step == step.index)
     before = plan.steps[step.index - 2] if step.index > 1 else None
-    if before and laid_elsewhere(plan, before):
+    if before and is_moved_later(plan, before):
         yield tuple(colours[index] for index in range(1, step.index))
     yield from ((cup,) for cup in plan.standing(step, "cup"))
     cast = colours[step.index]
-    if laid_elsewhere(plan, step):
+    if is_moved_later(plan, step):
         cast = replace(cast, name=f"{cast.name}-flat", shape=union(step.layer))
     yield (cast,)
     yield from ((lid,) for lid in plan.standing(step, "lid"))

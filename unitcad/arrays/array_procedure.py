@@ -16,7 +16,7 @@ from unitcad.arrays.constructions.pockets import hold_strain
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds
 from unitcad.arrays.tails import covered_tails, longer_tails, where_they_end
-from unitcad.casting.bill import Item, bill, consumed, injecting, motor_name, mould_plates
+from unitcad.casting.bill import Item, bill, injecting, list_consumables, motor_name, mould_plates
 from unitcad.casting.figures import (
     LAY_IN_MIN,
     LIFT_MIN,
@@ -29,9 +29,9 @@ from unitcad.casting.pouring import (
     Face,
     after_pours,
     cure,
-    injected,
+    injection_steps,
     lid_held,
-    mixed,
+    mixing_steps,
     motor_in,
     never_pushed,
     pour_steps,
@@ -48,7 +48,7 @@ from unitcad.catalogue import Material
 from unitcad.meshcheck.findings import counted
 from unitcad.moulds.plan import Step
 from unitcad.shape.lettering import seen
-from unitcad.text import listed, number, spaced
+from unitcad.text import join_words, number, spaced
 
 
 def back_sheet_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
@@ -101,8 +101,8 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
     steps = (
         *_laid_in(moulds, flat, silicones[0]),
         *_lid_on(moulds, step),
-        *mixed(batch),
-        *injected(batch, _picture(step, "inject")),
+        *mixing_steps(batch),
+        *injection_steps(batch, _picture(step, "inject")),
         cure(batch, "the bead on a vent", "layer", _picture(step, "filled")),
         _lid_off(moulds, step),
     )
@@ -148,7 +148,7 @@ def _base(moulds: PatchMoulds) -> str:
 def _sort_curved(moulds: PatchMoulds) -> BenchStep:
     plan, label = moulds.plan, seen(moulds.plan.label)
     last = plan.steps[-1]
-    cups = listed(f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps[:-1])
+    cups = join_words(f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps[:-1])
     return BenchStep(
         "Sort the pieces",
         f"All are engraved {label}. The flat ones are "
@@ -187,9 +187,9 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
     )
     yield BenchStep(
         f"Level {base}",
-        f"Put {base} in its final place and {lid} on it, dry. Lay a level on {lid}, along it and across, and put paper "
-        f"under a corner of {base} until it shows none; within 5 degrees is good enough, since the vents clear so "
-        f"much. Lift {lid} off; leave {base} there until it is cured.",
+        f"Put {base} in its final place and {lid} on it, dry. Lay a level on {lid}, along it and across, and shim "
+        f"the corners of {base} with paper until it reads level. Within 5 degrees is good enough for the vents. "
+        f"Lift {lid} off; leave {base} there until it is cured.",
         _picture(step, "level"),
         minutes=5.0,
         required_tools=("level", "paper"),
@@ -221,7 +221,7 @@ def _lengths(moulds: PatchMoulds) -> str:
     for place in array.places:
         length = radius + moulds.plan.dimensions.core_height - (radius + low) / math.cos(place.x / middle)
         found[number(math.ceil(length) + 1, 3)] += 1
-    return listed(f"{count} of {length}" for length, count in found.items())
+    return join_words(f"{count} of {length}" for length, count in found.items())
 
 
 def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
@@ -325,7 +325,7 @@ def pocket_bill(
         Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", net),
         Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", net),
         *_wires(moulds.arranged),
-        *consumed(moulds, [batch], steps),
+        *list_consumables(moulds, [batch], steps),
     ]
     return tuple(_added([*_scaled(moulds.arranged, units), *own]))
 
@@ -424,12 +424,12 @@ def pocket_procedure(
         # The sheet must not get thinner at one end by more than a dent.
         level(
             "Put the tray in its final place. Lay a level on the cores, which are as high as the wall, along the tray "
-            f"and across, and put paper under a corner until it shows none. {fall(moulds)} Leave the tray there until "
-            "it is cured."
+            f"and across, and shim the corners with paper until it reads level. {fall(moulds)} Leave the tray there "
+            "until it is cured."
         ),
     )
     poured = (
-        *mixed(batch),
+        *mixing_steps(batch),
         *struck(
             batch,
             "Pour in a thin thread, first along the wall and round every core, until it rises over the rim and "
@@ -521,8 +521,8 @@ def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
 
 def _sort(moulds: PatchMoulds) -> str:
     tray, files = (
-        listed(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base")),
-        listed(mould_plates(moulds)),
+        join_words(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base")),
+        join_words(mould_plates(moulds)),
     )
     return (
         f"Print tray ({tray}){_and_blade(moulds)} as in {files}, without supports. The tray is engraved "
@@ -545,7 +545,7 @@ def _printing(moulds: PatchMoulds, solid_mm3: float, units: Mapping[str, Procedu
         plates=(*sheet.plates, *files),
         minutes=sheet.minutes + sum(each.minutes for each in of_units),
         cm3=sheet.cm3 + sum(each.cm3 for each in of_units),
-        how=(*sheet.how, f"The units' moulds: {listed(files)}, as their casting.md says."),
+        how=(*sheet.how, f"The units' moulds: {join_words(files)}, as their casting.md says."),
     )
 
 
@@ -584,9 +584,11 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
             required_tools=("soldering iron and solder",),
         )
     strains = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units}
-    stretch = listed(f"{number(100 * one, 2)} % round {number(size, 3)} mm" for size, one in sorted(strains.items()))
+    stretch = join_words(
+        f"{number(100 * one, 2)} % round {number(size, 3)} mm" for size, one in sorted(strains.items())
+    )
     ordered = sorted(array.places, key=lambda place: place.angle_deg)
-    ways = listed(
+    ways = join_words(
         f"{number(angle, 3)} degrees: {' '.join(place.name for place in places)}"
         for angle, places in groupby(ordered, key=lambda place: place.angle_deg)
     )

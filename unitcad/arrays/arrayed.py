@@ -24,7 +24,7 @@ from unitcad.arrays.array_file import (
     ArraySource,
     array_hash,
     array_of,
-    expanded,
+    expand,
     load_array,
     makeable_array,
     sound_array,
@@ -37,7 +37,7 @@ from unitcad.arrays.circuit import crowded_tracks, has_circuit
 from unitcad.arrays.constructions import construction_of
 from unitcad.arrays.crosstalk import extras
 from unitcad.arrays.estimate_arrays import array_summary, estimate_arrays
-from unitcad.arrays.offers import offered
+from unitcad.arrays.offers import suggest_for_array
 from unitcad.arrays.patch import PatchMoulds, patch_bodies, patch_moulds, patch_parts
 from unitcad.arrays.sheet import bending_record
 from unitcad.arrays.tails import covered_tails, covered_tails_warning
@@ -53,7 +53,7 @@ from unitcad.checks.finding import FindingRecord
 from unitcad.checks.gap import play_missing
 from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet, shallow_grooves
-from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finished, geometry, mould_findings, record
+from unitcad.pipeline.make import DRAWING, Product, Progress, Subject, finish, geometry, mould_findings, record
 from unitcad.pipeline.manifest import (
     CASTING,
     NO_KERNEL,
@@ -64,7 +64,7 @@ from unitcad.pipeline.manifest import (
     MeshFinding,
     PartRecord,
     Skipped,
-    counted,
+    count_findings,
     printed_mm3,
 )
 from unitcad.pipeline.plan import (
@@ -106,11 +106,11 @@ class Arrayed(Compound):
 
     @classmethod
     def read(cls, path: Path) -> dict[str, Any]:
-        return expanded(read_toml(path), path.parent)
+        return expand(read_toml(path), path.parent)
 
     @classmethod
     def offered(cls, refusal: Refusal, data: Mapping[str, Any]) -> Refusal:
-        return offered(refusal, data, makeable_array, sound_array(data))
+        return suggest_for_array(refusal, data, makeable_array, sound_array(data))
 
     @classmethod
     def write_page(cls, folder: Path, warn: Callable[[str], None]) -> Path:
@@ -199,7 +199,7 @@ class Arrayed(Compound):
         own |= more
         manifest = _manifest(array, moulds, only, check, shape, units, parts, drawn, own, warned)
         manifest["skipped"] += [Skipped(output=output, reason=reason) for output, reason in lacking.items()]
-        return finished(manifest, own, shared, store)
+        return finish(manifest, own, shared, store)
 
 
 def unit_folders(array: Array) -> dict[str, Spec]:
@@ -346,7 +346,7 @@ def _manifest(
         ],
         mould_checks=findings,
         estimate=first["estimate"],
-        check=counted(meshes),
+        check=count_findings(meshes),
         pictures=drawn,
         casting=sorted(path for path in own if path in CASTING) or None,
         skipped=list(_skipped(array, only, check, first["skipped"])),

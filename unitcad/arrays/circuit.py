@@ -440,7 +440,7 @@ def _turn(points: np.ndarray) -> float:
     return -math.copysign(2 * (math.pi - abs(seen)), seen)
 
 
-def laid_circuit(array: Array) -> tuple[Body, ...]:
+def lay_circuit(array: Array) -> tuple[Body, ...]:
     """Return the circuit in the frame that the silicone is cast in.
 
     In a curved cast its part within each unit is flat; between the units it bends freely, and is not drawn.

@@ -19,13 +19,13 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.circuit import circuit_body, circuit_files, has_circuit, outline, outline_path
 from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.attenuation.curve import RANGE, Reading, contact, decay, ends
-from unitcad.attenuation.inputs import Drive, EstimateInput, body
+from unitcad.attenuation.inputs import Drive, EstimateInput, tissue_medium
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
 from unitcad.errors import Missing, Refusal
 from unitcad.estimate_inputs import estimate_input, estimate_spec
 from unitcad.export.chart import coord
 from unitcad.shape import Profile
-from unitcad.text import listed, number, some
+from unitcad.text import join_words, number, some
 
 BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
 MOST_LOADED = 100
@@ -83,7 +83,7 @@ class Decays:
         found = tuple(estimate_input(unit) for unit in self.array.units)
         for one in found:
             if one.tissue != found[0].tissue:
-                limit = f"units side by side are on one body, {found[0].tissue_name}"
+                limit = f"units side by side are on one tissue, {found[0].tissue_name}"
                 raise Refusal("estimate.tissue", one.tissue_name, limit, found[0].tissue_name)
         return found
 
@@ -176,7 +176,7 @@ def crosstalk(
     `matrix`: the decay between each two units by drive, rows the unit that drives, to the other's centre and nearest
     edge, null for itself, at the units' own frequencies; `sums`: the sum at each place; `band`: the same at the
     nearest neighbour and the worst place over frequencies (Hz); `absolute`: a range; `masses`: with the
-    masses of the others on the skin. Raises Refusal for a unit without an estimate, a frequency that no body takes,
+    masses of the others on the skin. Raises Refusal for a unit without an estimate, a frequency out of range,
     and for masses of more than `MOST_LOADED` units.
     """
     units = Decays(array)
@@ -258,7 +258,7 @@ def _sums(matrix: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _quantity(every: np.ndarray) -> dict[str, float]:
-    """Return a value with its range, of `Told.of` at the nominal body and at the ends, a row each."""
+    """Return a value with its range, of `Told.of` at the nominal tissue and at the ends, a row each."""
     ends = {"value": every[0, 0], "low": every[:, 1].min(), "high": every[:, 2].max()}
     return {key: round(float(one), DIGITS) for key, one in ends.items()}
 
@@ -314,7 +314,7 @@ def _masses(units: Decays) -> dict[str, Any]:
         Patch(1e-3 * place.x, 1e-3 * place.y, 1e-3 * place.radius, float(mass))
         for place, mass in zip(units.array.places, weights, strict=True)
     ]
-    g = influence(body(units.inputs[0].tissue), patches, omega, rtol=1e-3)
+    g = influence(tissue_medium(units.inputs[0].tissue), patches, omega, rtol=1e-3)
     forces = np.zeros((n, 3, n), dtype=np.complex128)
     for i, kind in enumerate(units.kind):
         forces[i, :, i] = FORCES[units.inputs[kind].drive]
@@ -440,7 +440,7 @@ def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:
             )
         for key in ("sum", "root_sum_of_squares"):
             block[key] = _over(other["worst"][key], first["worst"][key])
-        block["same_body"] = first["tissue"] == other["tissue"]
+        block["same_tissue"] = first["tissue"] == other["tissue"]
         found.append(block)
     return found
 
@@ -452,10 +452,12 @@ def ratio_line(one: Mapping[str, Any]) -> str:
         "worst place, root of squares": one["root_sum_of_squares"],
         "in phase": one["sum"],
     }
-    said = listed(f"{change} x {number(value, 3, zeros=True)}" for change, value in parts.items() if value is not None)
-    body = "" if one["same_body"] else " (on another body)"
+    said = join_words(
+        f"{change} x {number(value, 3, zeros=True)}" for change, value in parts.items() if value is not None
+    )
+    tissue = "" if one["same_tissue"] else " (on another tissue)"
     return (
-        f"{one['array']} over {one['over']}: {said or 'nothing to compare'}{body}, in edge levels of their own units."
+        f"{one['array']} over {one['over']}: {said or 'nothing to compare'}{tissue}, in edge levels of their own units."
     )
 
 

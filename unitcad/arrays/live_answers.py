@@ -11,7 +11,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import array_of, expanded, makeable_array, sound_array, to_toml
+from unitcad.arrays.array_file import array_of, expand, makeable_array, sound_array, to_toml
 from unitcad.arrays.array_page import patch_model, tools_model
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.array_tables import AskedArray, CircuitTable, LimbTable, SheetTable
@@ -66,7 +66,7 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
     if named and not folders:
         field, value = next(iter(named.items()))
         raise Refusal(field, value, "a page's text names only files that the server's own array names")
-    return expanded(data, folders[0] if named else Path())
+    return expand(data, folders[0] if named else Path())
 
 
 def faults_of(first: Refusal, whole: dict[str, Any], text: str) -> list[Refusal]:
@@ -95,7 +95,7 @@ def named_files(data: Mapping[str, Any]) -> dict[str, str]:
 
 def units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield each unit's plain data, with the field of its design. Raises Refusal for a unit that is not found."""
-    whole = expanded(data, folder)
+    whole = expand(data, folder)
     places = whole.get("place")
     found = {"unit": whole.get("unit")}
     for i, place in enumerate(places if isinstance(places, list) else ()):

@@ -7,18 +7,18 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from unitcad.errors import Refusal, shown
+from unitcad.errors import Refusal, format_value
 from unitcad.validation.plain_data import at
 from unitcad.validation.suggestions import (
     Judge,
     bare,
     culprit_of,
-    followed,
+    find_refusal,
+    follow,
     good_numbers,
     is_number,
-    listed,
     nearest_number,
-    refused,
+    write_changes,
 )
 
 PATIENCE_S = 10.0
@@ -42,7 +42,7 @@ _COUNTS: dict[str, dict[str, str]] = {
 """Keys that shorten an array of a kind of layout along each side of the bed."""
 
 
-def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Refusal:
+def suggest_for_array(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Refusal:
     """Return the refusal of plain data with a suggestion that was tried; `sound` is the data of a shipped array.
 
     The nearest value is accepted, or the limit names the other values that it needs.
@@ -52,8 +52,8 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapp
     judge = _patient(judge)
     field, limit = refusal.field, refusal.limit
     if field.endswith(_OF_TAIL) and (wider := _wider(_present_pitches(data), data, judge)):
-        limit += f"; with {listed(wider, 'and')} it is accepted as it is"
-    changes, met = followed(refusal, data, judge)
+        limit += f"; with {write_changes(wider, 'and')} it is accepted as it is"
+    changes, met = follow(refusal, data, judge)
     if isinstance(refusal.nearest, str) and changes.get(field) not in (None, refusal.nearest):
         own = [one.limit for one in met if one.field == field]
         return Refusal(field, refusal.value, f"{limit}; then {own[-1]}", refusal.nearest)
@@ -64,7 +64,7 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapp
         if field in pitches and (wider := _wider(pitches, data, judge)):
             if changes:
                 rest = {path: value for path, value in changes.items() if path not in pitches}
-                limit += f"; {listed(pitches, 'and')} would also need {listed(rest, 'and')}"
+                limit += f"; {write_changes(pitches, 'and')} would also need {write_changes(rest, 'and')}"
             changes = wider
     if not changes:
         return _otherwise(Refusal(field, refusal.value, limit), met, data, judge, sound)
@@ -72,7 +72,7 @@ def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapp
     if field.startswith(_OF_BED) and not changes and _places(data) <= _FEW:
         nearest = _nearer(refusal, nearest, data, judge)
     if changes:
-        limit += f"; the value offered here also needs {listed(changes, 'and')}"
+        limit += f"; the value offered here also needs {write_changes(changes, 'and')}"
     return Refusal(field, refusal.value, limit, nearest)
 
 
@@ -86,10 +86,10 @@ def _otherwise(
     good = None if bad is None else next(good_numbers(data, field, judge, sound), None)
     if bad is not None and good is not None:
         if met[-1] is not own[-1]:
-            limit += f"; at {shown(bad)}, {bare(met[met.index(own[-1]) + 1])}"
+            limit += f"; at {format_value(bad)}, {bare(met[met.index(own[-1]) + 1])}"
         return Refusal(field, value, limit, nearest_number(data, field, good, bad, judge))
     if culprit := culprit_of(data, judge, sound):
-        limit += f"; {listed(culprit, 'and')} would do"
+        limit += f"; {write_changes(culprit, 'and')} would do"
     return Refusal(field, value, limit)
 
 
@@ -116,7 +116,7 @@ def _nearer(refusal: Refusal, nearest: Any, data: Mapping[str, Any], judge: Judg
     """Return a bed that is accepted and smaller than the one that was found, if tries between find one."""
     low, high, same = float(str(refusal.value)), float(nearest), 0
     while (middle := math.floor((low + high) * 5) / 10) > low:
-        met = refused(data, {refusal.field: middle}, judge)
+        met = find_refusal(data, {refusal.field: middle}, judge)
         if met is None:
             high = middle
             continue
@@ -124,7 +124,7 @@ def _nearer(refusal: Refusal, nearest: Any, data: Mapping[str, Any], judge: Judg
         same += asked == high
         if same > 1:
             break  # its tools ask for no less
-        if isinstance(asked, float) and asked < high and refused(data, {refusal.field: asked}, judge) is None:
+        if isinstance(asked, float) and asked < high and find_refusal(data, {refusal.field: asked}, judge) is None:
             high, same = asked, 0
     return high
 
@@ -151,10 +151,10 @@ def _wider(pitches: Mapping[str, Any], data: Mapping[str, Any], judge: Judge) ->
         return {path: (math.ceil(pitch * 10 - 1e-6) + tenths) / 10 for path, pitch in pitches.items()}
 
     for whole in range(10, 10 * _WIDEST + 1, 10):
-        met = refused(data, raised(whole), judge)
+        met = find_refusal(data, raised(whole), judge)
         if met is None:
             nearer = (raised(tenths) for tenths in range(whole - 9, whole))
-            return next((each for each in nearer if refused(data, each, judge) is None), raised(whole))
+            return next((each for each in nearer if find_refusal(data, each, judge) is None), raised(whole))
     return {}
 
 
@@ -166,7 +166,7 @@ def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judg
     bed = refusal.field.startswith(_OF_BED)
     found: dict[str, object] = {}
     if places <= _MANY and (bed or refusal.field.startswith(_OF_CIRCUIT)):
-        found = next((each for each in _pitches(refusal, data) if refused(data, each, judge) is None), {})
+        found = next((each for each in _pitches(refusal, data) if find_refusal(data, each, judge) is None), {})
     if places <= _MANY and bed:
         found |= _shorter_slot(data, judge)
     word = "or"
@@ -174,7 +174,7 @@ def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judg
         found, word = _fewer(refusal, data, judge), "and"
     if not found:
         return refusal
-    limit = f"{refusal.limit}; {'on this bed' if bed else 'with this circuit'} {listed(found, word)} would do"
+    limit = f"{refusal.limit}; {'on this bed' if bed else 'with this circuit'} {write_changes(found, word)} would do"
     return Refusal(refusal.field, refusal.value, limit, refusal.nearest)
 
 
@@ -195,9 +195,9 @@ def _shorter_slot(data: Mapping[str, Any], judge: Judge) -> dict[str, object]:
     """Return the longest strap slot, in whole mm, that leaves room for cuts; {} if slots are not the cause."""
     path = "sheet.strap_slot_mm"
     slot = at(data, path)
-    if not isinstance(slot, list | tuple) or refused(data, {path: None}, judge) is not None:
+    if not isinstance(slot, list | tuple) or find_refusal(data, {path: None}, judge) is not None:
         return {}
-    length = _largest(int(slot[1]), lambda mm: refused(data, {f"{path}.1": float(mm)}, judge) is None)
+    length = _largest(int(slot[1]), lambda mm: find_refusal(data, {f"{path}.1": float(mm)}, judge) is None)
     return {f"{path}.1": float(length)} if length else {path: None}
 
 
@@ -213,11 +213,11 @@ def _fewer(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> dict[str,
                 count, lambda n, bed=bed, more=changes, path=path: not _refused_for(bed, data, {**more, path: n}, judge)
             )
             changes = {**changes, path: fewer}
-    return changes if changes and all(changes.values()) and refused(data, changes, judge) is None else {}
+    return changes if changes and all(changes.values()) and find_refusal(data, changes, judge) is None else {}
 
 
 def _refused_for(bed: str, data: Mapping[str, Any], changes: Mapping[str, object], judge: Judge) -> bool:
-    met = refused(data, changes, judge)
+    met = find_refusal(data, changes, judge)
     return met is not None and met.field == bed
 
 

@@ -12,10 +12,10 @@ from manifold3d import Manifold
 from msgspec import structs
 
 from unitcad.arrays.array import Array, Placed
-from unitcad.arrays.array_file import made_plan, makeable_array, sound_array
-from unitcad.arrays.circuit import has_circuit, laid_circuit
+from unitcad.arrays.array_file import makeable_array, plan_tools, sound_array
+from unitcad.arrays.circuit import has_circuit, lay_circuit
 from unitcad.arrays.constructions import Construction, construction_of
-from unitcad.arrays.offers import offered, with_other_ways
+from unitcad.arrays.offers import suggest_for_array, with_other_ways
 from unitcad.arrays.sheet import at_place
 from unitcad.designs import Dimensions, unit_bodies
 from unitcad.designs.design import Fitting
@@ -61,7 +61,7 @@ def patch_parts(array: Array) -> tuple[PatchPart, ...]:
     if array.cast == "curved":
         # Turned about the limb, each is a solid of its own.
         own = [PatchPart(body.name, body) for part in own for body in _at_places(array, part)]
-    circuit = laid_circuit(array) if has_circuit(array) else ()
+    circuit = lay_circuit(array) if has_circuit(array) else ()
     return (*(PatchPart(body.name, body) for body in shared), *own, *(PatchPart(each.name, each) for each in circuit))
 
 
@@ -162,7 +162,7 @@ class PatchMoulds(MouldSet):
             for p in array.places
             for body in motors
         ]
-        return (*placed, *laid_circuit(array))
+        return (*placed, *lay_circuit(array))
 
     @cached_property
     def pushed_in(self) -> tuple[Body, ...]:
@@ -253,10 +253,10 @@ class PatchMoulds(MouldSet):
         if self.altered:
             return self.altered
         try:
-            return made_plan(self.arranged)
+            return plan_tools(self.arranged)
         except Refusal as refusal:
             asked, places = self.arranged.asked, len(self.arranged.places)
-            better = offered(refusal, asked, makeable_array, sound_array(asked))
+            better = suggest_for_array(refusal, asked, makeable_array, sound_array(asked))
             raise with_other_ways(better, asked, places, makeable_array) from None
 
     @cached_property

@@ -11,7 +11,20 @@ from unitcad.arrays.sheet import rounded, slot_profile
 from unitcad.checks.seam import WEEP
 from unitcad.errors import Refusal
 from unitcad.geometry.segments import Point, nearer, to_segment
-from unitcad.moulds.cuts import BESIDE, FAR, LARGE, Axis, Feature, Interval, Place, Seam, Sized, in_gaps, length, seen
+from unitcad.moulds.cuts import (
+    BESIDE,
+    FAR,
+    LARGE,
+    Axis,
+    Feature,
+    Interval,
+    Place,
+    Seam,
+    Sized,
+    in_gaps,
+    length,
+    to_seam_frame,
+)
 from unitcad.moulds.pieces import row, row_width
 from unitcad.shape import Shape, mm, moved, turned
 from unitcad.shape.lettering import HEIGHT
@@ -178,7 +191,7 @@ def of_sheet(array: Array) -> list[Feature]:
     return slots + [box_feature(x[0], y[0], x[1], y[1]) for x in ends[0] for y in ends[1]]
 
 
-def sized(
+def size_tool(
     array: Array,
     outline: Box,
     clear: Sequence[Feature],
@@ -201,7 +214,7 @@ def sized(
     for axis, ends, bed in along:
         if ends[1] - ends[0] > bed + 1e-9:
             kept, closer, crossed = (
-                tuple(Feature(tuple(seen(corner, axis) for corner in f.corners), f.radius) for f in each)
+                tuple(Feature(tuple(to_seam_frame(corner, axis) for corner in f.corners), f.radius) for f in each)
                 for each in (clear, close, under)
             )
             choices = tuple(in_gaps(ends, kept)), tuple(in_gaps(ends, closer, narrow=True))

@@ -16,7 +16,7 @@ from unitcad.designs.dimensions import WIRE_GAP
 from unitcad.designs.limits import EPS
 from unitcad.geometry.segments import between_segments, to_box, to_segment
 from unitcad.spec import Spec
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 
 CLEAR = 0.5
 """From a tail to a unit, a strap slot or another tail, at least, mm (assumed: a hand lays the tails)."""
@@ -301,7 +301,7 @@ def where_they_end(covered: Sequence[CoveredTail], most_names: int = 0) -> str:
 
     groups = groupby(sorted(covered, key=short), key=short)
     first, *others = (f"{number(way)} mm%s at {_names(same, most_names)}" for way, same in groups)
-    return listed([first % " before its edge, measured along the tail,", *(other % "" for other in others)])
+    return join_words([first % " before its edge, measured along the tail,", *(other % "" for other in others)])
 
 
 def longer_tails(covered: Sequence[CoveredTail], most_names: int = 0) -> str:
@@ -349,4 +349,4 @@ def _typed(length: float) -> float:
 def _names(tails: Iterable[CoveredTail], most: int) -> str:
     """Return the tails' places in words; with a `most` only so many, and the number of the others."""
     names = [tail.place for tail in tails]
-    return listed([*names[:most], f"{len(names) - most} others"] if 0 < most < len(names) else names)
+    return join_words([*names[:most], f"{len(names) - most} others"] if 0 < most < len(names) else names)

@@ -10,44 +10,44 @@ from msgspec.structs import replace
 from scipy import special
 
 from unitcad.attenuation.edge.level import sensitivities
-from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
+from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, tissue_medium
 from unitcad.attenuation.layered import LayeredMedium, Response, components
 from unitcad.attenuation.layered.loads import UniformDisc
 
 EDGE_TO_MM = 30
-NO_RATIO = (
-    "a laterally uniform half-space has no ring of silicone in it: it can't say what the layers do, so multiplying "
-    "its curve by another model's ratio would not be a model"
-)
+NO_RATIO = "the half-space contains no rings of silicone, so its curve does not depend on the layers"
 FORCES: dict[Drive, str] = {
     "flat": "turns in the plane of the skin: two forces in quadrature, alike at every angle",
     "axial": "acts along the motor's axis, into the skin",
 }
 """How the force of each drive acts."""
-WHAT_U_IS = (
+U_DEFINITION = (
     "|u|, the root of the sum of the squares of the components' amplitudes: the root mean square of the skin's "
     "motion over a turn, times sqrt(2)"
 )
 ASSUMPTIONS = [
-    "A uniform traction on the motor's disc drives a laterally uniform body: a pressure from an axial drive, one that "
-    "turns in the skin's plane from a flat one. Unit, circuit and cavity are not in it, nor the moment of a flat "
-    "motor's force about the skin.",
-    "The body's layers are a template from published ranges, not this person's arm nor the paper's phantom.",
+    "A uniform traction on the motor's disc drives a laterally uniform tissue: an axial drive gives a pressure, a flat "
+    "one a traction that turns in the skin's plane. Unit, circuit, cavity and the moment of a flat motor's force about "
+    "the skin are not included.",
+    "The tissue's layers are a template from published ranges, not a person's arm or the paper's phantom.",
 ]
 FAR = (
-    "Beyond 2 cm the curve on the skin falls faster than was measured on arms: on hand and forearm vibration keeps "
-    "0.79 (0.70 to 0.88) of its amplitude every 20 mm at 40 to 60 Hz and 0.80 (0.68 to 0.92) at 75 to 100 Hz. Both "
-    "bands fit one of 400 random bodies within the template's sources under a flat motor, and eight under an axial one."
+    "Beyond 2 cm the curve on the skin falls faster than measurements on arms. On hand and forearm vibration keeps "
+    "0.79 (0.70 to 0.88) of its amplitude every 20 mm at 40 to 60 Hz and 0.80 (0.68 to 0.92) at 75 to 100 Hz. "
+    "One of 400 random tissues within the template's sources fits both bands under a flat motor, and eight under an "
+    "axial one."
 )
 _COMPONENTS = {"flat": ("u_r", "u_theta", "u_z"), "axial": ("u_r", "u_z")}
 _SLOPE_RTOL, _SLOPE_STEP = 1e-6, 0.01
 """They leave the slopes off by less than 1e-3."""
-_NO_UNIT = "a laterally uniform body under the motor's disc: walls, caps, silicones, circuit and mass are not in it"
+_NO_UNIT = (
+    "a laterally uniform tissue under the motor's disc: walls, caps, silicones, circuit and mass are not included"
+)
 
 
 RANGE = (
-    "moduli, damping and thicknesses of the body and the frequency to either end of their ranges, one kind at a time; "
-    "and what a unit on the skin changes, bonded or resting, by finite elements (`CONTACT`)"
+    "moduli, damping and thicknesses of the tissue, and the frequency, at both ends of their ranges, one kind at a "
+    "time; and the effect of a unit on the skin, bonded or resting, by finite elements (`CONTACT`)"
 )
 CONTACT_MM = (0.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 CONTACT: dict[Drive, tuple[tuple[float, ...], tuple[float, ...]]] = {
@@ -67,7 +67,7 @@ def crosstalk_ratio(variant: EstimateInput, pitch: float, spread: bool = True) -
     """Return |u| of the bare skin at `pitch` (m) from the unit's middle over |u| at its edge, under its motor's drive.
 
     The layered half-space's own decay. low and high: `RANGE`, without `spread` none. Raises `Refusal` for values that
-    no body has.
+    no tissue has.
     """
 
     def ratio(end: dict[str, int]) -> float:
@@ -104,9 +104,9 @@ def decay(
 ) -> np.ndarray:
     """Return the bare skin's motion at `radii` (m, any shape) from a unit's middle, over that at its edge.
 
-    `drive`, `hertz`: else the motor's own and the unit's frequency; `end` as `inputs.body` has it, and "frequency".
-    `reading`: |u| (`WHAT_U_IS`), or |u_z| alone. Radii inside the edge are given too: they are the bare skin's.
-    One response serves all radii. Raises `Refusal` for values that no body has.
+    `drive`, `hertz`: default: those of the motor and the unit. `end`: as in `inputs.tissue_medium`, or "frequency".
+    `reading`: |u| (`U_DEFINITION`), or only |u_z|. Radii inside the edge give the motion of the bare skin.
+    One response serves all radii. Raises `Refusal` for values that no tissue has.
     """
     if hertz is not None:
         variant = replace(variant, frequency=Quantity(hertz))
@@ -118,11 +118,11 @@ def decay(
 
 
 def _case(variant: EstimateInput, drive: Drive, end: Mapping[str, int]) -> tuple[LayeredMedium, UniformDisc, float]:
-    """Return the body, the load and omega of a drive; `end` as `decay` takes it."""
+    """Return the medium, the load and omega of a drive; `end` as `decay` takes it."""
     frequency = variant.frequency
     hertz = frequency.ends[end["frequency"]] if "frequency" in end else frequency.middle
     load = UniformDisc(variant.motor_diameter / 2.0, "tangential" if drive == "flat" else "normal")
-    return body(variant.tissue, end), load, 2.0 * np.pi * hertz
+    return tissue_medium(variant.tissue, end), load, 2.0 * np.pi * hertz
 
 
 def _response(variant: EstimateInput, drive: Drive, r: np.ndarray, end: Mapping[str, int], rtol: float) -> Response:
@@ -150,14 +150,14 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
         "frequency_hz": variant.frequency.middle,
         "drive": variant.drive,
         "r_mm": [float(v) for v in r_mm],
-        "r_is": "distance from the unit's edge outwards",
-        "u_is": WHAT_U_IS,
+        "r_definition": "distance from the unit's edge outwards",
+        "u_definition": U_DEFINITION,
         "drives": {drive: _drive_block(variant, drive, found[drive]) for drive in order},
         "flat_over_axial_per_newton": _curve(ratio),
         "spread": "each kind of input (moduli, damping, thicknesses, frequency) by itself at both ends of its range; "
-        "of |u| also what a unit on the skin changes, bonded or resting, by finite elements",
+        "|u| also includes the effect of a unit on the skin, bonded or resting, by finite elements",
         **({"far": FAR} if variant.tissue_name == "forearm" else {}),
-        "paper_beside": _paper_curves(variant, r),
+        "published_curves": _paper_curves(variant, r),
         "sensitivities": _sensitivities(variant),
         "hierarchical_over_control": None,
         "hierarchical_over_control_reason": NO_RATIO,
@@ -172,7 +172,7 @@ def _sensitivities(variant: EstimateInput) -> dict[str, Any]:
         "of": f"|u| of the skin {EDGE_TO_MM} mm from the unit's edge over |u| at the edge",
         "drive": variant.drive,
         "by": seen["by"],
-        "nothing_else": _NO_UNIT,
+        "not_included": _NO_UNIT,
     }
 
 
@@ -191,7 +191,7 @@ def _decays(variants: Sequence[EstimateInput]) -> list[float]:
 def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float, ...]) -> dict[str, list[float]]:
     """Return |u| under a `flat` and an `axial` drive and, `u`, the motor's; `u_z`: |u_z| under an axial one.
 
-    Each over its value at the edge, at distances (mm) from the edge and one frequency (Hz), nominal body.
+    Each over its value at the edge, at distances (mm) from the edge and one frequency (Hz), nominal tissue.
     """
     r = variant.diameter / 2.0 + 1e-3 * np.array(distances_mm)
     drives: tuple[Drive, ...] = ("flat", "axial")
@@ -251,7 +251,7 @@ def _paper_curves(variant: EstimateInput, r: np.ndarray) -> dict[str, Any]:
     bessel = np.abs(special.j0(omega / speed * r))
     rate = omega * tan_delta / speed
     return {
-        "what": "the print's J0(kr) exp(-omega eta r/(E c_s)) with the skin's values; it has no integral over k",
+        "note": "the print's J0(kr) exp(-omega eta r/(E c_s)) with the skin's values; it has no integral over k",
         "j0": [float(v) for v in bessel / bessel[0]] if bessel[0] > 1e-3 else None,
         "exponential": {
             "loss_modulus": [float(v) for v in np.exp(-rate * (r - r[0]))],

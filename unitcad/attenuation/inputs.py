@@ -103,7 +103,7 @@ class Geometry(msgspec.Struct, frozen=True):
 
 
 class TissueLayer(msgspec.Struct, frozen=True):
-    """A layer of the body: thickness (m, None for the half-space), density (kg/m3), shear modulus (Pa), damping.
+    """A layer of the tissue: thickness (m, None for the half-space), density (kg/m3), shear modulus (Pa), damping.
 
     damping is tan delta if `damping_law` is "loss_factor", a viscosity in Pa s if it is "kelvin_voigt".
     """
@@ -118,7 +118,7 @@ class TissueLayer(msgspec.Struct, frozen=True):
 
 
 class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
-    """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known).
+    """A unit on tissue: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known).
 
     `passes`: how often the wave from motor to skin passes the border between the layers; `drive`: how the motor's force
     acts, turning in the skin's plane (flat) or along the motor's axis (axial); `moduli`: which ones the layers have;
@@ -145,8 +145,8 @@ class EstimateInput(msgspec.Struct, frozen=True, cache_hash=True):
         return 2.0 * self.geometry.motor_radius
 
 
-def body(tissue: tuple[TissueLayer, ...], end: Mapping[str, int] | None = None) -> LayeredMedium:
-    """Return the body as a layered medium; `end` sets "moduli", "damping" or "thicknesses" to low (0) or high (1)."""
+def tissue_medium(tissue: tuple[TissueLayer, ...], end: Mapping[str, int] | None = None) -> LayeredMedium:
+    """Return the tissue as a layered medium; `end` sets "moduli", "damping" or "thicknesses" to low (0) or high (1)."""
     end = end or {}
 
     def of(kind: str, quantity: Quantity) -> float:
@@ -161,4 +161,4 @@ def body(tissue: tuple[TissueLayer, ...], end: Mapping[str, int] | None = None) 
         if layer.thickness is None:
             return LayeredMedium(made, HalfSpace(*material))
         made.append(Layer(of("thicknesses", layer.thickness), *material))
-    raise ValueError("a body ends with a half-space: a layer without a thickness")
+    raise ValueError("the tissue ends with a half-space: a layer without a thickness")

@@ -1,9 +1,9 @@
-"""Several units on one body: how far one that drives moves the others, whose masses load the skin.
+"""Several units on one tissue: how far one that drives moves the others, whose masses load the skin.
 
 Each unit is a mass on a disc of skin, free to move along x, y and z without turning. The skin under unit i moves by
 u_i = sum of G_ij f_j, f_j being the force on the skin at unit j. A unit of mass m_j that is driven by F_j presses with
 f_j = F_j + omega^2 m_j u_j, so (I - omega^2 G m) u = G F. G is the layered response of a uniform traction on the disc
-of unit j, averaged over the disc of unit i. It is symmetric by reciprocity, and a body only takes up power through it.
+of unit j, averaged over the disc of unit i. It is symmetric by reciprocity, and tissue only takes up power through it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
+from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, tissue_medium
 from unitcad.attenuation.layered import LayeredMedium, components
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.errors import Refusal
@@ -24,7 +24,7 @@ FORCES: dict[Drive, tuple[complex, complex, complex]] = {"flat": (1.0, -1.0j, 0.
 """A newton along x, y and z: one that turns in the plane of the skin, and one along the axis."""
 MOST_PITCH_MM = 200.0
 RANGE = (
-    "least and largest as masses, the body's moduli, damping and thicknesses and, unless it is asked for, the "
+    "least and largest as masses, the tissue's moduli, damping and thicknesses and, unless it is asked for, the "
     "frequency go to either end of their ranges, one kind at a time"
 )
 ASSUMPTIONS = [
@@ -112,7 +112,7 @@ def neighbours_block(
 
     For each frequency (Hz; none: the first unit's, with its range) and each other unit: |u| over that of the first, on
     bare skin and with the units' masses. low and high: `RANGE`.
-    Raises `Refusal` for fewer than two units, for units that overlap and for units on different bodies.
+    Raises `Refusal` for fewer than two units, for units that overlap and for units on different tissues.
     """
     _check(variants, pitch)
     first = variants[0]
@@ -126,7 +126,7 @@ def neighbours_block(
 
     def transfer(hertz: float, end: dict[str, int], *cases: list[float]) -> list[np.ndarray]:
         omega = 2.0 * np.pi * hertz
-        g = influence(body(first.tissue, end), patches, omega, 1e-3 if end else 1e-4)
+        g = influence(tissue_medium(first.tissue, end), patches, omega, 1e-3 if end else 1e-4)
         sizes = [np.linalg.norm(motion(g, case, forces, omega), axis=1) for case in cases]
         return [size / size[0] for size in sizes]
 
@@ -150,7 +150,7 @@ def neighbours_block(
                 }
             )
     return {
-        "what": "|u| of a unit over that of the first, which drives; |u| as in `layered.u_is`",
+        "note": "|u| of a unit over that of the first, which drives; |u| as in `layered.u_definition`",
         "range": RANGE,
         "pitch_mm": pitch * 1e3,
         "drive": first.drive,
@@ -183,7 +183,7 @@ def _check(variants: Sequence[EstimateInput], pitch: float) -> None:
         )
     for variant in variants:
         if variant.tissue != variants[0].tissue:
-            limit = f"units side by side are on one body, {variants[0].tissue_name}"
+            limit = f"units side by side are on one tissue, {variants[0].tissue_name}"
             raise Refusal("estimate.tissue", variant.tissue_name, limit, variants[0].tissue_name)
 
 

@@ -14,7 +14,7 @@ all who share a folder:
     <root>/tmp/                   files being written
 """
 
-from unitcad.cache.disk import DEFAULT_LIMIT_MB, DiskStore, Usage, collect, default_root, free, held, usage
+from unitcad.cache.disk import DEFAULT_LIMIT_MB, DiskStore, Usage, collect, default_root, held, is_free, usage
 from unitcad.cache.shared_store import SharedStore, absolute
 from unitcad.cache.store import Bundle, Entry, MemoryStore, MissingContent, Store, digest
 
@@ -32,7 +32,7 @@ __all__ = [
     "collect",
     "default_root",
     "digest",
-    "free",
     "held",
+    "is_free",
     "usage",
 ]

@@ -347,7 +347,7 @@ def held(path: Path) -> Iterator[None]:
         release(taken)
 
 
-def free(path: Path) -> bool:
+def is_free(path: Path) -> bool:
     """Tell whether the lock on a file is free; the file, left by a process that died, is then removed."""
     taken = lock(path)
     try:
@@ -412,7 +412,7 @@ def _alone(root: Path, held: contextlib.ExitStack) -> bool:
         gate.acquire(blocking=False)
     except OSError:
         return False
-    alone = all([free(path) for path in (root / "locks").glob("*")])
+    alone = all([is_free(path) for path in (root / "locks").glob("*")])
     if alone:
         held.callback(gate.release)
     else:

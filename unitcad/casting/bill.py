@@ -53,7 +53,7 @@ def bill(
         items += [
             Item(f"{material.name} part {part}", g, "g", "bought", note) for part, g in (("A", part_a), ("B", part_b))
         ]
-    return (*items, *_inside(moulds), *consumed(moulds, batches, steps, len(after)))
+    return (*items, *_inside(moulds), *list_consumables(moulds, batches, steps, len(after)))
 
 
 def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
@@ -72,7 +72,7 @@ def plural(item: str) -> str:
     return f"{noun}s{item.removeprefix(noun)}" if noun else item
 
 
-def grouped(items: Iterable[Item]) -> dict[str, list[Item]]:
+def group_bill(items: Iterable[Item]) -> dict[str, list[Item]]:
     """Return a bill by activity: print, buy, have."""
     groups: dict[str, list[Item]] = {"print": [], "buy": [], "have": []}
     for item in items:
@@ -147,7 +147,9 @@ def injecting(batches: Sequence[Batch]) -> Iterator[Item]:
     yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
 
 
-def consumed(moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], after: int = 0) -> Iterator[Item]:
+def list_consumables(
+    moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], after: int = 0
+) -> Iterator[Item]:
     """List the items for pours and steps; `after`: mixes after the pours."""
     pours, cups = len(moulds.plan.steps), moulds.plan.of_kind("cup")
     yield Item("mixing cups and sticks", pours + after, "set", "bought", "no latex, no sulphur clay")

@@ -25,7 +25,7 @@ from unitcad.designs.limits import LEAF_WIDTH, farthest_push, leaf_mm, least_ski
 from unitcad.export import printing
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.moulds.cup import ROOT, SLOPE, SQUARE, drawn, leaf_slots, placed
+from unitcad.moulds.cup import ROOT, SLOPE, SQUARE, drawn, leaf_slots, place_ribs
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, turned, union
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
 from unitcad.shape.tree import Body
@@ -84,12 +84,12 @@ class Coupon:
         self.pitch = 2 * self.handle + JAWS
         bears = "until it sits, no leaf cracked" if self.leaf else "until it sits"
         rows = (
-            ("recess", "plinth_clearance_mm", "least at which the plug drops in"),
-            ("ribs", "rib_interference_mm", f"most that the plug is pressed through by hand {bears}"),
-            ("window", "window_clearance_mm", "least at which the greased tongue slides"),
-            ("hole", "filament_hole_mm", "least that takes the filament by hand"),
-            ("wall", "least_wall_mm", "thinnest that stands closed and stiff"),
-            ("number", "engraving_stroke_mm", "narrowest that reads"),
+            ("recess", "plinth_clearance_mm", "smallest in which the plug drops in"),
+            ("ribs", "rib_interference_mm", f"largest through which you can press the plug by hand {bears}"),
+            ("window", "window_clearance_mm", "smallest in which the greased tongue slides"),
+            ("hole", "filament_hole_mm", "smallest that takes the filament by hand"),
+            ("wall", "least_wall_mm", "thinnest that is closed and stiff"),
+            ("number", "engraving_stroke_mm", "narrowest that you can read"),
         )
         self.fits: dict[str, Fit] = {}
         for feature, key, choose in rows:
@@ -142,13 +142,13 @@ class Coupon:
             f"# Fit coupon for {name}",
             "",
             f"Print {'plate and plug' if self.resin else 'plate, plug and tongue'} as they lie. At every feature",
-            "choose one of the five stations and put its line into your spec. Station 3 is the catalogue's value.",
+            "choose one of the five stations and copy its line into your spec. Station 3 has the catalogue's value.",
             "",
         ]
         if self.resin:
             lines += [
-                f"The tongue is no file: cut a strip {number(self.wide, 3)} wide and 25 long from film or steel",
-                f"{number(self.thick, 3)} mm thick, as the moulds' tongues are; printed resin is brittle.",
+                f"The tongue has no file: cut a strip {number(self.wide, 3)} mm wide and 25 mm long from film or steel",
+                f"{number(self.thick, 3)} mm thick, as for the moulds' tongues; printed resin is brittle.",
                 "",
             ]
         lines += ["```toml", "[moulds]", 'printer = "mine"', "", "[printers.mine]", f'like = "{name}"']
@@ -158,20 +158,20 @@ class Coupon:
             cells = " | ".join(f"`{fit.toml(i)}`" for i in range(len(SHARES)))
             lines.append(f"| {fit.feature} | {fit.choose} | {cells} |")
         if self.ribbed:
-            once = "the leaves under the ribs spring back" if self.leaf else "a rib is crushed once only"
+            once = "the leaves under the ribs spring back" if self.leaf else "a rib is crushed only once"
             lines += [
                 "",
                 f"Ribs: press the plug into each station until its handle lies on the boss; {once}.",
-                "Then measure across handle and boss together, along x and along y. What exceeds the handle alone is",
-                f"how far the plug stands off the middle; without ribs up to {number(self.clearance, 3)} mm.",
+                "Then measure across handle and boss together, along x and along y. The excess over the handle is the",
+                f"plug's offset from the middle; without ribs it is up to {number(self.clearance, 3)} mm.",
             ]
         heights = [number(high - low, 3) for low, high in self.windows]
         every = f"{', '.join(heights)} mm from 1 to 5" if len({*heights}) > 1 else f"{heights[0]} mm at every station"
         lines += [
             "",
-            f"A window's lower and upper edge end whole layers of {number(self.layer, 3)} mm: its height is",
-            f"{every}. Stations of one height differ in width only. A cup's layers count from its",
-            "rim, so its window is as high as station 3's or one layer higher, never lower.",
+            f"Windows begin and end with whole layers of {number(self.layer, 3)} mm: the height is",
+            f"{every}. Stations of one height differ only in width. A cup's layers count from its",
+            "rim, so its window is as high as that of station 3, or one layer higher.",
         ]
         return "\n".join(lines) + "\n"
 
@@ -214,7 +214,7 @@ class Coupon:
         As in a cup, ribs and slots are drawn mouth downwards.
         """
         clearance, crest, half = self.clearance, float(self.printer.least_feature_mm), (self.plug, self.plug)
-        standing = placed(half, CORNER, -self.height, clearance, interference, crest, self.leaf)
+        standing = place_ribs(half, CORNER, -self.height, clearance, interference, crest, self.leaf)
         drawings = drawn(standing, clearance, interference, crest, self.leaf / 2 or ROOT)
         room = cut(self._taper(clearance, RELIEF, 0.25), [turned(shape, "x", 2) for shape in drawings])
         return union((room, *(turned(slot, "x", 2) for slot in leaf_slots(standing, clearance, self.leaf))))

@@ -66,7 +66,7 @@ class Figure:
     source: str
 
 
-def sourced(value: Value) -> str:
+def source_text(value: Value) -> str:
     """Return a catalogue value's origin in words: its status, then its source."""
     return f"{value.status}: {value.source}"
 
@@ -312,7 +312,7 @@ class Batch:
         more = f"assumed: {casting.waste:.0%} more, at least {number(casting.minimum_mix_g, 3)} g"
         held_back = f"net, and {number(HELD_BACK_ML, 2)} ml that tip and plunger keep (assumed)"
         stokes = "computed: Stokes' law at the viscosity just mixed, so optimistic"
-        ratio = f"mix ratio, {sourced(silicone.mix_ratio)}"
+        ratio = f"mix ratio, {source_text(silicone.mix_ratio)}"
         kpa = f"assumed: usual advice; {number(VACUUM_INHG * KPA_PER_INHG, 3)} kPa below the room's pressure"
         weep = 100 * weep_mm3(self.moulds, step, silicone) / self.volume_mm3
         pressure = "; the syringe's pressure comes on top" if step.lid else ""
@@ -321,7 +321,7 @@ class Batch:
         rows = (
             (what, self.volume_mm3, "mm3", "computed: the drawn layer's mesh"),
             channels and ("sprue and vents", self.channels_mm3, "mm3", "computed: as drawn"),
-            ("density", float(silicone.density_g_cm3), "g/cm3", sourced(silicone.density_g_cm3)),
+            ("density", float(silicone.density_g_cm3), "g/cm3", source_text(silicone.density_g_cm3)),
             ("in the cavities, net", mix.net_g, "g", f"computed: {taken} x density"),
             ("to mix", mix.mix_g, "g", more),
             mix.syringe_ml and ("to draw into the syringe, at least", mix.syringe_ml, "ml", held_back),
@@ -329,16 +329,16 @@ class Batch:
             ("part B", mix.part_b_g, "g", ratio),
             ("scale's error on a part, net", mix.net_error_pct, "%", digit),
             ("scale's error on a part, mixed", mix.mix_error_pct, "%", digit),
-            ("pot life in this room", self.pot_min, "min", by_temperature + sourced(silicone.pot_life_min)),
+            ("pot life in this room", self.pot_min, "min", by_temperature + source_text(silicone.pot_life_min)),
             ("mixing", MIXING_MIN, "min", practice),
             ("pouring and striking off", pouring_min(cells), "min", practice),
-            ("viscosity, mixed", float(silicone.mixed_viscosity_cps), "cps", sourced(silicone.mixed_viscosity_cps)),
+            ("viscosity, mixed", float(silicone.mixed_viscosity_cps), "cps", source_text(silicone.mixed_viscosity_cps)),
             ("depth of this pour", step.rim, "mm", "computed: the rim over the seat"),
             (f"rise of a {BUBBLE_MM} mm bubble through it", self.rise_min, "min", stokes),
             self.vacuum and ("degassing", DEGASSING_MIN, "min", practice),
             self.vacuum and ("degassing container, at least", CONTAINER * mix.millilitres, "ml", FOAMS),
             self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),
-            ("cure in this room", self.cure_h, "h", by_temperature + sourced(silicone.cure_h)),
+            ("cure in this room", self.cure_h, "h", by_temperature + source_text(silicone.cure_h)),
             weep and ("weep by the windows, no grease", weep, "% of a layer", flow),
             held and ("area on the base over area in the cup", held, "", "computed: adhesion is not measured"),
         )

@@ -30,7 +30,7 @@ from unitcad.casting.figures import (
 )
 from unitcad.casting.preparation import inner
 from unitcad.casting.steps import BenchStep
-from unitcad.casting.views import fed_through, picture_path
+from unitcad.casting.views import is_fed_through, picture_path
 from unitcad.catalogue import Material
 from unitcad.designs.design import ADHESIVE, Fitting, bond
 from unitcad.moulds.cup import ribs
@@ -38,7 +38,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import CAST
 from unitcad.moulds.plan import Step
 from unitcad.spec import Spec
-from unitcad.text import listed, number, spaced
+from unitcad.text import join_words, number, spaced
 
 TACK = (
     "done if a gloved finger comes off without a pull and a fingernail's dent springs back. If not, wait half an hour"
@@ -117,7 +117,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     dry = True
     for i, fitting in enumerate(laid):
         if fitting.mix and dry:
-            yield from mixed(batch)
+            yield from mixing_steps(batch)
             dry = False
         title = f"Lay in, {i + 1} of {len(laid)}" if len(laid) > 1 else "Lay in"
         shown = "" if i else picture("laid-in")
@@ -134,7 +134,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         yield BenchStep(
             "Grease the flanks",
             f"Before cup {n} goes on, smear petroleum jelly on {flanks}: a film that shines, no beads. It keeps "
-            "silicone out of the slits beside the cup's slots. Wipe it off everywhere else.",
+            "silicone out of the slits next to the cup's slots. Wipe it off everywhere else.",
             picture("grease"),
             minutes=1.0 * cells,
             required_tools=("petroleum jelly",),
@@ -196,9 +196,9 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     else:
         yield _cup_held(moulds, n, picture("hold"))
     if dry:
-        yield from mixed(batch)
+        yield from mixing_steps(batch)
     if step.lid:
-        yield from injected(batch, picture("inject"))
+        yield from injection_steps(batch, picture("inject"))
     else:
         if cells == 1 or len(step.layer) > 1:
             where = "the cavity stands" if len(step.layer) == 1 else "it stands"
@@ -206,7 +206,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             poured = f"Pour in a thin thread at one place until {where} over its rim{each}."
         else:
             poured = (
-                "Pour in a thin thread, first beside each unit's earlier layer until that is covered, then outwards "
+                "Pour in a thin thread, first at each unit's earlier layer until that is covered, then outwards "
                 "until the whole cavity stands over its rim."
             )
         strip = not plan.concentric and plan.dimensions.core_height > step.rim
@@ -241,8 +241,8 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     if step.lid:
         yield BenchStep(
             "Lid off",
-            "Take off what held the lid down. Push the lid's edge up from below on two opposite sides, with thumbs or "
-            f"a blunt spatula, a little at a time, cup {n} held down. Lift it straight up: sprue and vents tear off. "
+            "Remove its tape or bands. Push the lid's edge up from below on two opposite sides, with thumbs "
+            f"or a blunt spatula, bit by bit, cup {n} held down. Lift it straight up: sprue and vents tear off. "
             f"Trim them flush with a knife.{' Peel off silicone that came up on the core.' if core else ''}",
             picture("lid-off"),
             minutes=LIFT_MIN,
@@ -264,8 +264,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         )
     yield BenchStep(
         f"Cup {n} off",
-        f"{'' if step.lid else 'Take off what held the cup down. '}{pried} Lift cup {n} straight up. "
-        f"{recovery(moulds, n)}",
+        f"{'' if step.lid else 'Remove its tape or bands. '}{pried} Lift cup {n} straight up. {recovery(moulds, n)}",
         picture("cup-off"),
         minutes=LIFT_MIN,
         required_tools=("blunt spatula",) if split else (),
@@ -286,7 +285,7 @@ def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
     between = [number(at - left, 2) for at in others[:-1]]
     where = ": one at either end" if others else ""
     if between:
-        where += f", {'one' if len(between) == 1 else 'the others'} {listed(between)} mm from the left one"
+        where += f", {'one' if len(between) == 1 else 'the others'} {join_words(between)} mm from the left one"
     pieces = ""
     if split:
         pieces = " Each piece of cup and base that reaches these sides has one; one over a seam holds both pieces."
@@ -341,7 +340,7 @@ def _tongue_home(moulds: MouldSet, pour: int, the_tongue: str, picture: str) -> 
     )
 
 
-def mixed(batch: Batch) -> Iterator[BenchStep]:
+def mixing_steps(batch: Batch) -> Iterator[BenchStep]:
     """Describe the way from the bottles to a mix without air."""
     mix, larger = batch.mix, ""
     if mix.mix_error_pct > MOST_ERROR_PCT:
@@ -372,7 +371,7 @@ def _mixing(pot_min: float) -> str:
     )
 
 
-def injected(batch: Batch, picture: str) -> Iterator[BenchStep]:
+def injection_steps(batch: Batch, picture: str) -> Iterator[BenchStep]:
     """Say how the mix gets into the syringe, and from there into a cavity under a lid."""
     mix = batch.mix
     refilled = " Fill it again while the mix flows." if mix.syringe_size_ml < mix.millilitres else ""
@@ -470,13 +469,13 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
             )
         if split and inner(split):
             levered += (
-                " A piece without an outer edge hangs by the tape alone. Before you lever, stick more tape across it, "
+                " A piece without an outer edge hangs only by the tape. Before you lever, stick more tape across it, "
                 "both ways, clear of the filaments' holes. Let its neighbours get a millimetre ahead at most, and pull "
                 "at the tape under it."
             )
         yield BenchStep(
             "Base off, downwards",
-            f"Take off what held the cup down. Leave {cup} on: silicone lies over it. {levered} The {moulds.makes} "
+            f"Remove its tape or bands. Leave {cup} on: silicone lies over it. {levered} The {moulds.makes} "
             f"stays in {cup}.",
             picture_path("base-off"),
             minutes=LIFT_MIN * 2,
@@ -511,7 +510,7 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         if fitting.mixed:
             yield from _mixed_later(later[fitting.mixed], moulds.spec)
         title = f"Motor in, {i + 1} of {len(fittings)}" if len(fittings) > 1 else "Motor in"
-        path = picture_path("motor-home" if i or fed_through(moulds) else "motor-in")
+        path = picture_path("motor-home" if i or is_fed_through(moulds) else "motor-in")
         minutes = LAY_IN_MIN * len(moulds.plan.layout.cells)
         yield BenchStep(title, fitting.text, path, minutes=minutes, required_tools=fitting.required_tools)
     mouth, motor = ("cavity's mouth", "motor") if moulds.makes == "unit" else ("cavities' mouths", "motors")

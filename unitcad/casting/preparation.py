@@ -27,7 +27,7 @@ from unitcad.moulds.lid import DENT, TILT_DEG
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.lettering import seen
 from unitcad.spec import MOTOR_SIZES, printer_of
-from unitcad.text import listed, number, spaced
+from unitcad.text import join_words, number, spaced
 
 PERIMETERS = 3
 INFILL_PERCENT = 20
@@ -37,7 +37,7 @@ FOOT_MM = 0.2
 MEASURED_MM = 0.05
 """Difference of a measured length from the drawn one from which it is worth to build again (assumed)."""
 GOOD_DEG = {"a phone": 0.2, "a spirit level of 0.5 mm/m": 0.03}
-"""Tilt that is left if a level shows none (assumed): two steps of a phone; a builder's level, turned end for end."""
+"""Tilt that is left if the level reads none (assumed): two steps of a phone; a builder's level, turned end for end."""
 
 
 def slicer_settings(moulds: MouldSet) -> dict[str, str]:
@@ -92,7 +92,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     spec, plan, lengths, resin = moulds.spec, moulds.plan, moulds.spec.moulds, in_resin(moulds)
     printed = [tool for tool in plan.pieces if tool.made == "printed"]
     mixed = {tool.kind for tool in printed if not tool.upside_down}
-    turned = listed(
+    turned = join_words(
         dict.fromkeys(
             spaced(t.name.partition("-")[0]) if t.kind in mixed else f"{t.kind}s" if t.step else t.kind
             for t in printed
@@ -105,7 +105,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     tallest = max(standing, BLADE_HEIGHT if plan.of_kind("blade") else 0.0, tallest_mm)
     minutes, cm3 = 5.0 * max(round(print_min(spec, solid_mm3, tallest) / 5), 1), solid_mm3 / 1000
     takes = f"About {duration(minutes)}, at most {number(cm3, 2)} cm3 of"
-    names = [listed(plan.called(one.name).replace(",", "") for one in plate) for plate in files.values()]
+    names = [join_words(plan.called(one.name).replace(",", "") for one in plate) for plate in files.values()]
     there = "; ".join(f"{path} with {each}" for path, each in zip(files, names, strict=True))
     plates = f"Plate: {there}"
     if len(files) > 1:
@@ -169,9 +169,9 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     own += [f"L{step.index:X} on {spaced(step.lid)}" for step in plan.steps if step.lid]
     own += [f"F on the {plan.called(tray.name)}" for tray in plan.of_kind("tray")]
     pieces = " Beside it each piece of a tool that is printed in several has its number." if plan.splits else ""
-    marks = f"{label[:2]} and {label[2:]} on {'cups and lids' if plan.of_kind('lid') else 'cups'}, {listed(own)}"
+    marks = f"{label[:2]} and {label[2:]} on {'cups and lids' if plan.of_kind('lid') else 'cups'}, {join_words(own)}"
     if any(len(plan.pieces_of(cup.name)) > 1 for cup in plan.of_kind("cup")):
-        marks = f"{listed(own)}, and after it {label} where the piece has room"
+        marks = f"{join_words(own)}, and after it {label} where the piece has room"
     yield BenchStep(
         "Sort the pieces",
         f"Engraved: {seen('B')}{label} on the base, {marks}.{pieces}",
@@ -238,10 +238,10 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     cup = spaced(level_on(moulds).cup)
     enough = fall(moulds)
     if lengths.pour == "injected":
-        enough = f"Within {number(TILT_DEG, 2)} degrees is good enough: so much the vents clear."
+        enough = f"Within {number(TILT_DEG, 2)} degrees is good enough for the vents."
     yield level(
         f"Put the base where it stays until the last cure, {cup} on it. Lay a level on the rim, along and across, and "
-        f"put paper under a corner of the base until it shows none. {enough} Take {cup} off."
+        f"shim the corners of the base with paper until it reads level. {enough} Take {cup} off."
     )
 
 
@@ -276,9 +276,9 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         height = number(min(high - low for _, low, high in windows), 2)
         yield BenchStep(
             "Clear the windows",
-            f"Clear the windows of {listed(spaced(step.cup) for step in steps)} before the post-cure: resin stays in a "
-            f"slot {height} mm high. Rinse each with a syringe of isopropanol. Push the tongue's film through until it "
-            "slides freely.",
+            f"Clear the windows of {join_words(spaced(step.cup) for step in steps)} before the post-cure: resin stays "
+            f"in slots of {height} mm. Rinse each with a syringe of isopropanol. Push the tongue's film through until "
+            "it slides freely.",
             picture_path("clear-windows"),
             minutes=5.0 * len(steps),
             required_tools=("isopropanol and lint-free wipes", "rinsing syringe"),
@@ -333,7 +333,7 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
     if not plan.splits:
         return
     called = {split.tool: plan.called(split.tool) for split in plan.splits}
-    parts = listed(f"{called[split.tool]} in {len(split.pieces)} pieces" for split in plan.splits)
+    parts = join_words(f"{called[split.tool]} in {len(split.pieces)} pieces" for split in plan.splits)
     (base, *cups), below = plan.splits, called[plan.splits[0].tool]
     upper = [name for tool, name in called.items() if plan.tool(tool).kind == "cup"]
     play = number(base.seams[0].play, 2)
@@ -362,13 +362,13 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
         in_line = "The pins hold the pieces of each cup in line"
         if same:
             in_line = (
-                f"Where base and cup are cut at the same gap ({listed(same)}), only dovetails and tape hold them in "
-                "line: keep the base on one flat board, and before each pour lay the blade's edge over that seam on "
+                f"If base and cup are cut at the same gap ({join_words(same)}), only dovetails and tape align them: "
+                "keep the base on one flat board, and before each pour lay the blade's edge over that seam on "
                 "the rim: no light may show under it"
             )
         text += (
-            f"; petroleum jelly rubbed into the underside of {listed(upper)} and wiped off flush. The tape stays on "
-            f"until the {below} is off. {in_line}"
+            f"; petroleum jelly rubbed into the underside of {join_words(upper)} and wiped off flush. The tape stays "
+            f"on until the {below} is off. {in_line}"
         )
     yield BenchStep(
         "Join the pieces",

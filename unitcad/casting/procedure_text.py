@@ -9,19 +9,19 @@ from typing import Any
 
 import msgspec
 
-from unitcad.casting.bill import Item, grouped, in_words, plural, to_csv
+from unitcad.casting.bill import Item, group_bill, in_words, plural, to_csv
 from unitcad.casting.drawings import cast_colour
 from unitcad.casting.figures import OVER_ALL
 from unitcad.casting.preparation import MEASURED_MM
 from unitcad.casting.procedure import Procedure
-from unitcad.casting.steps import BenchStep, Phase, duration, shortened
+from unitcad.casting.steps import BenchStep, Phase, duration, number_steps
 from unitcad.casting.troubles import TROUBLES, troubles_markdown
 from unitcad.export import svg
 from unitcad.json_text import all_finite
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.tree import Body
-from unitcad.text import listed, markdown, number, spaced
+from unitcad.text import join_words, markdown, number, spaced
 
 
 def _nine_digits(text: str) -> float:
@@ -46,7 +46,7 @@ def files(procedure: Procedure) -> dict[str, str]:
 
 def _shortened(procedure: Procedure) -> Procedure:
     """Return the procedure with the short texts of its steps."""
-    left = iter(shortened(_steps(procedure)))
+    left = iter(number_steps(_steps(procedure)))
 
     def next_of(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
         return tuple(islice(left, len(steps)))
@@ -104,16 +104,16 @@ def to_markdown(procedure: Procedure) -> str:
 
     total, bench = duration(procedure.earliest_finish_min), duration(procedure.bench_min)
     out = "units and sheet are out of their moulds" if made == "sheet" else f"{made} is out of the mould"
-    lines.append(f"The {out} **{total}** after the print, with {bench} at the bench (assumed).")
-    lines.append(f"Faults: {TROUBLES}.\n")
+    lines.append(f"The {out} **{total}** after the print. You work {bench} of it at the bench (assumed).")
+    lines.append(f"If something goes wrong, see {TROUBLES}.\n")
     lines += [*_stretches(procedure.time_line), ""]
     if printing.sizes:
         section("0. Measure first", _measuring(procedure))
     section("Print", (f"- {markdown(text)}" for text in printing.how))
-    for group, items in grouped(procedure.bill).items():
+    for group, items in group_bill(procedure.bill).items():
         if group == "print":
             continue  # the plate's line names the pieces
-        section(group.capitalize(), _listed_items(items))
+        section("Have ready" if group == "have" else group.capitalize(), _listed_items(items))
     steps("Before the first pour", procedure.preparation)
     titles = [f"{pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}" for pour in procedure.pours]
     for title, pour in zip(titles, procedure.pours, strict=True):
@@ -157,20 +157,20 @@ def _listed_items(items: Iterable[Item]) -> Iterator[str]:
             plain.append(counted)
     for silicone, each in parts.items():
         equal = len(each) == 2 and each[0][:-1] == each[1][:-1]
-        yield f"- silicone {silicone}: {f'{each[0]} and as much of B' if equal else listed(each)}"
+        yield f"- silicone {silicone}: {f'{each[0]} and as much of B' if equal else join_words(each)}"
     if plain:
-        yield f"- {listed(plain)}"
+        yield f"- {join_words(plain)}"
 
 
 def _stretches(line: Sequence[Phase]) -> Iterator[str]:
-    """Yield a line for each stretch at the bench: its begin, its phases, its length; the wait after the last."""
+    """Yield a line for each stretch of work: its start, its phases, its length; the wait after the last."""
     names, begins, bench = list[str](), 0.0, 0.0
     for i, phase in enumerate(line, 1):
         begins = begins if names else phase.start_min
         names, bench = [*names, phase.name], bench + phase.bench_min
         if phase.wait_min or i == len(line):
             wait = f", then wait {duration(phase.wait_min)}" if phase.wait_min and i == len(line) else ""
-            yield f"- after {duration(begins)}: {', '.join(names)}, {duration(bench)}{wait}"
+            yield f"- {duration(begins)} after the start: {', '.join(names)}; {duration(bench)} of work{wait}"
             names, bench = [], 0.0
 
 
@@ -181,12 +181,12 @@ def _appendix(procedure: Procedure) -> Iterator[str]:
     yield from (" ".join(sections), "")
     for o in procedure.off_grid:
         height, by = number(o.height_mm, 3), number(o.moved_mm, 2)
-        yield f"- {spaced(o.piece)}, {o.edge}: {height} mm, which whole layers move by {by} mm"
+        yield f"- {spaced(o.piece)}, {o.edge}: {height} mm; whole layers move it by {by} mm"
     # The height over all is among the measures.
     inside = [height for height in procedure.unit_heights if height.what != OVER_ALL]
     heights = (f"{h.what} {number(h.printed_mm, 3)} for {number(h.asked_mm, 3)}" for h in inside)
     if inside:
-        yield f"- in whole layers, mm: {', '.join(heights)}"
+        yield f"- heights as printed in whole layers, mm: {', '.join(heights)}"
     yield from ("", "All figures and their sources: casting.json.", "", "</details>")
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class BenchStep:
     wait_min  waiting time before the next step
     required_tools
               tools and consumables, by their names in `REQUIRED_TOOLS`
-    short     the text if an earlier pour had the step too: its number and the differences; filled in by `shortened`
+    short     the text if an earlier pour had the step too: its number and the differences; filled in by `number_steps`
     """
 
     title: str
@@ -42,7 +42,7 @@ _MOST_NEW = 0.8
 """A step refers to an earlier one if its own words are a smaller share of its text."""
 
 
-def shortened(steps: Iterable[BenchStep]) -> list[BenchStep]:
+def number_steps(steps: Iterable[BenchStep]) -> list[BenchStep]:
     """Return the steps of a whole procedure, numbered from 1; repeated steps have a short text."""
     found: list[BenchStep] = []
     earlier: dict[str, list[tuple[int, set[str]]]] = {}
@@ -150,7 +150,7 @@ def casting_summary(procedure: Mapping[str, Any]) -> Iterator[str]:
     then = f"; {procedure['last'].lower()}{mixed} {duration(more)} later" if procedure["assembly"] else ""
     printing = procedure["printing"]
     time, volume = duration(printing["minutes"]), number(printing["cm3"], 2)
-    yield f"print {listed(printing['plates'])}: about {time}, at most {volume} cm3 of {printing['of']}"
+    yield f"print {join_words(printing['plates'])}: about {time}, at most {volume} cm3 of {printing['of']}"
     yield "mix " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams.items())
     yield f"out of the mould {total} after the print: {count}, {bench} at the bench{then}"
     yield from (f"warning: {line}" for line in pour_warnings(pours))
@@ -163,5 +163,5 @@ def pour_warnings(pours: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         ([pour for pour in pours if pour["over_pot_life_min"] > 0], "mixing and pouring outlast the pot life in"),
     ):
         if wrong:
-            named = listed([f"pour {pour['index']} ({pour['material']})" for pour in wrong])
+            named = join_words([f"pour {pour['index']} ({pour['material']})" for pour in wrong])
             yield f"{words} {named}; casting.md says what to do"

@@ -38,7 +38,7 @@ _KNOWN: tuple[tuple[Trouble, _Part | None], ...] = (
     (
         Trouble(
             "Silicone is torn",
-            "It was opened too early, lifted over a tongue, or levered on one side alone.",
+            "It was opened too early, lifted over a tongue, or levered only on one side.",
             "Close a small tear with silicone adhesive. Cast again if it runs through the slot or into the bond.",
             "the torn layer's wall_mm larger (Layer 1 is layers.0), or a silicone with more elongation at break.",
         ),

@@ -85,7 +85,9 @@ class View:
     way: int = -1
 
 
-def placed(these: Iterable[Body | Step], x: float = 0.0, z: float = 0.0, half: bool = False) -> tuple[Placed, ...]:
+def place_pieces(
+    these: Iterable[Body | Step], x: float = 0.0, z: float = 0.0, half: bool = False
+) -> tuple[Placed, ...]:
     """Return pieces, or cast layers, in their places or next to them."""
     return tuple(Placed(each.name, (x, 0.0, z), half) for each in these)
 
@@ -145,12 +147,12 @@ def level_on(moulds: MouldSet) -> Step:
 
 def _views(moulds: MouldSet) -> Views:
     plan, (bottom, top), (cup_x, cup_y) = moulds.plan, moulds.plate, moulds.plan.layout.cup
-    yield "pieces", View(placed(plan.pieces), eye=OVER, group="pieces")
+    yield "pieces", View(place_pieces(plan.pieces), eye=OVER, group="pieces")
     if moulds.cast_flat:
         yield from _curved(moulds, moulds.cast_flat, views(moulds.cast_flat))
         return
     yield from _single_pieces(moulds)
-    base, first = placed(plan.of_kind("base")), plan.steps[0]
+    base, first = place_pieces(plan.of_kind("base")), plan.steps[0]
     if not plan.of_kind("cup"):
         yield from _tray(moulds, base, first)
         return
@@ -164,8 +166,8 @@ def _views(moulds: MouldSet) -> Views:
         x, y = plan.layout.cells[0].x, -plan.layout.plate[1]
         names = Name("filament", (x, y * 0.8, bottom - down)), Name("groove", (x, y * 0.7, bottom))
         up = _beside_filaments(moulds, 1)
-        yield "filament", View((*base, *placed(filaments, z=-down)), up, UNDER, "under", names=names, way=0)
-    standing, on = (*base, *placed(filaments)), level_on(moulds)
+        yield "filament", View((*base, *place_pieces(filaments, z=-down)), up, UNDER, "under", names=names, way=0)
+    standing, on = (*base, *place_pieces(filaments)), level_on(moulds)
     yield "level", _level((*standing, Placed(on.cup)), cup_x, on.rim, plan.layout.plate, bottom)
     for step in plan.steps:
         for name, view in _pour(moulds, step, standing):
@@ -214,20 +216,20 @@ def _single_pieces(moulds: MouldSet) -> Views:
         x0, y0, z0, x1, _, z1 = bounds(moulds.mesh(pushed))
         up = z1 - z0 + max(2 * CLEAR, 0.15 * (x1 - x0))
         names = Name("piece 1", ((left + right) / 2, front, high)), Name("piece 2", ((x0 + x1) / 2, y0, z1 + up))
-        yield "join", View((*placed([lying]), *placed([pushed], z=up)), names=names)
+        yield "join", View((*place_pieces([lying]), *place_pieces([pushed], z=up)), names=names)
 
 
 def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
     plan, lay, dims, (bottom, top) = moulds.plan, moulds.plan.layout, moulds.dimensions, moulds.plate
     (cup_x, cup_y), before, radius = lay.cup, plan.steps[: step.index - 1], dims.radii[step.index - 1]
     near, lengths = min(lay.cells, key=lambda each: (each.y, each.x)), moulds.spec.moulds
-    cured = *standing, *placed(before)
+    cured = *standing, *place_pieces(before)
     if before:
         face = Name("bond face", (near.x, near.y - dims.radii[step.index - 2], 0.6 * before[-1].rim))
-        yield "bond-face", View((*cured, *placed(before[-1].inserts)), names=(face,) if plan.concentric else ())
+        yield "bond-face", View((*cured, *place_pieces(before[-1].inserts)), names=(face,) if plan.concentric else ())
     if moulds.design.laid_in == step.index:
-        yield "laid-in", View((*cured, *placed(step.inserts, z=2 * CLEAR)))
-    cured = *cured, *placed(step.inserts)
+        yield "laid-in", View((*cured, *place_pieces(step.inserts, z=2 * CLEAR)))
+    cured = *cured, *place_pieces(step.inserts)
     if moulds.greased(step):
         meshes = [mesh for mesh in moulds.meshes(step.seals[:1]) if not mesh.is_empty()]
         points = [max(np.asarray(arrays(mesh)[0], float).tolist(), key=np.array(ABOVE).dot) for mesh in meshes]
@@ -262,9 +264,9 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
         if len(plan.steps) > 1:
             marks, names = on_tongues(moulds, 0.6, INK), (Name("pen mark", (side * (cup_x + 0.3), *wall)), *card)
         on = *pads, *tabs(moulds)
-        yield "tongue-home", View((*cured, opened, *placed(tongues)), (*on, *marks), names=names)
-    closed = *cured, Placed(step.cup), *placed(tongues)
-    lift, poured, colour = step.top - step.rim + 2 * CLEAR, placed([step]), layer_colour(step.index - 1)
+        yield "tongue-home", View((*cured, opened, *place_pieces(tongues)), (*on, *marks), names=names)
+    closed = *cured, Placed(step.cup), *place_pieces(tongues)
+    lift, poured, colour = step.top - step.rim + 2 * CLEAR, place_pieces([step]), layer_colour(step.index - 1)
     off = Placed(step.lid or "", (0.0, 0.0, lift + moulds.hung(step)))
     if step.lid:
         grease = Name("grease", (0.4 * cup_x, 0.8 - cup_y, step.rim))
@@ -282,7 +284,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Views:
         thread = moved(cylinder(0.6, step.rim - 1.0, step.rim + 14.0), near.x - 0.5 * reach, near.y)
         yield "pour", View((*closed, *poured), (*held, *(Extra(each, colour) for each in (*mounds, thread))))
         back, strikers = -0.55 * cup_x, held
-        blades = placed(plan.of_kind("blade"), back, step.rim - (*before, step)[0].rim)
+        blades = place_pieces(plan.of_kind("blade"), back, step.rim - (*before, step)[0].rim)
         if not plan.concentric and plan.dimensions.core_height > step.rim:
             # A strip as wide as the cavity, since parts on the base are in the blade's way.
             half, blades = plan.dimensions.radii[step.index - 1], ()
@@ -322,7 +324,7 @@ def _injected(
     first = count if len(step.channels) > count else 0
     sprue, *vents = (_middle(moulds, shape, top=True) for shape in step.channels[first : first + count])
     vent = max(vents, key=lambda at: ABOVE[0] * at[0] + ABOVE[1] * at[1])
-    closed, held = (*closed, *placed([step])), (*held, Extra(union(step.channels), layer_colour(step.index - 1)))
+    closed, held = (*closed, *place_pieces([step])), (*held, Extra(union(step.channels), layer_colour(step.index - 1)))
     names = Name("sprue", sprue), Name("vent", vent, ring=True)
     x0, y0, _, x1, y1, z = bounds(moulds.mesh_of(step.channels[0]))
     tip = (x1 - x0) / 2
@@ -352,17 +354,17 @@ def _demoulding(moulds: MouldSet) -> Views:
     cast = *plan.steps, *last.inserts
     stays = () if any(removal.piece == last.cup for removal in last.removals) else (Placed(last.cup),)
     if filaments := plan.of_kind("filament"):
-        away = placed(filaments, z=1.2 * (bottom - moulds.dimensions.core_height))
+        away = place_pieces(filaments, z=1.2 * (bottom - moulds.dimensions.core_height))
         out = _beside_filaments(moulds, -1)
-        yield "filament-out", View((*placed((*base, *cast)), *stays, *away), out, UNDER, "under", way=0)
+        yield "filament-out", View((*place_pieces((*base, *cast)), *stays, *away), out, UNDER, "under", way=0)
     up = last.rim + CLEAR
-    raised = placed(cast, z=up)
+    raised = place_pieces(cast, z=up)
     if not stays:
-        yield "peel", View((*placed(base), *raised), way=1)
+        yield "peel", View((*place_pieces(base), *raised), way=1)
         return
     down = moulds.dimensions.core_height + max(last.rim, 2 * CLEAR)
     names = Name("base", (0.0, -plan.layout.plate[1], top - down)), Name("cup stays on", (0.0, -y, last.rim / 2))
-    yield "base-off", View((*placed(base, z=-down), *placed(cast), *stays), names=names, way=1)
+    yield "base-off", View((*place_pieces(base, z=-down), *place_pieces(cast), *stays), names=names, way=1)
     yield "push-out", View((*stays, *raised), way=1)
 
 
@@ -373,11 +375,11 @@ def _motor_in(moulds: MouldSet) -> Views:
         return
     below = moulds.design.opens == "below"
     away = (-1.0 if below else 1.0) * (moulds.dimensions.heights[-1] + CLEAR)
-    cast = placed((body for body in moulds.unit if body.kind == "layer"), half=not moulds.laid_later)
+    cast = place_pieces((body for body in moulds.unit if body.kind == "layer"), half=not moulds.laid_later)
     eye = UNDER if below else LOW
-    if not fed_through(moulds):
-        yield "motor-in", View((*cast, *placed(inside, z=away)), (), eye, "unit", turned=below)
-    yield "motor-home", View((*cast, *placed(inside)), eye=eye, group="unit", turned=below)
+    if not is_fed_through(moulds):
+        yield "motor-in", View((*cast, *place_pieces(inside, z=away)), (), eye, "unit", turned=below)
+    yield "motor-home", View((*cast, *place_pieces(inside)), eye=eye, group="unit", turned=below)
 
 
 def _skin_on(moulds: MouldSet) -> Views:
@@ -386,10 +388,13 @@ def _skin_on(moulds: MouldSet) -> Views:
         rim, colour = moulds.dimensions.heights[-1], layer_colour(len(moulds.plan.steps) - 1)
         film = Extra(union(films(moulds.dimensions, moulds.plan.layout)), colour)
         names = (Name("film", (moulds.plan.layout.cells[0].x, moulds.plan.layout.cells[0].y, rim), on=True),)
-        yield "skin-on", View((*placed(trays), *placed(moulds.plan.steps, z=rim + 2 * CLEAR)), (film,), names=names)
+        yield (
+            "skin-on",
+            View((*place_pieces(trays), *place_pieces(moulds.plan.steps, z=rim + 2 * CLEAR)), (film,), names=names),
+        )
 
 
-def fed_through(moulds: MouldSet) -> bool:
+def is_fed_through(moulds: MouldSet) -> bool:
     """Tell whether a tail or wires are led out through a closed slot: no picture shows that way."""
     exit = moulds.dimensions.exit
     return bool(exit) and exit.high < moulds.dimensions.heights[0] and moulds.design.opens == "below"
@@ -398,17 +403,17 @@ def fed_through(moulds: MouldSet) -> bool:
 def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
     """Yield the views of the one pour of a tray, a mould without cups."""
     (x, y), lengths = moulds.plan.layout.plate, moulds.spec.moulds
-    filled = *tray, *placed([step])
+    filled = *tray, *place_pieces([step])
     yield "level", _level(tray, moulds.plan.layout.cup[0], step.rim, (x, y), moulds.plate[0])
     x0, y0, _, _, y1, _ = bounds(moulds.meshes(step.layer)[0])
     thread = moved(cylinder(0.6, step.rim - 1.0, step.rim + 14.0), x0 + 3.0, (y0 + y1) / 2)
     yield "pour", View(filled, (Extra(thread, cast_colour(moulds, 1)),))
-    yield "strike", View((*filled, *placed(moulds.plan.of_kind("blade"), -0.55 * x)))
+    yield "strike", View((*filled, *place_pieces(moulds.plan.of_kind("blade"), -0.55 * x)))
     groove = y0 - lengths.land_mm - lengths.groove_width_mm / 2
     touched = Name("touch here", ((x0 + 2 * x) / 3, groove, step.rim - lengths.groove_depth_mm))
     yield "filled", View(filled, names=(touched,))
     up = step.rim + 2 * CLEAR
-    yield "peel", View((*tray, *placed([step], z=up)), way=1)
+    yield "peel", View((*tray, *place_pieces([step], z=up)), way=1)
     if cast := {
         body.name.partition("-")[0]: bounds(moulds.mesh(body)) for body in moulds.pushed_in if body.made == "cast"
     }:
@@ -416,7 +421,7 @@ def _tray(moulds: MouldSet, tray: tuple[Placed, ...], step: Step) -> Views:
         down = max(high for *_, high in cast.values()) + CLEAR
         middles = {name: ((box[0] + box[3]) / 2, (box[1] + box[4]) / 2, step.rim) for name, box in cast.items()}
         names = tuple(Name(name, at, on=True) for name, at in middles.items())
-        parts = *placed(moulds.unit), *placed(moulds.pushed_in, z=-down)
+        parts = *place_pieces(moulds.unit), *place_pieces(moulds.pushed_in, z=-down)
         yield "units-in", View(parts, (), OVER, "unit", names=names)
 
 
@@ -440,7 +445,7 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
     casts = tuple(Extra(union(shapes), layer_colour(pour)) for pour, shapes in enumerate(laid))
     (base,), (lid,), filaments = (plan.standing(step, kind) for kind in ("base", "lid", "filament"))
     x0, y0, bottom, x1, y1, high = bounds(moulds.mesh(base))
-    seat, standing = step.pins.seat if step.pins else bottom, placed((base, *filaments))
+    seat, standing = step.pins.seat if step.pins else bottom, place_pieces((base, *filaments))
 
     def pulled(there: tuple[Placed, ...], casts: tuple[Extra, ...], way: int) -> View:
         """Return the base from below, its filaments halfway out along their cores, on their way up or down."""
@@ -450,8 +455,8 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
 
     def last_pour() -> Views:
         """Yield the views from the empty curved base to the cured sheet without its lid."""
-        yield "filament", pulled(placed([base]), (), -1)
-        yield "level", _level((*standing, *placed([lid])), x1, step.top, (x1, y1), bottom, "curved")
+        yield "filament", pulled(place_pieces([base]), (), -1)
+        yield "level", _level((*standing, *place_pieces([lid])), x1, step.top, (x1, y1), bottom, "curved")
         raised = [
             Extra(shape, layer_colour(pour), _along(way, 2 * CLEAR))
             for pour, shapes in enumerate(laid)
@@ -461,20 +466,20 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
         names = tuple(Name(cell.name, at) for cell, at in zip(plan.layout.cells, tops, strict=True))
         yield "laid-in", View(standing, tuple(raised), group="curved", names=names)
         lift = high - seat + CLEAR
-        off = placed([lid], z=lift)
+        off = place_pieces([lid], z=lift)
         edges = [box(x0, x1, *ys, seat, step.top) for ys in ((y0 + 0.5, y0 + 1.5), (y1 - 1.5, y1 - 0.5))]
         line = Common((union(step.seals), union((*edges, box(x0, x1, y0, y1, seat + 0.4, seat + 0.9)))))
         names = (Name("grease", (0.0, y0 + 1.0, high)),)
         yield "lid-on", View((*standing, *off), (*casts, Extra(line, GREASE)), group="curved", names=names)
         held = *casts, *bands(x1, y1, bottom, step.top)
-        yield from _injected(moulds, step, (*standing, *placed([lid])), held, x1 - 2.0, "curved")
+        yield from _injected(moulds, step, (*standing, *place_pieces([lid])), held, x1 - 2.0, "curved")
         levers = *casts, *screwdrivers(x1, x1, seat)
         names = (Name("screwdriver", (x1 + 8.0, 0.0, seat)),)
-        yield "lid-off", View((*standing, *placed([step]), *off), levers, group="curved", names=names, way=1)
+        yield "lid-off", View((*standing, *place_pieces([step]), *off), levers, group="curved", names=names, way=1)
 
     for name, view in last_pour():
         yield f"pour{step.index}-{name}", view
-    yield "filament-out", pulled(placed([base, step]), casts, 1)
+    yield "filament-out", pulled(place_pieces([base, step]), casts, 1)
     # The silicone drawn off, each part in its own direction.
     up = step.rim + 2 * CLEAR
     *others, last = drawn_off
@@ -489,7 +494,7 @@ def _curved(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> 
         apart = ((Common((whole, union(within))), way) for way, within in spaces.items())
         parts = *apart, (cut(whole, rest), last.direction)
         extras += [Extra(part, layer_colour(pour), _along(way, up)) for part, way in parts]
-    yield "peel", View(placed([base]), tuple(extras), group="curved", way=1)
+    yield "peel", View(place_pieces([base]), tuple(extras), group="curved", way=1)
     bodies = {body.name: body for body in (*cast_flat.unit, *cast_flat.laid_later)}
     for name in ("motor-in", "motor-home"):
         # Flat parts here have the names of those cast round the limb: they are drawn by their shapes.

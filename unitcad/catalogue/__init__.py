@@ -155,14 +155,14 @@ def printers(own: Mapping[str, PrinterEntry] | None = None) -> dict[str, Printer
 
 
 def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] | None = None) -> tuple[Tissue, ...]:
-    """Return the layers of a body under the unit.
+    """Return the layers of the tissue under the unit.
 
     Parameters
     ----------
     name : str, default "forearm"
-        Name of the body.
+        Name of the tissue.
     own : mapping of str to mapping of str to entry, optional
-        Bodies of a spec, each with its layers by name, skin first.
+        Tissues of a spec, each with its layers by name, skin first.
 
     Returns
     -------
@@ -172,7 +172,7 @@ def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] |
     Raises
     ------
     Refusal
-        For an unknown name, and for an invalid body.
+        For an unknown name, and for an invalid tissue.
 
     Examples
     --------

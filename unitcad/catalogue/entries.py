@@ -198,7 +198,7 @@ class Printer(Struct, frozen=True, kw_only=True):
 
 
 class Tissue(Struct, frozen=True, kw_only=True):
-    """One layer of the body under the unit, skin first; no `thickness_mm` means a half-space."""
+    """One layer of the tissue under the unit, skin first; no `thickness_mm` means a half-space."""
 
     name: str
     density_kg_m3: Value[TissueDensity]
@@ -311,7 +311,7 @@ Length = Annotated[float, Meta(gt=0)]
 
 
 class MeasuredUnit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Common properties of the measured units: motor, diameter, wall of each layer, circuit, frequency, body."""
+    """Common properties of the measured units: motor, diameter, wall of each layer, circuit, frequency, tissue."""
 
     motor: str
     diameter_mm: Length

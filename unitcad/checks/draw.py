@@ -78,7 +78,9 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
                     continue
                 if overlapping and boxes_meet(piece, solid):
                     # Silicone has taken the tool's shape, whichever of the two moves.
-                    areas.append((blocked(piece - solid, solid, way) if cast else blocked(piece, solid, way), name))
+                    areas.append(
+                        (blocked_area(piece - solid, solid, way) if cast else blocked_area(piece, solid, way), name)
+                    )
                 elif _in_the_way(piece, solid, way):
                     apart.append((name, facing(solid, way, False)))
             areas += _areas(facing(piece, way, True), apart) if apart else []
@@ -153,7 +155,7 @@ def _out_of_order(where: str, why: str) -> MouldFinding:
     return at_most("C300", where, 1, 0, "", f"the order of removal is impossible: {why}")
 
 
-def blocked(piece: Manifold, stays: Manifold, direction: Way) -> float:
+def blocked_area(piece: Manifold, stays: Manifold, direction: Way) -> float:
     """Return the area, mm2, of upward faces of `piece` below downward faces of `stays` along `direction`.
 
     `direction` is any vector but 0. A face below several others counts once for each of them. If the two overlap at the

@@ -19,7 +19,7 @@ from unitcad.kernels.mesh import shells, thick_pieces
 from unitcad.moulds.layout import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.moulds.surroundings import Congruence, cropped, once_each, reaching
+from unitcad.moulds.surroundings import Congruence, crop, once_each, reaching
 from unitcad.shape.column import Column
 
 SLACK = 0.1
@@ -62,7 +62,7 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
             if tiles:
                 there = groove ^ _circle(tiles[i], farthest)
                 near = there ^ _circle(tiles[i], -farthest)
-                beside = [cropped(piece, tiles[i]) for piece in reaching(deep, tiles[i])]
+                beside = [crop(piece, tiles[i]) for piece in reaching(deep, tiles[i])]
             inside = Manifold.extrude(there.offset(GRID, JoinType.Miter), step.rim - bottom + 2 * GRID)
             others = Manifold.compose(beside) - inside.translate((0, 0, bottom - GRID))
             whole = thick_pieces(others)

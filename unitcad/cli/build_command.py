@@ -39,13 +39,13 @@ from unitcad.pipeline import step_helper
 from unitcad.pipeline.make import Subject
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest, PartRecord, row
 from unitcad.pipeline.subjects import Compound, load_subject
-from unitcad.pipeline.write import BENCH, PAGE, Built, check_slicing, held, slice_tools
+from unitcad.pipeline.write import BENCH, PAGE, Built, check_slicing, hold_folder, slice_tools
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
 from unitcad.report.read_results import check_casts
-from unitcad.spec import Spec, assumed_lengths, read_toml, said_of
+from unitcad.spec import Spec, assumed_lengths, length_text, read_toml
 from unitcad.spec.custom_code import files_named
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 from unitcad.validation import confirm_known, every_template
 from unitcad.validation.suggestions import numbers
 
@@ -129,7 +129,7 @@ def summary(spec: Spec, built: Built, given: Container[str] = ()) -> Iterator[st
 def assumed_line(spec: Spec, given: Container[str], path: str = "") -> Iterator[str]:
     """Yield a line of the lengths that nobody measured, if there are any; `path`: of the spec in its file."""
     if assumed := assumed_lengths(spec, given, path):
-        lengths = listed(f"{path}{said_of(spec, key)} ({how})" for key, how in assumed.items())
+        lengths = join_words(f"{path}{length_text(spec, key)} ({how})" for key, how in assumed.items())
         yours = f"; build with yours: --set {path}{next(iter(assumed))}=MM" if path else ""
         yield f"measure first; assumed: {lengths}{yours}"
 
@@ -236,7 +236,7 @@ def _build_all(
                 printing.append(slice_tools(spec.unit, result.folder, result.manifest, say))
             if paged or (result.folder / PAGE).is_file():
                 say("page")
-                with held(result.folder):
+                with hold_folder(result.folder):
                     write_report(result.folder, warn)
         results.append(result)
     if as_json:

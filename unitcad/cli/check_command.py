@@ -23,7 +23,7 @@ from unitcad import catalogue, files
 from unitcad.catalogue import Printer, printers
 from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
 from unitcad.export import finding_pictures
-from unitcad.files import no_such_file, seen_from
+from unitcad.files import no_such_file, path_seen_from
 from unitcad.meshcheck import Limits, Options, file_checks, output
 from unitcad.meshcheck import baseline as baselines
 from unitcad.meshcheck import manifest as listing
@@ -80,20 +80,20 @@ class Configuration:
     @property
     def shown(self) -> str | None:
         """Path of the file from the working directory."""
-        return None if self.path is None else seen_from(self.path)
+        return None if self.path is None else path_seen_from(self.path)
 
     @property
     def baseline(self) -> Path | None:
         """Path of the baseline, which the file gives from its own folder."""
         if self.path is None or self.value("baseline") is None:
             return None
-        return Path(seen_from(self.path.parent / self.value("baseline")))
+        return Path(path_seen_from(self.path.parent / self.value("baseline")))
 
     def ignored(self, path: str) -> list[str]:
         """Return prefixes of codes that per-file-ignores drops for a file; patterns start at the settings' folder."""
         if self.path is None or self.settings is None:
             return []
-        below = seen_from(path, self.path.parent)
+        below = path_seen_from(path, self.path.parent)
         return [
             code for pattern, codes in self.settings.per_file_ignores.items() if _fits(below, pattern) for code in codes
         ]
@@ -108,7 +108,7 @@ class Configuration:
 
         def named(path: str) -> bool:
             for folder, patterns in sets:
-                below = Path(seen_from(path, folder)) if patterns else Path()
+                below = Path(path_seen_from(path, folder)) if patterns else Path()
                 for pattern in patterns:
                     if any(_fits(part.as_posix(), pattern.rstrip("/")) for part in (below, *below.parents)):
                         return True
@@ -150,7 +150,7 @@ def _table(path: Path, data: Mapping[str, Any]) -> str:
 
 def _read(path: Path) -> Configuration | None:
     """Read the settings of a file; None without such a table. A unit's spec named unitcad.toml has none."""
-    shown, text = seen_from(path.absolute()), files.read_text(path)
+    shown, text = path_seen_from(path.absolute()), files.read_text(path)
     if path.name == "pyproject.toml" and "unitcad" not in text and "\\" not in text:  # with escapes it may be meant
         return None
 
@@ -346,7 +346,9 @@ def check(
         _write(said, plain=output_format == "text")
         raise typer.Exit(code)
     if not files and manifest is None:
-        raise UnitcadError("check needs files, folders or globs, or --manifest")
+        raise UnitcadError(
+            "FILE...: is required: mesh files, folders or globs, or --manifest; see unitcad check --help"
+        )
     for pattern, codes in (configuration.value("per_file_ignores") or {}).items():
         check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
     draw = None
@@ -374,7 +376,7 @@ def check(
         listed = listing.read(manifest)
         work = listing.work(listed, paths, of_path, None if options.printer is not None else printers())
         compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
-        reports = unread + compared + listing.unchecked(listed, [path for path, _ in work], of_path)
+        reports = unread + compared + listing.check_unread(listed, [path for path, _ in work], of_path)
     shown = MOST if all_locations else SHOWN
     if base is not None:
         known = baselines.write(base, known, reports) if write_baseline else known

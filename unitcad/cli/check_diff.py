@@ -122,7 +122,7 @@ def _pairs(old: str, new: str) -> Iterator[tuple[str, str | None, str | None]]:
 
 
 def _compare(name: str, old: str | None, new: str | None, options: Options, pictures: str | None) -> Difference:
-    one, other = (None if path is None else file_checks.guarded(path, options) for path in (old, new))
+    one, other = (None if path is None else file_checks.check_guarded(path, options) for path in (old, new))
     if one is None or other is None:
         return Difference(name, one, other)
     gone = tuple(item for item in baseline.compare(one, other).findings if not item.known)

@@ -121,7 +121,7 @@ def _in_style(error: Any, command: str) -> UnitcadError:
     text = re.sub(r"Got unexpected extra argument.*\((.*)\)", r"unexpected argument: \1", text)
     parameter, option, more = getattr(error, "param", None), getattr(error, "option_name", ""), f"see {command} --help"
     if parameter is None:
-        if getattr(error, "possibilities", None) is None:
+        if not hasattr(error, "possibilities"):
             return UnitcadError(re.sub("Option '(.*?)'", r"\1:", f"{text}; {more}"))
         if option == "--jobs":
             more = "unitcad batch and unitcad check take it"

@@ -21,14 +21,14 @@ from unitcad.estimate_inputs import FEM, estimate_spec, frequency_table_of_spec,
 from unitcad.moulds.plan import plan
 from unitcad.rooms import load as load_named
 from unitcad.spec import Spec
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 from unitcad.validation import compound_kind, confirm_known, load
 
 
 def print_estimate(data: dict[str, Any], details: bool = False) -> None:
     """Print the two lines of the answer; with `details` its basis: models, curve, slopes, assumptions.
 
-    The range by finite elements, which is only made when it is asked for, is always shown.
+    The range by finite elements exists only on request; it is always shown.
     """
     screen = console()
     variant = data["variant"]
@@ -53,7 +53,7 @@ def _print_details(screen: Console, data: dict[str, Any]) -> None:
         if "fit" in data:
             screen.print(_fit_line(data["fit"]), soft_wrap=True)
     screen.print(_curve(data["layered"]))
-    screen.print(f"  {data['layered']['u_is']}", soft_wrap=True)
+    screen.print(f"  {data['layered']['u_definition']}", soft_wrap=True)
     inputs = _inputs(data)
     if inputs:
         screen.print(inputs[0])
@@ -67,7 +67,7 @@ def _print_details(screen: Console, data: dict[str, Any]) -> None:
     if published.get("readings") and published["readings"][0]["hierarchical_over_control"]:
         screen.print(_readings(published["readings"]))
     no_ratio = data["layered"]["hierarchical_over_control_reason"]
-    for line in [f"no hierarchical / control from the layers: {no_ratio}", *data["assumptions"]]:
+    for line in [f"No ratio to a control from the layered curve: {no_ratio}", *data["assumptions"]]:
         screen.print(f"  {line}", soft_wrap=True)
 
 
@@ -78,7 +78,7 @@ def print_errors(errors: dict[str, Any], models: dict[str, Any]) -> None:
     if fitted := {name: block["fit_error"] for name, block in models.items() if "fit_error" in block}:
         screen.print(_fit_errors(fitted))
     screen.print(_choice(errors["chosen_without"]), soft_wrap=True)
-    screen.print(_classes(errors["classes_out"]["by_class"], errors["order"]))
+    screen.print(_classes(errors["leave_one_class_out"]["by_class"], errors["order"]))
 
 
 def print_frequencies(data: dict[str, Any]) -> None:
@@ -133,7 +133,7 @@ def _fem_lines(block: dict[str, Any]) -> list[str]:
         "as drawn: the unit of the spec, bonded, nominal values.",
         f"Not known, and drawn: {block['not_known']}.",
         "The level on the skin over that of the unit's own edge, as drawn: "
-        + listed(f"{number(100 * ratio, 2)} % ({drive})" for drive, ratio in block["skin_over_edge"].items())
+        + join_words(f"{number(100 * ratio, 2)} % ({drive})" for drive, ratio in block["skin_over_edge"].items())
         + ". The paper does not state which of the two it measured.",
     ]
 
@@ -171,7 +171,7 @@ def _models(data: dict[str, Any]) -> Table:
         table.add_row(name, level(block["edge_level"], 100), *spread, *ratios)
     answer = data["answer"]
     mean = f"{100 * answer['class_mean']:.3g} ({answer['class']})"
-    table.add_row("class mean", mean, *["-"] * (len(ranges) + len(controls)))
+    table.add_row("baseline", mean, *["-"] * (len(ranges) + len(controls)))
     for own in data.get("own_measured", ()):
         shown = level(own, 100), f"{own['unit']}, {own['frequency_hz']:g} Hz"
         table.add_row("measured here", *shown, *["-"] * len(controls))
@@ -189,17 +189,17 @@ def _models(data: dict[str, Any]) -> Table:
 
 
 def _errors(errors: dict[str, Any]) -> Table:
-    """Tabulate each model's error against the measured values, the best one with a unit left out first."""
+    """Tabulate each model's error against the measured values, the least leave-one-out error first."""
     best = errors["order"][0]
-    table = Table("model", "levels", "unit left out", f"p ({best})", "ratios", "directions", title=_ERRORS)
+    table = Table("model", "levels", "leave-one-out", f"p ({best})", "ratios", "directions", title=_ERRORS)
     for name in errors["order"]:
         error = errors[name]
-        left_out = error["leave_one_unit_out"]["levels"]
+        own = error["leave_one_out"]["levels"]
         p = error["against_best"]["p"]
         table.add_row(
             name,
             f"x {error['levels']['geometric_mean']:.2f}",
-            f"x {left_out['geometric_mean']:.2f} ({left_out['range']['low']:.2f} to {left_out['range']['high']:.2f})",
+            f"x {own['geometric_mean']:.2f} ({own['range']['low']:.2f} to {own['range']['high']:.2f})",
             "-" if p is None else f"{p:.2g}",
             f"x {error['ratios']['geometric_mean']:.2f}",
             f"{error['directions']['right']} of {error['directions']['of']}",
@@ -209,13 +209,13 @@ def _errors(errors: dict[str, Any]) -> Table:
 
 def _fit_errors(fitted: dict[str, Any]) -> Table:
     """Tabulate each model's error by the lab's fit, the best one first, and the baseline's."""
-    names = ("model", "unit left out", "own units", "own, stored constants", "in 80 %")
-    table = Table(*names, title="error by the lab's fit; the table above is by the stored constants")
-    for name, error in sorted(fitted.items(), key=lambda pair: pair[1]["left_out"]["geometric_mean"]):
-        one = error["left_out"]
+    names = ("model", "leave-one-out", "own units", "own, stored constants", "coverage")
+    table = Table(*names, title="error by the lab's fit; the table above uses the stored constants")
+    for name, error in sorted(fitted.items(), key=lambda pair: pair[1]["leave_one_out"]["geometric_mean"]):
+        one = error["leave_one_out"]
         middle = f"x {one['geometric_mean']:.2f} ({one['low']:.2f} to {one['high']:.2f})"
-        own = ["-" if error[key] is None else f"x {error[key]:.2f}" for key in ("own_left_out", "own_by_stored")]
-        table.add_row(name, middle, *own, error["held_80"] or "-")
+        own = ["-" if error[key] is None else f"x {error[key]:.2f}" for key in ("own_leave_one_out", "own_by_stored")]
+        table.add_row(name, middle, *own, error["coverage"] or "-")
     table.add_row("baseline", f"x {next(iter(fitted.values()))['baseline']:.2f}", "-", "-", "-")
     return table
 
@@ -225,64 +225,64 @@ def _predicted(block: dict[str, Any]) -> str:
 
 
 def _fit_line(fit: dict[str, Any]) -> str:
-    """Say which fit it is, and its scores."""
-    scores = ", ".join(f"{name} x {one['geometric_mean']:.2f}" for name, one in fit["left_out"].items())
-    beside = " beside the paper's nine" if fit["include_paper_units"] else ""
-    units = f"{fit['own_units']} units of the lab's own{beside}"
+    """Return the line that names the fit and its scores."""
+    scores = ", ".join(f"{name} x {one['geometric_mean']:.2f}" for name, one in fit["leave_one_out"].items())
+    paper = " and the paper's nine" if fit["include_paper_units"] else ""
+    units = f"{fit['own_units']} units of the lab{paper}"
     head = f"  fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]}), {fit['leads']} leads"
-    return f"{head}: {units}; unit left out: {scores}"
+    return f"{head}: {units}; leave-one-out error: {scores}"
 
 
 _ERRORS = "error against the table"
 _SLOPES = (
     "In brackets: measured pairs of units whose slope has the same sign, and the range with them. ?: no pair was "
-    "measured, so that 0 is in the range."
+    "measured, so the range contains 0."
 )
 
 
 def _choice(chosen: dict[str, Any]) -> str:
-    """Say the rule's score when its form is chosen without the unit too."""
+    """State the rule's score if its form is chosen without the unit too."""
     low, high = chosen["range"]["low"], chosen["range"]["high"]
     return (
-        f"  rule, its form chosen among {len(chosen['forms'])} without the unit too: x {chosen['geometric_mean']:.2f} "
-        f"({low:.2f} to {high:.2f}); p above 0.05: not told apart by nine units"
+        f"  Rule with its form chosen among {len(chosen['forms'])} without the unit too: "
+        f"x {chosen['geometric_mean']:.2f} ({low:.2f} to {high:.2f}). p above 0.05: nine units show no difference."
     )
 
 
 def _classes(by_class: dict[str, dict[str, float]], order: list[str]) -> Table:
     """Tabulate the error of each model if a whole class is left out."""
-    table = Table("model", *by_class, title="error on a class that the fit did not have")
+    table = Table("model", *by_class, title="leave-one-class-out error")
     for model in order:
         table.add_row(model, *[f"x {errors[model]:.2f}" for errors in by_class.values()])
     return table
 
 
 def _inputs(data: dict[str, Any]) -> tuple[Table, str] | None:
-    """Tabulate the percent by which a level grows with 1 % more of an input, and name inputs that no model reads."""
+    """Tabulate the percent by which a level grows with 1 % more of an input; name the inputs without effect."""
     found = {name: block["sensitivities"] for name, block in data["models"].items()}
     for one in data.get("fem", {}).get("sensitivities", ()):
         found[f"fem, {one['reading']}"] = one
     seen = {name: one["by"] for name, one in found.items() if one["by"] is not None}
     if not seen:
         return None
-    table = Table(Column("1 % more of", no_wrap=True), *seen, title="changes the edge level by, %")
+    table = Table(Column("input + 1 %", no_wrap=True), *seen, title="change of the edge level, %")
     some = found[next(iter(seen))]
-    names = [*some["by"], *some["not_seen"]]
+    names = [*some["by"], *some["no_effect"]]
     for name in sorted(names, key=lambda name: -max(abs(by.get(name, 0.0)) for by in seen.values())):
         if any(name in by for by in seen.values()):
             table.add_row(name, *[_slope(found[model], name) for model in seen])
     unread = [name for name in names if not any(name in by for by in seen.values())]
     if not unread:
         return table, ""
-    body = any(name.startswith("tissue ") for name in unread)
-    curve = "; the body's inputs change the curve of the skin alone" if body and "layered" in data else ""
-    return table, f"read by no model of the level: {', '.join(unread)}{curve}"
+    tissue = any(name.startswith("tissue ") for name in unread)
+    curve = ". The tissue changes only the curve on the skin." if tissue and "layered" in data else ""
+    return table, f"Inputs without effect on the level: {', '.join(unread)}{curve}"
 
 
 def _slope(seen: dict[str, Any], name: str) -> str:
     """Format a slope, how many measured pairs agree, and its range; "?" if there is no pair."""
     if name not in seen["by"]:
-        return "not seen"
+        return "no effect"
     slope, one = f"{seen['by'][name]:+.2f}", seen.get("tested", {}).get(name)
     if one is None:
         return slope
@@ -294,7 +294,7 @@ def _slope(seen: dict[str, Any], name: str) -> str:
 
 
 def _coefficients(interfaces: list[str], found: dict[str, dict[str, Any]]) -> Table:
-    """Tabulate equation 4's coefficients of both waves."""
+    """Tabulate the coefficients of both waves, equation 4."""
     heads = [f"{key}, {wave.upper()}" for wave in found for key in ("k_t", "k_r")]
     table = Table("from a layer to the next", *heads, title="transmission and reflection, equation 4")
     for i, name in enumerate(interfaces):
@@ -304,13 +304,13 @@ def _coefficients(interfaces: list[str], found: dict[str, dict[str, Any]]) -> Ta
 
 
 def _constraints(rows: list[dict[str, Any]]) -> Table:
-    table = Table("", "says", "left", "", "right", "margin", "unit", title="the paper's inequalities 5 and 6")
+    table = Table("", "inequality", "left", "", "right", "margin", "unit", title="the paper's inequalities 5 and 6")
     table.add_column("holds")
     for row in rows:
         numbers = [_format_range(row, key) for key in ("left", "right", "margin")]
         holds = {True: "yes", False: "no", None: row.get("reason", "not known")}[row["holds"]]
-        what = row["text"].replace("control", row["control"] or "")
-        table.add_row(row["equation"], what, numbers[0], row["relation"], *numbers[1:], row["unit"], holds)
+        text = row["text"].replace("control", row["control"] or "")
+        table.add_row(row["equation"], text, numbers[0], row["relation"], *numbers[1:], row["unit"], holds)
     return table
 
 
@@ -320,7 +320,7 @@ def _readings(rows: list[dict[str, Any]]) -> Table:
     table = Table(
         "eta read as",
         "exponents, S wave",
-        "their unit",
+        "unit",
         *[Column(f"% of an all-{name} unit's level", min_width=min(17, len(name) + 4)) for name in controls],
     )
     table.title = "the paper's model by reading of eta"
@@ -398,7 +398,7 @@ def estimate(
     pitch: Annotated[
         float | None,
         typer.Option(
-            metavar="MM", help="Pitch of units in a row: how far the first moves the others. Default: one unit."
+            metavar="MM", help="Pitch of units in a row; prints how far the first moves the others. Default: one unit."
         ),
     ] = None,
     masses: Annotated[

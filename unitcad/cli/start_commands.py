@@ -21,7 +21,7 @@ from unitcad.meshcheck.rules.registry import rules
 from unitcad.rooms import file_kinds, load
 from unitcad.validation import default_template
 from unitcad.validation.load import shipped_of
-from unitcad.validation.starter import commented
+from unitcad.validation.starter import comment_template
 
 
 def init(
@@ -56,17 +56,17 @@ def init(
     kind, start = starts[template]
     schema = f"unitcad-{kind.name}.schema.json"
     try:
-        write_new(path, commented(start, stem, load(kind.model), schema).encode())
+        write_new(path, comment_template(start, stem, load(kind.model), schema).encode())
     except FileExistsError:
-        raise UnitcadError(f"{path}: is there already; choose another name") from None
+        raise UnitcadError(f"{path}: exists already; choose another name") from None
     except OSError as error:
         raise UnitcadError(f"{path}: {(error.strerror or 'unwritable').lower()}") from None
     if as_json:
         print_json({kind.name: str(path)})
         return
-    typer.echo(f"then: {kind.command} {path}")
+    typer.echo(f"Edit the file, then run: {kind.command} {path}")
     if not Path(schema).exists():
-        typer.echo(f"an editor checks it as you type after: unitcad schema {kind.name} -o {schema}")
+        typer.echo(f"To check it in an editor as you type, run: unitcad schema {kind.name} -o {schema}")
     typer.echo(str(path))
 
 

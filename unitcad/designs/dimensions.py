@@ -235,6 +235,6 @@ def growth(spec: Spec) -> float:
     return 1 / (1 - spec.moulds.shrinkage_percent / 100)
 
 
-def poured(spec: Spec, dims: Dimensions) -> Dimensions:
+def tool_dimensions(spec: Spec, dims: Dimensions) -> Dimensions:
     """Return the dimensions that tools are drawn to: silicone shrinks from them to the unit's."""
     return dims.scaled(growth(spec)) if spec.moulds.shrinkage_percent else dims

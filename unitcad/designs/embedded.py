@@ -114,7 +114,7 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
     return [*steps, Fitting(ring, ("petroleum jelly",), silicone=1, mixed="ring", volume_mm3=volume)]
 
 
-def skipped(spec: Spec) -> list[Reason]:
+def skipped_tooling(spec: Spec) -> list[Reason]:
     """Name the tooling that an open ring does without."""
     reasons = [("filament and its hole", "embedded: open rings have no suction")]
     if spec.fpcb:
@@ -135,5 +135,5 @@ DESIGN = Design(
     opens="above",
     passes=1.0,
     assembly=assembly,
-    skipped=skipped,
+    skipped=skipped_tooling,
 )

@@ -145,13 +145,13 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
         ]
         strain = pad_strain(spec.fpcb, dims.exit)
         if spec.fpcb.tail == "both" and strain:
-            chain = (
-                f"A chain's next pad does not pass the slot: that would stretch it by {strain:.0%}. Solder the next "
-                "unit on after this one is in its body."
+            next_unit = (
+                f"The next pad of the circuit does not pass the slot: that would stretch it by {strain:.0%}. Solder "
+                "the next unit on after this one is in its silicone."
             )
-            steps.append(Fitting(chain, solder))
+            steps.append(Fitting(next_unit, solder))
     else:
-        steps = [Fitting("Lay the unit down with the cavity's mouth up, and the motor beside it, its back up.")]
+        steps = [Fitting("Lay the unit down with the cavity's mouth up, and the motor next to it, its back up.")]
     back, moved_in = ("the pad", "pad and motor") if spec.fpcb else ("the motor's back", "the motor")
     way = "through the lip" if dims.mouth_radius else "from the skin's side"
     fixed = (

@@ -41,7 +41,7 @@ def tail_strain(fpcb: Circuit, slot: Exit) -> float:
 
 
 def pad_strain(fpcb: Circuit, slot: Exit) -> float:
-    """Return the strain of the slot's edge if the circuit's own pad had to pass, as a chain's next pad would."""
+    """Return the strain of the slot's edge if a pad of the circuit had to pass, as in `tail = "both"`."""
     return max(0.0, 2 * (fpcb.pad_diameter_mm + fpcb.thickness_mm) / _round(slot) - 1)
 
 

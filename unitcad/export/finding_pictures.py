@@ -106,7 +106,7 @@ def write(folder: Path, report: FileReport) -> FileReport:
         for finding in report.findings:
             if picture := draw(report, finding, scenes):
                 files.write(own / f"{finding.code}.svg", picture.encode())
-        files.write(own / "findings.3mf", coloured(report))
+        files.write(own / "findings.3mf", colour_3mf(report))
     return FileReport(report.path, report.findings, report.facts, report.seconds)
 
 
@@ -119,7 +119,7 @@ def folder_name(path: str) -> str:
     return f"{name[-80:].strip('._-')}-{hashlib.sha256(os.fsencode(shown)).hexdigest()[:8]}"
 
 
-def coloured(report: FileReport) -> bytes:
+def colour_3mf(report: FileReport) -> bytes:
     """Return a 3MF of the report's meshes, faces coloured by the worst severity that concerns them."""
     parts = []
     for index, mesh in enumerate(report.meshes):

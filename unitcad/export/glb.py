@@ -116,10 +116,10 @@ def content(parts: Sequence[GlbPart]) -> bytes:
 def _ready(vertices: bytes, faces: bytes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return a mesh in single precision, shaded: kept, since most bodies stay as they are while one number changes."""
     corners = np.frombuffer(vertices).reshape(-1, 3) + 0.0
-    return shaded(*single_precision(corners, np.frombuffer(faces, np.int64).reshape(-1, 3)))
+    return shading_normals(*single_precision(corners, np.frombuffer(faces, np.int64).reshape(-1, 3)))
 
 
-def shaded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def shading_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices (n, 3), unit normals (n, 3) and faces for shading; a vertex on a crease becomes several.
 
     A corner's normal is the mean, weighted by angle, of the faces round its vertex that meet its own face at less than

@@ -35,10 +35,10 @@ def print_ready(vertices: np.ndarray, faces: np.ndarray, upside_down: bool = Fal
     sorted), every face thicker than single precision resolves at this size. Raises TooThin if that is not
     possible.
     """
-    return single_precision(laid_down(vertices, upside_down), faces)
+    return single_precision(lay_down(vertices, upside_down), faces)
 
 
-def laid_down(vertices: np.ndarray, upside_down: bool) -> np.ndarray:
+def lay_down(vertices: np.ndarray, upside_down: bool) -> np.ndarray:
     """Return vertices (n, 3) in print attitude: turned by 180 degrees about x if `upside_down`, standing on z = 0."""
     turned = vertices * ((1.0, -1.0, -1.0) if upside_down else (1.0, 1.0, 1.0))
     return turned - (0.0, 0.0, turned[:, 2].min())

@@ -83,7 +83,7 @@ def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
     return low.T, high.T
 
 
-def grouped(label: Ints, n: int) -> tuple[Ints, Ints, Ints]:
+def group_labels(label: Ints, n: int) -> tuple[Ints, Ints, Ints]:
     """Return the places of labels 0 to n - 1, grouped by label, with the start and the count of each group."""
     count = np.bincount(label, minlength=n)
     return np.argsort(label, kind="stable").astype(np.int32), np.cumsum(count) - count, count

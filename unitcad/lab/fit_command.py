@@ -51,7 +51,7 @@ def as_data(result: Fitted) -> dict[str, Any]:
         source: {"reason": compared.reason}
         if compared.reason
         else {
-            name: {"left_out": one.score, "range": one.range, "held_80": one.held()}
+            name: {"leave_one_out": one.score, "range": one.range, "coverage": one.coverage()}
             for name, one in compared.judged.items()
         }
         for source, compared in result.by_source.items()
@@ -152,20 +152,20 @@ def leads_text(result: Fitted) -> str:
     ]
     return (
         f"{lead} leads: x {judged[lead].own_score:.2f} on the lab's own units ({'; '.join(tests)}). Another "
-        f"model than {RULE} leads only if, on the lab's own units each left out, its "
-        f"mean error is less than {RULE}'s and the {BASELINE}'s and p is at most {OVERTURNED:g} against both."
+        f"model than {RULE} leads only if, its leave-one-out error on the lab's "
+        f"own units is less than {RULE}'s and the {BASELINE}'s and p is at most {OVERTURNED:g} against both."
     )
 
 
 def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
     """Return title, table with its head, and remarks of each section, for the page and the terminal."""
     chosen, by_source = result.chosen, result.by_source.items()
-    models = [["model", "leave-one-out", "own units", "own, stored constants", "against the baseline", "in 80 %"]]
+    models = [["model", "leave-one-out", "own units", "own, stored constants", "against the baseline", "coverage"]]
     for name in chosen.order:
         one = result.fit.model[name]
-        own = ["-" if value is None else f"{value:.2f}" for value in (one.own_left_out, one.own_by_stored)]
-        score = f"{one.left_out:.2f} ({one.left_out_low:.2f} to {one.left_out_high:.2f})"
-        models.append([name, score, *own, against_text(one), one.held])
+        own = ["-" if value is None else f"{value:.2f}" for value in (one.own_leave_one_out, one.own_by_stored)]
+        score = f"{one.leave_one_out:.2f} ({one.leave_one_out_low:.2f} to {one.leave_one_out_high:.2f})"
+        models.append([name, score, *own, against_text(one), one.coverage])
     moduli = [["moduli", *chosen.judged]]
     for source, compared in by_source:
         moduli.append([source, *(f"{compared.judged[n].score:.2f}" if compared.judged else "-" for n in chosen.judged)])
@@ -190,8 +190,8 @@ def sections(result: Fitted) -> list[tuple[str, list[list[str]], list[str]]]:
                 *(f"Warning: {one}." for one in warnings(result)),
                 "Factors are geometric means of predicted over measured, 1 is exact; in brackets 5 to 95 % over units "
                 "drawn again. Against the baseline: mean difference of |ln(predicted/measured)| with its standard "
-                "error, and the sign-flip test; below 0 is better than four class means. In 80 %: units within the "
-                "range that was predicted without them.",
+                "error, and the sign-flip test; below 0 is better than the baseline. Coverage: units within their "
+                "80 % range, which was predicted without them.",
             ],
         ),
         (
@@ -251,8 +251,8 @@ def fit(
 ) -> None:
     """Judge the edge-level models with a lab's units, and fit them.
 
-    Each unit is predicted from all others, by every model and by a baseline of four class means. The fewer units, the
-    more the constants shrink towards the stored ones. `estimate --fit` and `build --fit` take lab-fit.toml.
+    Every model predicts each unit from all others, and so does the baseline, the means of four classes. The fewer
+    units, the more the constants shrink towards the stored ones. `estimate --fit` and `build --fit` take lab-fit.toml.
     """
 
     loaded = load_fit_lab(lab)

@@ -22,7 +22,7 @@ from unitcad.catalogue import materials
 from unitcad.catalogue.entries import Frequency, MaterialEntry
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import estimate_input
-from unitcad.lab.shrunk_fit import BETWEEN_LABS, Campaigns, Judged, Shrunk, gradients, judge, paired, shrunk
+from unitcad.lab.shrunk_fit import BETWEEN_LABS, Campaigns, Judged, Shrunk, gradients, judge, paired_difference, shrunk
 from unitcad.lab.unit_files import File, Name, UnitSource, file_of, measured_walls, source_file, specs_of
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.raw import Table
@@ -341,17 +341,17 @@ def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
     constants = {"constants": found.constants, "low": found.constants / wide, "high": found.constants * wide}
     constants["stored"] = model.fit(campaigns.table, paper[None].astype(float))[0] if paper.any() else ()
     low, high = judged.range
-    against, error, p = paired(judged, compared.judged[BASELINE]) if name != BASELINE else (None, None, None)
+    against, error, p = paired_difference(judged, compared.judged[BASELINE]) if name != BASELINE else (None, None, None)
     numbers = {
         **{key: dict(zip(model.names, map(float, values), strict=False)) for key, values in constants.items()},
-        "model_error": found.sigma, "covariance": found.covariance.tolist(), "left_out": judged.score,
-        "left_out_low": low, "left_out_high": high, "own_left_out": judged.own_score,
+        "model_error": found.sigma, "covariance": found.covariance.tolist(), "leave_one_out": judged.score,
+        "leave_one_out_low": low, "leave_one_out_high": high, "own_leave_one_out": judged.own_score,
         "own_by_stored": judged.stored_score, "against_baseline": against, "against_baseline_error": error,
         "against_baseline_p": p,
     }  # fmt: skip
     return ModelFit(
         degrees_of_freedom=found.df,
-        held=f"{judged.held()} of {judged.errors.size}",
+        coverage=f"{judged.coverage()} of {judged.errors.size}",
         at_bound=compared.at_bound(name),
         **rounded(numbers, 6),
     )

@@ -48,7 +48,7 @@ class Declared:
     unit: str = ""
 
 
-def declared(texts: Iterable[str]) -> dict[str, Declared]:
+def parse_column(texts: Iterable[str]) -> dict[str, Declared]:
     """Parse QUANTITY=COLUMN[:UNIT]. Raises Refusal for anything else."""
     found: dict[str, Declared] = {}
     for text in texts:
@@ -222,7 +222,7 @@ def read_curve(
     if len(strain) < LEAST_POINTS:
         raise UnitcadError(f"{path}: {len(strain)} points before the largest stress; a curve needs {LEAST_POINTS}")
     if strain[0] <= -1.0:
-        raise UnitcadError(f"{path}: the strain begins at {strain[0]:.3g}: no body is shorter than nothing")
+        raise UnitcadError(f"{path}: the strain begins at {strain[0]:.3g}: strain cannot be below -1")
     return TensileCurve(path.name, strain, stress, specimen, files.sha256(path), rate, int((~fresh).sum()), lost, path)
 
 

@@ -25,9 +25,9 @@ from unitcad.lab.material import (
     DynamicResult,
     Specimen,
     TensileResult,
-    declared,
     evaluate,
     evaluate_dynamic,
+    parse_column,
     quasistatic,
     read_curve,
     read_dynamic,
@@ -268,7 +268,7 @@ def material(
             raise files.NotThere(path)
         if path.suffix == ".toml":
             expect_none_but("", read_toml(path), str(path), "FILE")
-    given = declared(column or [])
+    given = parse_column(column or [])
     layout = Layout(_DELIMITERS.get(delimiter, delimiter), decimal, skip_lines)
     used = _strain(strain, amplitude_um, wall_mm)
     with progress("material") as stage:

@@ -312,7 +312,7 @@ def measured(path: bytes) -> bytes:
     return msgspec.json.encode({"page": page(result, charts_of(result), lead)})
 
 
-def refused(file: Path, why: str) -> str:
+def refusal_page(file: Path, why: str) -> str:
     """Return the page that says why a campaign file can't be measured, as HTML."""
     folder, named = escape(str(file.parent)), escape(file.name)
     lead = f"<p>The file is {named} in {folder}, with its recordings. Change it, then {_AGAIN}.</p>"

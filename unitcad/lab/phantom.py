@@ -17,7 +17,7 @@ from msgspec import Meta, Struct
 
 from unitcad.attenuation.curve import rounded_error
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.inputs import TissueLayer, body
+from unitcad.attenuation.inputs import TissueLayer, tissue_medium
 from unitcad.attenuation.layered import FractionalKelvinVoigt, HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
 from unitcad.catalogue import Material, Printer, choose, materials, printers, tissue
 from unitcad.catalogue import entries as kinds
@@ -351,7 +351,7 @@ class Expected:
 
     `low`, `high`: each kind of input by itself at both ends. `sensitivity`: relative change at the farthest point for a
     layer thinner by `THINNER_MM`. `wall_mm`: least distance of a wall from the unit's centre for the asked echo;
-    `echo_pct`: at the actual wall, `soft_echo_pct`: there with the least loss factors. `forearm`: the body template's
+    `echo_pct`: at the actual wall, `soft_echo_pct`: there with the least loss factors. `forearm`: the template's
     curve, `factor` the mean factor between the two.
     """
 
@@ -369,7 +369,7 @@ class Expected:
 
 
 def medium(phantom: PhantomTable, recipes: Sequence[Recipe], **changed: Sequence[float]) -> LayeredMedium:
-    """Return the stack; `changed` overrides thickness (mm), modulus (kPa) or loss factor, a value each layer."""
+    """Return the stack; `changes` overrides thickness (mm), modulus (kPa) or loss factor, a value each layer."""
     usual = {
         "thickness": [layer.thickness_mm for layer in phantom.layers],
         "modulus": [one.modulus_kpa for one in recipes],
@@ -401,7 +401,7 @@ def wall_distance(phantom: PhantomTable, recipes: Sequence[Recipe]) -> float:
 def echo_pct(phantom: PhantomTable, recipes: Sequence[Recipe], wall_mm: float, **changed: Sequence[float]) -> float:
     """Return the echo at the farthest point from a wall at a distance (mm) from the unit's centre, percent.
 
-    `changed` as in `medium`.
+    `changes` as in `medium`.
     """
     return 100 * float(_echo(phantom, medium(phantom, recipes, **changed), np.array([wall_mm]))[0])
 
@@ -442,7 +442,7 @@ def expected(
         thickness = [one.thickness_mm - (THINNER_MM if j == i else 0.0) for j, one in enumerate(phantom.layers)]
         cases.append(curve(thickness=thickness))
         sensitivity[layer.name] = round(float(cases[-1][-1] / value[-1] - 1), _DECIMALS)
-    arm, beyond = _curve(phantom, body(forearm), r)[0], distances > 0
+    arm, beyond = _curve(phantom, tissue_medium(forearm), r)[0], distances > 0
     factor = math.exp(float(np.mean(np.abs(np.log(value[beyond] / arm[beyond])))))
     value, low, high, arm = (tuple(one.tolist()) for one in (value, np.min(cases, 0), np.max(cases, 0), arm))
     echoes = echo_pct(phantom, recipes, wall_mm), echo_pct(phantom, recipes, wall_mm, loss=losses[0])
@@ -499,7 +499,7 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
         raise Refusal("inside_mm", inside, limit, needed)
     size = lengths(table, inside, printer)
     tools = tuple(pieces(table, size))
-    for piece in printed(tools):
+    for piece in printed_pieces(tools):
         lengths_mm = np.diff(np.reshape(bounds(realise(piece.shape, SEGMENTS)), (2, 3)), axis=0)[0]
         needed_mm, bed = (*np.sort(lengths_mm[:2]), lengths_mm[2]), _bed(printer)
         over = float(np.max(np.subtract(needed_mm, bed)[:2]))
@@ -552,6 +552,6 @@ def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
     return found
 
 
-def printed(tools: Sequence[Body]) -> list[Body]:
+def printed_pieces(tools: Sequence[Body]) -> list[Body]:
     """Return the pieces that a printer makes."""
     return [body for body in tools if body.made == "printed"]

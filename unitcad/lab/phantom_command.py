@@ -33,7 +33,7 @@ from unitcad.lab.phantom import (
     bolts,
     load_phantom,
     phantom_set,
-    printed,
+    printed_pieces,
     stiffening,
     tissue_table,
 )
@@ -133,7 +133,7 @@ def casting_markdown(phantom: PhantomSet) -> str:
         lines += ["", *steps(_pour(phantom, pour)), ""]
     lines += ["## Marks, and out of the box", "", *steps(_release(phantom)), ""]
     lines += ["## What to expect", "", *_expectations(phantom), ""]
-    lines += ["## Needed", "", "| item | quantity | made | note |", "| --- | --- | --- | --- |"]
+    lines += ["## Buy and have ready", "", "| item | quantity | made | note |", "| --- | --- | --- | --- |"]
     lines += [f"| {i.item} | {i.quantity:.4g} {i.unit} | {i.made} | {markdown(i.note)} |" for i in bill(phantom)]
     return "\n".join(lines) + "\n"
 
@@ -174,14 +174,18 @@ def bill(phantom: PhantomSet) -> list[Item]:
     table, found = phantom.table, pours(phantom)
     rows: list[tuple[str, float, str, str, str]] = [
         (body.name, 1, "piece", f"printed {'upside down' if body.upside_down else 'as drawn'}", phantom.printer.name)
-        for body in printed(phantom.tools)
+        for body in printed_pieces(phantom.tools)
     ]
     side = 2 * phantom.size.inner - 0.6
     rows.append(("plate", 1, "piece", "cut", f"acrylic, {side:.1f} x {side:.1f} x {table.plate_thickness_mm:g} mm"))
     for name in dict.fromkeys(one.silicone.name for one in phantom.recipes):
         own = [p for p in found if phantom.recipes[p.layer].silicone.name == name]
-        rows.append((f"{name} part A", sum(p.part_a_g for p in own), "g", "bought", f"{len(own)} pours"))
-        rows.append((f"{name} part B", sum(p.part_b_g for p in own), "g", "bought", f"{len(own)} pours"))
+        rows.append(
+            (f"{name} part A", sum(p.part_a_g for p in own), "g", "bought", f"{len(own)} pour{'s' * (len(own) > 1)}")
+        )
+        rows.append(
+            (f"{name} part B", sum(p.part_b_g for p in own), "g", "bought", f"{len(own)} pour{'s' * (len(own) > 1)}")
+        )
     rows.append(("silicone thinner", sum(p.thinner_g for p in found), "g", "bought", "of the silicones' maker"))
     rows += [
         ("scale", 1, "piece", "at hand", f"reads {table.scale_resolution_g:g} g"),
@@ -369,7 +373,7 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
     """Return the files of a phantom's folder by their names, the pieces as STL and one 3MF."""
     found: dict[str, bytes] = {}
     parts = []
-    for body in printed(phantom.tools):
+    for body in printed_pieces(phantom.tools):
         stage(body.name)
         ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
         found[f"moulds/{body.name}.stl"] = printing.stl(*ready, body.name)

@@ -160,7 +160,7 @@ def score_figure(points: tuple[Point, ...]) -> dict[str, Any]:
         {
             "units": units,
             "scores": {name: _factor([(one["levels"][name], one["measured"]) for one in blind]) for name in COMPARED},
-            "held": f"{sum(one['held'] for one in blind)} of {len(blind)}",
+            "coverage": f"{sum(one['in_range'] for one in blind)} of {len(blind)}",
             "decay": decay,
             "decay_scores": {
                 name: _factor([(one[name]["value"], one["measured"]) for one in decay])
@@ -187,7 +187,7 @@ def _unit(point: Point, constants: Mapping[str, np.ndarray]) -> dict[str, Any]:
         "levels": levels,
         "p10": low,
         "p90": high,
-        "held": low <= point.value <= high,
+        "in_range": low <= point.value <= high,
     }
 
 
@@ -197,7 +197,7 @@ def _decay(point: Point, measured: float, layered: Mapping[str, Any]) -> dict[st
     def at(curve: Mapping[str, Any]) -> dict[str, float]:
         return {key: float(np.interp(point.distance_mm, mm, values)) for key, values in curve.items()}
 
-    exponential = layered["paper_beside"]["exponential"]["loss_modulus"]
+    exponential = layered["published_curves"]["exponential"]["loss_modulus"]
     return {
         "unit": point.unit,
         "distance_mm": point.distance_mm,
@@ -240,7 +240,10 @@ def score(
         table.add_row(name, f"{100 * one['measured']:.3g}", ends, *levels)
     table.add_section()
     table.add_row(
-        "factor error, blind", "", f"held {data['held']}", *[_factor_text(data["scores"][model]) for model in models]
+        "factor error, blind",
+        "",
+        f"coverage {data['coverage']}",
+        *[_factor_text(data["scores"][model]) for model in models],
     )
     screen.print(table)
     if data["decay"]:

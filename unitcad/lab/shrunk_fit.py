@@ -89,7 +89,7 @@ class Judged:
         """The same by the stored constants."""
         return None if self.by_stored is None else _factor(self.by_stored[self.own])
 
-    def held(self, content: float = 0.8) -> int:
+    def coverage(self, content: float = 0.8) -> int:
         """Return how many units are in the middle `content` of their prediction without them."""
         return int(np.sum(np.abs(self.share - 0.5) <= content / 2))
 
@@ -136,7 +136,7 @@ def judge(model: Model, campaigns: Campaigns) -> Judged:
     return Judged(errors, stdtr(df, -errors / scale), centre, scale, df, campaigns.own, by_stored)
 
 
-def paired(judged: Judged, other: Judged) -> tuple[float, float, float]:
+def paired_difference(judged: Judged, other: Judged) -> tuple[float, float, float]:
     """Return the mean difference of |ln(predicted/measured)| to another model's, its standard error, sign-flip p."""
     one, two = np.abs(judged.errors), np.abs(other.errors)
     differences = one - two

@@ -40,7 +40,7 @@ def file_of(folder: Path, name: str, field: str) -> Path:
     """Return the path of a file that a lab's file in `folder` names. Raises Refusal if there is none."""
     path = folder / name
     if not path.is_file():
-        raise Refusal(field, name, f"no such file in {files.seen_from(folder)}")
+        raise Refusal(field, name, f"no such file in {files.path_seen_from(folder)}")
     return path
 
 

@@ -98,7 +98,9 @@ def _mark_known(report: FileReport, entries: Sequence[Entry]) -> FileReport:
 
 def _key(path: Path, file: str) -> str:
     """Return a file's name in the baseline at `path`."""
-    return files.seen_from(file, path.parent).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    return (
+        files.path_seen_from(file, path.parent).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    )
 
 
 def _may_be(finding: Finding) -> bool:

@@ -281,7 +281,7 @@ def _geometry(
     findings += s_scale.likely_unit(whole, build.unit)
     findings += g_shells.expected(whole.shells, options.shells)
     if options.printer is not None:
-        findings += printed(instances, options.printer, deadline)
+        findings += check_printability(instances, options.printer, deadline)
     return findings, whole
 
 
@@ -308,7 +308,7 @@ def _filled(findings: Iterable[Finding], strict: bool = False) -> Iterator[Findi
             yield item
 
 
-def printed(instances: Sequence[Instance], printer: Printer, deadline: Deadline) -> list[Finding]:
+def check_printability(instances: Sequence[Instance], printer: Printer, deadline: Deadline) -> list[Finding]:
     """Apply the printer's rules to instances; those that differ by their place on the bed alone are checked once."""
     findings: list[Finding] = []
     checked: dict[tuple[Key, bytes, float], tuple[Floats, tuple[Finding, ...]]] = {}

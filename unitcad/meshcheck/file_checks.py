@@ -23,7 +23,7 @@ from unitcad.files import no_such_file
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
 from unitcad.meshcheck.builds import check_3mf, check_on_bed, check_step, check_surface
-from unitcad.meshcheck.findings import Facts, FileReport, Finding, detailed, ending, merge
+from unitcad.meshcheck.findings import Facts, FileReport, Finding, ending, limit_details, merge
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.readers import kind_of
 from unitcad.meshcheck.readers.read_step import missing
@@ -71,7 +71,7 @@ def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileR
 
 def _check_with(path: str, options: Options, work: Callable[[Deadline], tuple[Sequence[Finding], Facts]]) -> FileReport:
     meshes: list[Mesh] | None = [] if options.draw else None
-    with detailed(options.locations, meshes):
+    with limit_details(options.locations, meshes):
         try:
             with keeping():
                 findings, facts = work(Deadline(options.limits.seconds))
@@ -88,7 +88,7 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
     kind = readers.kind_of(path.name)
     if not kind:
         known = ", ".join(sorted(readers.SUFFIXES))
-        raise F005.unreadable(f"suffix {path.suffix!r} is no mesh's; known: {known}")
+        raise F005.unreadable(f"suffix {path.suffix!r} is not a mesh format; known: {known}")
     if not data:
         raise F001.unreadable("the file is empty")
     content, wanted = readers.foreign(data[:2048]), {"3mf": "zip", "step": "STEP", "glb": "binary glTF"}.get(kind)
@@ -217,12 +217,12 @@ def check_files(
     if jobs <= 1 or len(work) <= 1:
         with _bounded(memory_mb):
             for path, options in work:
-                yield guarded(path, options, then)
+                yield check_guarded(path, options, then)
         return
     yield from _in_processes(work, min(jobs, len(work)), memory_mb, then)
 
 
-def guarded(path: str, options: Options, then: Then | None = None) -> FileReport:
+def check_guarded(path: str, options: Options, then: Then | None = None) -> FileReport:
     """Call `check_file` with an alarm behind its clock; an inner fault becomes a finding, not a crash."""
     begin = time.perf_counter()
     try:
@@ -250,7 +250,7 @@ def _in_processes(
     work: Sequence[tuple[str, Options]], jobs: int, memory_mb: int | None, then: Then | None
 ) -> Iterator[FileReport]:
     with Pool(jobs, memory=memory_mb and memory_mb * 1_000_000) as pool:
-        calls = [pool.submit(guarded, path, options, then) for path, options in work]
+        calls = [pool.submit(check_guarded, path, options, then) for path, options in work]
         for (path, _), call in zip(work, calls, strict=True):
             try:
                 yield call.result()

@@ -37,7 +37,7 @@ def detail() -> Detail:
 
 
 @contextlib.contextmanager
-def detailed(locations: int, meshes: list[Mesh] | None = None) -> Iterator[None]:
+def limit_details(locations: int, meshes: list[Mesh] | None = None) -> Iterator[None]:
     """Keep at most `locations` locations a finding, and meshes if a list is given, until the block ends."""
     before = _DETAIL.set(Detail(locations, meshes))
     try:

@@ -105,7 +105,7 @@ def work(
 
     `options` gives those of a path; `printers`: the known ones by name, None if the caller chose the printer.
     """
-    chosen = list(paths) or [files.seen_from(path) for path in listing.files if path.lower().endswith(_MESHES)]
+    chosen = list(paths) or [files.path_seen_from(path) for path in listing.files if path.lower().endswith(_MESHES)]
     pairs = []
     for path in chosen:
         part = listing.files.get(os.path.abspath(path))
@@ -128,15 +128,15 @@ def compare(listing: Listing, report: FileReport, options: Options) -> FileRepor
     return replace(report, findings=merge([*report.findings, *added]))
 
 
-def unchecked(listing: Listing, checked: Sequence[str], options: Choice) -> list[FileReport]:
+def check_unread(listing: Listing, checked: Sequence[str], options: Choice) -> list[FileReport]:
     """Report the listed files that were not checked (STEP, drawings and others) and are gone or changed: M003, M004.
 
     One of the manifest itself comes last if it lists paths outside its folder (M005): nothing there is read.
     """
     seen = {os.path.abspath(path) for path in checked}
-    left = [files.seen_from(path) for path in listing.files if path not in seen]
+    left = [files.path_seen_from(path) for path in listing.files if path not in seen]
     reports = [compare(listing, FileReport(path), options(path)) for path in left]
-    name = files.seen_from(listing.path)
+    name = files.path_seen_from(listing.path)
     if listing.outside and options(name).wants("M005"):
         shown = ", ".join([*(repr(path[:80]) for path in listing.outside[:3]), *["..."][: len(listing.outside) > 3]])
         text = f"{counted(len(listing.outside), 'path')} outside the manifest's folder: {shown}"

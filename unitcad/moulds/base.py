@@ -94,7 +94,7 @@ def pry_floor(spec: Spec) -> float:
 
 def plinth(spec: Spec, lay: Layout) -> Shape:
     """Draw the keyed square on the plate that every cup fits over; its top is the seat z = 0."""
-    return tapered(lay, 0.0, plate_top(spec))
+    return draw_taper(lay, 0.0, plate_top(spec))
 
 
 def core(dims: Dimensions) -> Shape:
@@ -117,7 +117,7 @@ def outline(size: tuple[float, float], key: float, grow: float = 0.0) -> Profile
     return rounded_rectangle(size[0] + grow, size[1] + grow, CORNER_RADIUS + grow, leg)
 
 
-def tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
+def draw_taper(lay: Layout, clearance: float, bottom: float) -> Shape:
     """Draw the plinth's taper from `bottom` up to the seat, grown by `clearance` on every side."""
 
     def section(z: float) -> Profile:

@@ -11,7 +11,7 @@ from manifold3d import Manifold, OpType
 
 from unitcad.kernels.mesh import realise
 from unitcad.moulds.plan import Plan, Step
-from unitcad.moulds.surroundings import MARGIN, column_round, cropped, once_each, reaching
+from unitcad.moulds.surroundings import MARGIN, column_round, crop, once_each, reaching
 from unitcad.shape import Shape, box
 from unitcad.shape.column import Standing
 
@@ -70,7 +70,7 @@ def _gang(step: Step, solids: Mapping[str, Manifold], segments: int, cells: Sequ
     def cavity(i: int) -> tuple[Manifold, Manifold]:
         column = column_round([layers[i], *channels(i)], MARGIN)
         filled = [*reaching(tools, column), *(realise(others[k], segments) for k in beside.inside(column))]
-        filled = [solid for whole in filled if not (solid := cropped(whole, column)).is_empty()]
+        filled = [solid for whole in filled if not (solid := crop(whole, column)).is_empty()]
         return _one(layers[i], channels(i), filled, _block_round(filled, step.top))
 
     @cache

@@ -46,7 +46,7 @@ from unitcad.designs import Dimensions
 from unitcad.designs.design import BEYOND, Cell, Layout, solid_within
 from unitcad.designs.dimensions import Exit
 from unitcad.designs.limits import CREST, LEAF_WIDTH, leaf_mm
-from unitcad.moulds.base import outline, plate_bottom, plate_top, tapered
+from unitcad.moulds.base import draw_taper, outline, plate_bottom, plate_top
 from unitcad.moulds.layout import CORNER_RADIUS, EPS, MARK, PLINTH_DRAFT_DEG, groove_depth_of
 from unitcad.shape import Extrude, Profile, Revolve, Shape, box, cut, moved, polygon, ring, union
 from unitcad.shape.profile import mm
@@ -123,11 +123,11 @@ def ribs(spec: Spec, lay: Layout) -> tuple[Rib, ...]:
     end = -moulds.plinth_height_mm + moulds.seat_relief_mm
     corner = max(lay.key, CORNER_RADIUS)
     leaf = leaf_mm(printer_of(spec))
-    return placed(lay.plinth, corner, end, moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest, leaf)
+    return place_ribs(lay.plinth, corner, end, moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest, leaf)
 
 
 @lru_cache(maxsize=16)
-def placed(
+def place_ribs(
     half: tuple[float, float],
     corner: float,
     end: float,
@@ -265,7 +265,7 @@ def recess(spec: Spec, lay: Layout) -> Shape:
     """Draw the cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides, less
     the ribs that centre the cup, and the slots round the leaves of ribs of resin.
     """
-    room = cut(tapered(lay, spec.moulds.plinth_clearance_mm * SQUARE, skirt_end(spec)), rib_shapes(spec, lay))
+    room = cut(draw_taper(lay, spec.moulds.plinth_clearance_mm * SQUARE, skirt_end(spec)), rib_shapes(spec, lay))
     return union((room, *slots)) if (slots := slot_shapes(spec, lay)) else room
 
 

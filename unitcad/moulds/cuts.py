@@ -187,7 +187,7 @@ def at(line: Sequence[Point], y: float) -> float:
     raise ValueError(f"the line does not pass y = {y:g}")
 
 
-def seen(point: Point, across: Axis) -> Point:
+def to_seam_frame(point: Point, across: Axis) -> Point:
     """Return a point in the frame of the seams across an axis."""
     return point if across == "x" else (point[1], -point[0])
 
@@ -339,7 +339,7 @@ def _found(sized: Sequence[Sized], play: float, other: Sequence[Seam]) -> tuple[
                 return each.across
             chosen += [(each, place) for place in places]
         bare = [Seam(place.at, place.line, (), play, each.across) for each, place in chosen]
-        made = [toothed(place, each, play, [s for s in bare if s.across != each.across]) for each, place in chosen]
+        made = [add_teeth(place, each, play, [s for s in bare if s.across != each.across]) for each, place in chosen]
         found = [seam for seam in made if seam]
         if len(found) == len(chosen) and _joined(found):
             return tuple(found)
@@ -393,10 +393,10 @@ def in_gaps(ends: Interval, features: Sequence[Feature], *, narrow: bool = False
         yield Place(middle, ((x, -FAR), (x, FAR)), wide)
 
 
-def toothed(place: Place, sized: Sized, play: float, crossing: Sequence[Seam] = ()) -> Seam | None:
+def add_teeth(place: Place, sized: Sized, play: float, crossing: Sequence[Seam] = ()) -> Seam | None:
     """Return the seam at a place, with teeth clear of the seams that cross it (`crossing`); None without room."""
     heights = _heights(Seam(place.at, place.line, (), play, sized.across), crossing)
-    way = {"x": lambda p: (-p[1], p[0]), "y": lambda p: seen(p, "y")}[sized.across]
+    way = {"x": lambda p: (-p[1], p[0]), "y": lambda p: to_seam_frame(p, "y")}[sized.across]
     lines = [tuple(way(point) for point in seam.line) for seam in crossing]
     features = (*sized.features, *(Feature(ends, LARGE.depth) for line in lines for ends in pairwise(line)))
     teeth: list[Tooth] = []

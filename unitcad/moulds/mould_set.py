@@ -28,7 +28,7 @@ from unitcad.spec import Spec, assumed_lengths, from_json, to_json, with_formats
 from unitcad.spec.custom_code import is_body_file
 from unitcad.spec.raw import CastingTable
 from unitcad.spec.resolved import Estimate
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 
 _T = TypeVar("_T")
 
@@ -301,5 +301,5 @@ def shallow_grooves(moulds: MouldSet) -> list[str]:
     cut_down = {plan.called(name): groove_depth_of(spec, rim) for name, rim in walls if rim / 2 < asked}
     if not cut_down:
         return []
-    drawn = listed([f"{number(depth, 3)} mm on {name}" for name, depth in cut_down.items()])
+    drawn = join_words([f"{number(depth, 3)} mm on {name}" for name, depth in cut_down.items()])
     return [f"moulds.groove_depth_mm = {asked:g} mm is more than half the rim's height: the groove is drawn {drawn}"]

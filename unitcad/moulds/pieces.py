@@ -56,7 +56,7 @@ def set_label(shapes: Iterable[Shape]) -> str:
     return "".join(one for one in content_hash(Union(tuple(shapes))).upper() if one not in "BCD")[:4]
 
 
-def engraved(blank: Shape, letters: list[Shape]) -> Shape:
+def engrave(blank: Shape, letters: list[Shape]) -> Shape:
     """Return a piece with its letters cut in the same pass as its other openings."""
     return replace(blank, tools=(*blank.tools, *letters)) if isinstance(blank, Cut) else cut(blank, letters)
 

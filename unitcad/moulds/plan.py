@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
 from unitcad.designs.design import BEYOND, Cell, Layout, Tooling
-from unitcad.designs.dimensions import poured
+from unitcad.designs.dimensions import tool_dimensions
 from unitcad.errors import UNIT_ALONE, Refusal, UnitcadError
 from unitcad.moulds import filament, lid
 from unitcad.moulds.base import base, plate_bottom, plate_top, tongues
@@ -26,7 +26,7 @@ from unitcad.moulds.pieces import (
     corner_labels,
     cup_piece,
     customary,
-    engraved,
+    engrave,
     filament_pieces,
     lid_piece,
     seals,
@@ -162,9 +162,9 @@ def plan(spec: Spec) -> Plan:
     # Material variants share pieces: the label depends only on geometry.
     label = set_label((*(tool.in_file.shape for tool in made.tools), *layers))
     tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in made.tools)
-    cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
+    cast = [tuple(place_in_cell(layer, dims, cell) for cell in lay.cells) for layer in layers]
     laid_in, laid = design_of(spec).laid_in, inserts(spec)
-    laid = tuple(replace(b, shape=union(placed(b.shape, dims, cell) for cell in lay.cells)) for b in laid)
+    laid = tuple(replace(b, shape=union(place_in_cell(b.shape, dims, cell) for cell in lay.cells)) for b in laid)
     tails = sum(len(cell.sides) for cell in lay.cells) if dims.exit else 0
     pours = range(1, len(layers) + 1)
     standing = [
@@ -223,7 +223,7 @@ def cast_layers(spec: Spec) -> tuple[Shape, ...]:
     """
     if spec.moulds.shrinkage_percent:
         design = design_of(spec)
-        drawn = design.layers(spec, poured(spec, design.dimensions(spec)))
+        drawn = design.layers(spec, tool_dimensions(spec, design.dimensions(spec)))
         return tuple(drawn[f"layer{i + 1}"] for i in range(len(spec.layers)))
     bodies = sorted((body for body in unit_bodies(spec) if body.kind == "layer"), key=lambda body: body.step or 0)
     if len(bodies) != len(spec.layers):
@@ -233,7 +233,7 @@ def cast_layers(spec: Spec) -> tuple[Shape, ...]:
     return tuple(body.shape for body in bodies)
 
 
-def placed(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
+def place_in_cell(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
     """Return a unit's solid in its cell: turned by half if the cell's one tail leaves to -x."""
     return moved(turned(shape, "z", 2 if cell.sides == (-1,) and dims.sides == (1,) else 0), cell.x, cell.y)
 
@@ -252,8 +252,8 @@ def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str)
         letters = corner_labels(spec, lay, dims.heights[-1], ("F", *corners))
     else:
         return tool
-    file = engraved(tool.file, letters) if tool.file else None
-    return replace(tool, shape=engraved(tool.shape, letters), file=file)
+    file = engrave(tool.file, letters) if tool.file else None
+    return replace(tool, shape=engrave(tool.shape, letters), file=file)
 
 
 def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
@@ -262,7 +262,7 @@ def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     Raises Refusal beyond the bed, for a tail that reaches no edge, and for a tongue or vents that can't clear the air.
     """
     design = design_of(spec)
-    dims = poured(spec, design.dimensions(spec))
+    dims = tool_dimensions(spec, design.dimensions(spec))
     lay, pours = layout(spec, dims), range(len(cast))
     lid.check_tongue(spec, dims)
     injected = spec.moulds.pour == "injected"

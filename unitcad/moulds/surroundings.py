@@ -47,7 +47,7 @@ def column_round(solids: Sequence[Manifold], margin: float) -> Column:
     return Column(column.x, column.y, float(np.hypot(*corners.T).max()) + margin, *ends)
 
 
-def cropped(solid: Manifold, column: Column) -> Manifold:
+def crop(solid: Manifold, column: Column) -> Manifold:
     """Return the part of a solid in a column, whose round wall is a polygon about it."""
     low, high = max(solid.bounding_box()[2] - 1, column.low), min(solid.bounding_box()[5] + 1, column.high)
     if low >= high:

@@ -176,10 +176,10 @@ class Subject:
         progress("manifest")
         findings = mould_findings(spec, shape)
         manifest = manifests.of_unit(moulds, outputs, check, shape, findings, estimate, list(pictures))
-        return finished(manifest, own, {**shape["files"], **pictures}, store)
+        return finish(manifest, own, {**shape["files"], **pictures}, store)
 
 
-def finished(manifest: Manifest, own: dict[str, bytes], shared: dict[str, str], store: Store) -> Product:
+def finish(manifest: Manifest, own: dict[str, bytes], shared: dict[str, str], store: Store) -> Product:
     """Return a product whose manifest lists all its files."""
     listed = {path: manifests.FileRecord(bytes=len(content), sha256=digest(content)) for path, content in own.items()}
     listed |= {path: manifests.FileRecord(bytes=store.size(sha), sha256=sha) for path, sha in shared.items()}

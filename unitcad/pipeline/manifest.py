@@ -204,7 +204,7 @@ def of_unit(
         steps=[{**step, "material": spec.layers[step["index"] - 1].material} for step in shape["steps"]],
         mould_checks=findings,
         estimate=EstimateSummary(**summary(estimate)) if estimate else None,
-        check=counted(shape["check"]),
+        check=count_findings(shape["check"]),
         pictures=pictures,
         casting=sorted(CASTING) if "casting" in only else None,
         skipped=[Skipped(output=output, reason=reason) for output, reason in _skipped(spec, only, check)],
@@ -244,7 +244,7 @@ def printed_mm3(parts: Iterable[PartRecord]) -> float:
     return sum(part["volume_mm3"] for part in parts if part["role"] == "tool" and part["made"] == "printed")
 
 
-def counted(findings: list[MeshFinding]) -> MeshFindings:
+def count_findings(findings: list[MeshFinding]) -> MeshFindings:
     """Return the findings of mesh rules with their number by severity."""
     count = Counter(finding["severity"] for finding in findings)
     return {"errors": count["error"], "warnings": count["warning"], "findings": findings}

@@ -122,7 +122,7 @@ def _plan(moulds: MouldSet, path: str, draw: Callable[[], str], reads: str) -> P
     return Planned(path, lambda: draw().encode(), partial(geometry_key, moulds, reads), "drawing")
 
 
-def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:
+def check_outputs(only: Sequence[str]) -> tuple[str, ...]:
     """Return `only` in the order of OUTPUTS. Raises Refusal for an unknown one, or none."""
     for name in only:
         if name not in OUTPUTS:
@@ -292,7 +292,7 @@ def side_by_side(bodies: Sequence[Body]) -> list[Body]:
     """
     groups: dict[str, list[Body]] = {}
     for body in bodies:
-        several = body.kind in ("tongue", "stub")
+        several = body.kind in ("tongue", "filament")
         groups.setdefault(f"{body.kind}{body.step}" if several else body.name.partition("-")[0], []).append(body)
     placed, end = dict[str, Body](), -math.inf
     for group in groups.values():

@@ -65,7 +65,7 @@ def moments(moulds: MouldSet) -> Iterator[Moment]:
     )
 
 
-def taken_apart(moulds: MouldSet) -> dict[str, Offset]:
+def exploded_moves(moulds: MouldSet) -> dict[str, Offset]:
     """Return how far each tool and each cast layer moves (mm) when the set is shown exploded.
 
     Up the axis in casting order; a tongue out of its window, a filament down.
@@ -138,7 +138,7 @@ def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict
     if "unit" in only:
         drawn["unit.png"] = partial(unit_cut_open, moulds)
     if "moulds" in only:
-        drawn["moulds/exploded.png"] = partial(exploded, moulds)
+        drawn["moulds/exploded.png"] = partial(exploded_view, moulds)
         for step in moulds.plan.steps:
             drawn[f"moulds/step{step.index}.png"] = partial(step_in_section, moulds, step.index)
     return drawn
@@ -164,9 +164,9 @@ def step_in_section(moulds: MouldSet, index: int) -> bytes:
     return draw(halves, (0.18, -1.0, 0.48), (1200, 640))
 
 
-def exploded(moulds: MouldSet) -> bytes:
+def exploded_view(moulds: MouldSet) -> bytes:
     """Show the whole set taken apart, with names."""
-    colours, offsets = _colours(moulds), taken_apart(moulds)
+    colours, offsets = _colours(moulds), exploded_moves(moulds)
     groups = [[tool.name for tool in moulds.plan.of_kind(kind)] for kind in ("tongue", "filament")]
     numbered = [name for group in groups if len(group) > 1 for name in group]
     unnamed = {name for group in groups for name in group[1:]}

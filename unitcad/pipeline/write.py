@@ -22,7 +22,7 @@ from unitcad.export import slicer
 from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product, Progress, Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
-from unitcad.pipeline.plan import checked_outputs, code_version
+from unitcad.pipeline.plan import check_outputs, code_version
 from unitcad.pipeline.subjects import subject
 from unitcad.spec import Spec, printer_of, read_toml
 from unitcad.spec.raw import FORMATS, OUTPUTS, Format
@@ -76,7 +76,7 @@ def build(
     Raises Refusal or UnitcadError before anything is written; a failed check is no exception, see `Built.ok`.
     """
     wanted = subject(of)
-    outputs = wanted.outputs(checked_outputs(only))
+    outputs = wanted.outputs(check_outputs(only))
     if any(os.path.lexists(path) and not path.is_dir() for path in (out, *out.parents)):
         raise files.in_the_way(out)
     folder, store = out / wanted.folder_name, store or MemoryStore()
@@ -84,7 +84,7 @@ def build(
     while True:
         there = earlier(folder, wanted)
         formats: tuple[Format, ...] = tuple(form for form in FORMATS if form in (*there.formats, *wanted.formats))
-        every, checked = checked_outputs((*outputs, *there.outputs)), check or there.checked
+        every, checked = check_outputs((*outputs, *there.outputs)), check or there.checked
         with contextlib.suppress(_Changed):  # another build has put a result there: its outputs are made too
             making = wanted.with_formats(formats)
             making.given = given
@@ -221,7 +221,7 @@ def _sync(paths: Iterable[str]) -> None:
             os.close(handle)
 
 
-def held(folder: Path) -> contextlib.AbstractContextManager[None]:
+def hold_folder(folder: Path) -> contextlib.AbstractContextManager[None]:
     """Hold a lock on a result's folder, so that one process at a time changes it."""
     return cache.held(folder.parent / f".{folder.name}.lock")
 
@@ -236,7 +236,7 @@ def replacing(folder: Path) -> Iterator[Path]:
     """
     expect_folder(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with held(folder), files.scratch(folder.parent, folder.name) as scratch:
+    with hold_folder(folder), files.scratch(folder.parent, folder.name) as scratch:
         fresh, aside = scratch / files.NEW, scratch / files.OLD
         fresh.mkdir()
         try:
@@ -299,7 +299,7 @@ def clear_leftovers(out: Path) -> None:
         with contextlib.suppress(OSError):  # it has been released meanwhile
             status = path.lstat()
             if LOCK.fullmatch(path.name) and stat.S_ISREG(status.st_mode) and not status.st_size:
-                cache.free(path)
+                cache.is_free(path)
 
 
 def expect_folder(folder: Path) -> None:
@@ -354,7 +354,7 @@ def slice_tools(spec: Spec, folder: Path, manifest: Manifest, say: Callable[[str
         for part in manifest["parts"]
         if part["role"] == "tool" and "stl" in part["files"] and part["files"]["stl"]["path"].startswith("moulds/")
     ]
-    with held(folder):
+    with hold_folder(folder):
         try:
             report = slicer.print_report(tools, printer_of(spec), _earlier(folder / SLICED), say)
         except UnitcadError as error:

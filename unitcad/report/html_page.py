@@ -83,19 +83,19 @@ def html_page(
     body = [
         '<main id="page"><p>Reading ...</p></main>',
         f"<noscript><p>A script draws this page. {html.escape(without_script)}</p></noscript>",
-        f'<script type="text/plain" id="data">{packed(data)}</script>',
+        f'<script type="text/plain" id="data">{pack(data)}</script>',
         f'<script type="text/plain" id="licences">{html.escape(licences, quote=False)}</script>',
     ]
     return document(title, sheets, body, scripts)
 
 
-def packed(data: dict[str, Any]) -> str:
+def pack(data: dict[str, Any]) -> str:
     """Return data as JSON, compressed and in base 64."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-    return compressed(text.encode("utf-8", "replace"))
+    return compress(text.encode("utf-8", "replace"))
 
 
-def compressed(content: bytes) -> str:
+def compress(content: bytes) -> str:
     """Return content as a gzip file in base 64.
 
     Base 64 in it, such as pictures, has no repetitions. So it is coded without a search for them, which would take most
@@ -178,7 +178,7 @@ def plain_page(title: str, body: str, model: dict[str, Any] | None = None) -> st
         return document(title, sheets, markup)
     licence = html.escape(asset("vendor/three.LICENSE.txt"), quote=False)
     markup += [
-        f'<script type="text/plain" id="data">{packed(model)}</script>',
+        f'<script type="text/plain" id="data">{pack(model)}</script>',
         f'<script type="text/plain" id="licences">{licence}</script>',
     ]
     return document(title, sheets, markup, [asset(name) for name in _PROGRAMS])

@@ -15,11 +15,11 @@ from unitcad.files import write
 from unitcad.meshcheck.findings import counted
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
-from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
+from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
 from unitcad.pipeline.write import BENCH, PAGE
 from unitcad.report import read_results
 from unitcad.report.bench_page import write_bench
-from unitcad.report.html_page import Pool, asset, compressed, html_page
+from unitcad.report.html_page import Pool, asset, compress, html_page
 from unitcad.report.read_results import VariantRecord
 from unitcad.rooms import load
 from unitcad.spec import Spec
@@ -39,19 +39,19 @@ Modelled = Callable[[Spec], dict[str, Any]]
 
 
 def model(spec: Spec) -> dict[str, Any]:
-    """Return a geometry for the page; GLB files compressed and in base 64. Lengths in mm.
+    """Return a geometry for the page; GLB files compress and in base 64. Lengths in mm.
 
     Raises UnitcadError if the geometry can't be made any more.
     """
     moulds = MouldSet(spec)
     plan = moulds.plan
     return {
-        "unit": compressed(glb_content(moulds, moulds.unit)),
-        "moulds": compressed(glb_content(moulds, plan.tools)),
+        "unit": compress(glb_content(moulds, moulds.unit)),
+        "moulds": compress(glb_content(moulds, plan.tools)),
         "cells": cells(moulds),
         "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(moulds)],
         "unit_apart": {name: list(offset) for name, offset in unit_apart(moulds).items()},
-        "moulds_apart": {name: list(offset) for name, offset in taken_apart(moulds).items()},
+        "moulds_apart": {name: list(offset) for name, offset in exploded_moves(moulds).items()},
     }
 
 
@@ -109,7 +109,8 @@ def page_data(folder: Path, modelled: Modelled | None = model) -> tuple[dict[str
     Geometries are made by `modelled`, none without it. Raises UnitcadError if the folder has no result.
     """
     if not folder.is_dir():
-        raise UnitcadError(f"{folder}: is not a folder")
+        found = "is a file" if folder.exists() else "no such folder"
+        raise UnitcadError(f"{folder}: {found}; name the folder of a build or of a batch")
     damaged: dict[str, str] = {}
     if read_results.is_variant(folder):
         record, spec = read_results.read_variant(folder, folder)
@@ -175,9 +176,9 @@ def _of_all(batch: dict[str, Any] | None, records: list[VariantRecord]) -> dict[
 
 
 def _typical(scores: Any) -> float | None:
-    """Return a model's typical factor with the unit left out from its scores in an estimate; None for anything else."""
+    """Return a model's leave-one-out error from its scores in an estimate; None for anything else."""
     try:
-        typical = scores["leave_one_unit_out"]["levels"]["geometric_mean"]
+        typical = scores["leave_one_out"]["levels"]["geometric_mean"]
     except (KeyError, TypeError):
         return None
     return typical if isinstance(typical, float) else None

@@ -17,7 +17,7 @@ from unitcad import catalogue
 from unitcad.attenuation.curve import crosstalk_ratio
 from unitcad.attenuation.edge import measured as nearest
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.measured import FIELDS, stacked
+from unitcad.attenuation.edge.measured import FIELDS, stack_inputs
 from unitcad.attenuation.edge.ranges import Predictive, lead_of
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 from unitcad.attenuation.receivers import MOST_PITCH_MM
@@ -31,7 +31,7 @@ from unitcad.estimate_inputs import drawn_input, silicone_layer
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.search.target_file import MOST_GEOMETRIES, Target
 from unitcad.spec import Spec
-from unitcad.text import listed, number, some
+from unitcad.text import join_words, number, some
 from unitcad.validation import from_data
 
 MOST_CANDIDATES = 400_000
@@ -322,7 +322,7 @@ def _units(
 ) -> tuple[Units, nearest.Lengths, np.ndarray]:
     """Return the closed forms' input, lengths and mass (kg) of each geometry with each sequence of silicones."""
     variants = [one.variant for one in made]
-    base, each, count = stacked(variants), nearest.lengths(variants), len(own)
+    base, each, count = stack_inputs(variants), nearest.lengths(variants), len(own)
     of_silicones = {key: [[getattr(layer, key).middle for layer in one] for one in own] for key in FIELDS}
     of_silicones["density"] = [[layer.density for layer in one] for one in own]
     units = replace(
@@ -518,7 +518,7 @@ def check_possible(found: Candidates, measured: Mapping[int, Mapping[str, Any]])
     made = []
     for key, (value, offer) in offers.items():
         others = [f"target.{other} = {instead:g}" for other, (_, instead) in offers.items() if other != key]
-        together = f": together with {listed(others)}" if others else ""
+        together = f": together with {join_words(others)}" if others else ""
         words = f"{none}; nearest is {label(found, row)}{together}{_left_out(found)}"
         made.append(Refusal(f"target.{key}", value, words, offer))
     made[0].others = tuple(made[1:])

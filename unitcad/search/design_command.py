@@ -10,7 +10,7 @@ import typer
 
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
-from unitcad.files import seen_from
+from unitcad.files import path_seen_from
 from unitcad.search import design_files
 from unitcad.search.proposals import explain as explained
 from unitcad.search.proposals import invert
@@ -35,7 +35,7 @@ def design(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Try all designs at hand for a target, and rank them.
+    """Rank all available designs for a target.
 
     Each proposal has its probability of meeting the level at the edge, with a range, and the inputs that no measurement
     covers. The last line printed is the folder: the page design.html, ranking.csv, and specs to build.
@@ -48,7 +48,7 @@ def design(
         made = invert(asked, check=not no_check, say=stage)
         if explain is None:
             folder = design_files.folder_of(asked.name, out)
-            found = design_files.contents(made, seen_from(folder), stage)
+            found = design_files.contents(made, path_seen_from(folder), stage)
             design_files.write(folder, found)
     if explain is not None:
         reasons = explained(made, explain)
@@ -58,7 +58,7 @@ def design(
             for line in design_files.explanation_lines(reasons):
                 console().print(line, soft_wrap=True)
         return
-    data = design_files.with_files(made.data, seen_from(folder))
+    data = design_files.with_files(made.data, path_seen_from(folder))
     if as_json:
         print_json({"folder": str(folder), **data})
         return

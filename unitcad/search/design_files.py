@@ -21,9 +21,9 @@ from unitcad.pipeline import write as folders
 from unitcad.pipeline.variant import Variant
 from unitcad.report.html_page import drawing, plain_page
 from unitcad.search.candidates import Candidates, Say, limits
-from unitcad.search.proposals import Inversion, name_of, ordered
+from unitcad.search.proposals import Inversion, name_of, order_rows
 from unitcad.spec import to_toml
-from unitcad.text import cell, listed, markdown, number
+from unitcad.text import cell, join_words, markdown, number
 
 OTHERS = "Nearest others: measured outside the target, or below the probability that is asked for"
 """The heading over the candidates that are no proposals."""
@@ -124,7 +124,7 @@ def lines(one: Mapping[str, Any]) -> list[str]:
             f"its probability is {sibling['probability']:.2f}"
         )
     if one["relies_on"]:
-        made.append(f"the nearest measured unit differs in {listed(one['relies_on'])}")
+        made.append(f"the nearest measured unit differs in {join_words(one['relies_on'])}")
     return [*made, one["lengths_gain"], *one["remarks"]]
 
 
@@ -214,7 +214,7 @@ def ranking(made: Inversion) -> str:
     columns = [found.diameter_mm, found.height_mm, found.mass_g, found.cure_hours, found.crosstalk, found.probability]
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
-    for place, row in enumerate([*ordered(found, made.rows), *ordered(found, outside)], 1):
+    for place, row in enumerate([*order_rows(found, made.rows), *order_rows(found, outside)], 1):
         lengths, name, own = found.lengths(row), name_of(found, int(row)), made.measured.get(int(row))
         writer.writerow(
             [

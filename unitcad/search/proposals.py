@@ -39,7 +39,7 @@ from unitcad.search.candidates import (
 )
 from unitcad.search.target_file import Target
 from unitcad.spec import Spec
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 from unitcad.validation import load, templates, warnings
 from unitcad.validation.load import is_path
 
@@ -82,7 +82,7 @@ def explain(made: Inversion, named: str) -> dict[str, Any]:
         why = "was measured outside the target" if own["measured"] else "is below the probability that is asked for"
         reasons.append(f"it is no proposal: it {why}, and is among the nearest others as number {own['rank']}")
     elif unknown:
-        names = listed(dict.fromkeys(layer.material for layer in unknown))
+        names = join_words(dict.fromkeys(layer.material for layer in unknown))
         reasons.append(f"{names}: {unknown[0].youngs_modulus.note}")
     elif not own:
         body = found.geometries[0].variant
@@ -128,9 +128,9 @@ def _not_tried(found: Candidates, spec: Spec, alike: str | None) -> list[str]:
     target, vary, count = found.target, found.target.asked.vary, len(spec.layers)
     names, reasons = [layer.material for layer in spec.layers], []
     if missing := [name for name in dict.fromkeys(names) if name not in target.materials]:
-        reasons.append(f"not at hand: {listed(missing)}")
+        reasons.append(f"not at hand: {join_words(missing)}")
     if spec.design not in target.designs:
-        reasons.append(f"the design {spec.design} is not among {listed(target.designs)}")
+        reasons.append(f"the design {spec.design} is not among {join_words(target.designs)}")
     if spec.motor.part not in target.asked.at_hand.motors:
         reasons.append(f"the motor {spec.motor.part or 'of its own size'} is not at hand")
     if count not in vary.layers:
@@ -170,7 +170,7 @@ class Kind:
         return int(self.rows[0])
 
 
-def ordered(found: Candidates, rows: np.ndarray) -> np.ndarray:
+def order_rows(found: Candidates, rows: np.ndarray) -> np.ndarray:
     """Return rows by their probability, equal ones by novelty, then by mass."""
     return rows[np.lexsort((rows, *_ease(found, rows)[:0:-1], -np.round(found.probability[rows], 6)))]
 
@@ -209,7 +209,7 @@ def kinds(found: Candidates, rows: np.ndarray) -> list[Kind]:
     return [kind for group in groups for kind in group]
 
 
-def unmeasured(variant: EstimateInput) -> list[str]:
+def unmeasured_inputs(variant: EstimateInput) -> list[str]:
     """Return the inputs in which a candidate differs from the nearest measured unit."""
     return nearest(variant)["differs_in"]
 
@@ -395,7 +395,7 @@ def proposal(found: Candidates, row: int, spec: Spec, kind: Kind, checked: int |
         "within": [limit.shown(row) for limit in limits(found)],
         "checks": checked,
         "lengths_measured": not found.novelty[row],
-        "relies_on": unmeasured(variant),
+        "relies_on": unmeasured_inputs(variant),
         "lengths_gain": _gain(kind),
         "remarks": [*warnings(spec), *_scale(spec)],
     }
@@ -472,4 +472,6 @@ def _scale(spec: Spec) -> list[str]:
     if not poor:
         return []
     digit, least = number(spec.casting.scale_resolution_g, 3), number(spec.casting.minimum_mix_g, 3)
-    return [f"a scale of {digit} g is off by more than {MOST_ERROR_PCT:g} % on a part of {least} g of {listed(poor)}"]
+    return [
+        f"a scale of {digit} g is off by more than {MOST_ERROR_PCT:g} % on a part of {least} g of {join_words(poor)}"
+    ]

@@ -135,7 +135,7 @@ class ModelsTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Inputs of the estimate."""
 
     fit: Annotated[str | None, Meta(description="lab-fit.toml of unitcad fit")] = None
-    tissue: Annotated[Name, Meta(description="body under the unit")] = "forearm"
+    tissue: Annotated[Name, Meta(description="tissue under the unit")] = "forearm"
     moduli: Annotated[
         Moduli, Meta(description="moduli of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")
     ] = "small-strain"
@@ -214,7 +214,7 @@ def _named(field: str, given: Sequence[str] | None, known: Mapping[str, Any]) ->
         if name not in known:
             raise unknown_name(at, name, known)
         if name in names[:i]:
-            raise Refusal(at, name, "is there twice")
+            raise Refusal(at, name, "is given twice")
     return names
 
 
@@ -260,7 +260,7 @@ def _check_ranges(vary: VaryTable) -> None:
             raise Refusal(f"vary.{key}", list(ends), "goes from the least to the largest value", [ends[1], ends[0]])
     for i, count in enumerate(vary.layers):
         if count in vary.layers[:i]:
-            raise Refusal(f"vary.layers.{i}", count, "is there twice")
+            raise Refusal(f"vary.layers.{i}", count, "is given twice")
 
 
 def _check_spec(tables: Mapping[str, Mapping[str, Any]]) -> None:

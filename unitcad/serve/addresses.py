@@ -54,7 +54,7 @@ def means(host: str, allowed: frozenset[str]) -> bool:
     return False
 
 
-def shown(host: str) -> str:
+def shown_host(host: str) -> str:
     """Return the host of the address to open: of one that means all, this machine's own."""
     if not _is_any(host):
         return f"[{host}]" if ":" in host else host

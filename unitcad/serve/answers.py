@@ -18,7 +18,7 @@ from unitcad.errors import NEAREST, UNIT_ALONE, Refusal, UnitcadError, UnknownKe
 from unitcad.serve import unit_answers
 from unitcad.serve.form import edited
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted
-from unitcad.serve.remedies import remedied
+from unitcad.serve.remedies import add_remedies
 from unitcad.spec import parse_toml
 from unitcad.validation import compound_kind
 
@@ -62,9 +62,9 @@ def _answered(ask: Ask, trusted: Trusted) -> Answer:
         answer.faults = [_fault(error)]
         if whole is not None and subject is None:
             every = [_fault(one) for one in kind.faults_of(error, whole, text)]
-            answer.faults = remedied(every, whole, ask.since, kind.judge, kind.makeable)
+            answer.faults = add_remedies(every, whole, ask.since, kind.judge, kind.makeable)
         elif whole is not None and ask.what == "moulds":
-            answer.faults = remedied([_fault(error)], whole, ask.since, kind.makeable, kind.makeable)
+            answer.faults = add_remedies([_fault(error)], whole, ask.since, kind.makeable, kind.makeable)
     except UnitcadError as error:
         answer.faults = [_fault(error)]
     if ask.what == "unit":
@@ -79,7 +79,7 @@ def answers_about(data: Mapping[str, Any]) -> Any:
     return import_module(kind.page) if kind else unit_answers
 
 
-def resolved(text: bytes, trusted: bytes) -> bytes:
+def resolve(text: bytes, trusted: bytes) -> bytes:
     """Return {"text": the resolved spec as TOML, "asked", "code"} of a text, or {"refused": why}.
 
     `asked` has only the keys of the text, so that defaults follow other values; `code`: whether it has code. Both

@@ -149,7 +149,7 @@ class Live:
                 given, status = {"refused": str(error)}, 500
         if "page" in given:
             return self._html(given["page"])
-        return self._html(import_module(module).refused(path, given["refused"]), status)
+        return self._html(import_module(module).refusal_page(path, given["refused"]), status)
 
     async def ask(self, request: Request) -> Response:
         """Answer a question about a text by the worker for it."""
@@ -214,7 +214,7 @@ class Live:
         """
         async with self.questions.turns["unit"]:
             content = await self.questions.call(
-                "unit", "unitcad.serve.answers:resolved", text.encode("utf-8", "replace"), self.questions.trusted,
+                "unit", "unitcad.serve.answers:resolve", text.encode("utf-8", "replace"), self.questions.trusted,
                 seconds=10.0,
             )  # fmt: skip
         given = msgspec.json.decode(content)
@@ -298,7 +298,7 @@ def _write(path: Path, content: bytes, replace: bool) -> None:
         with contextlib.suppress(UnitcadError):  # a link, no regular file, or larger
             same = read(path, largest=len(content), links=False) == content
         if not same:
-            raise Refusal("name", path.name, "is there already; replace it, or choose another name")
+            raise Refusal("name", path.name, "exists already; replace it, or choose another name")
     write(path, content)
 
 

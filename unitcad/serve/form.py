@@ -18,7 +18,7 @@ from unitcad.designs import shipped
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.serve.messages import Edit, Field, Group
 from unitcad.spec import MOTOR_SIZES, Spec, parse_toml, to_data
-from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, meaning, notes, titled
+from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, meaning, notes, title_of
 from unitcad.spec.raw import (
     CastingTable,
     EstimateTable,
@@ -130,7 +130,7 @@ def fields(
         entries = _numbers_of(info.type, value)
         if entries and value is not None:
             for i, (kind, one) in enumerate(zip(entries, value, strict=True)):
-                label = f"{_label(name)} {titled(kind) or i + 1}"
+                label = f"{_label(name)} {title_of(kind) or i + 1}"
                 made = _field(f"{where}.{i}", label, kind, one, given is not ABSENT, [])
                 yield replace(made, required=info.required, meaning=meaning(info.type))
             continue

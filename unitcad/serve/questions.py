@@ -47,7 +47,7 @@ class Questions:
     def pool(self, what: What) -> Pool:
         """Return the workers of a kind, which start with the first look."""
         if what not in self._pools:
-            warm = (warmed, *self._parts(Ask(text=self._text, what=what)))
+            warm = (warm_up, *self._parts(Ask(text=self._text, what=what)))
             self._pools[what] = Pool(2, memory=MEMORY, load=PRELOAD, prepare=warm)
         return self._pools[what]
 
@@ -120,7 +120,7 @@ async def _either(answer: asyncio.Task[bytes], event: asyncio.Event) -> None:
         waiting.cancel()
 
 
-def warmed(function: str, *parts: bytes) -> None:
+def warm_up(function: str, *parts: bytes) -> None:
     """Answer a question whose answer is not wanted."""
     with contextlib.suppress(Exception):
         resolve_name(function)(*parts)

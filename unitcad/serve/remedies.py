@@ -10,17 +10,17 @@ import tomlkit
 from msgspec.structs import replace
 from tomlkit.exceptions import TOMLKitError
 
-from unitcad.errors import NEAREST, Refusal, UnitcadError, shown
+from unitcad.errors import NEAREST, Refusal, UnitcadError, format_value
 from unitcad.serve.messages import Edit, Fault
 from unitcad.validation import put
 from unitcad.validation.plain_data import ABSENT, at, drop
-from unitcad.validation.suggestions import followed, is_number, nearest_number, refused
+from unitcad.validation.suggestions import find_refusal, follow, is_number, nearest_number
 
 Judge = Callable[[dict[str, Any]], Mapping[str, Any]]
 """Validates plain data and returns it settled; raises UnitcadError for a fault."""
 
 
-def remedied(
+def add_remedies(
     faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[Edit], judge: Judge, whole: Judge
 ) -> list[Fault]:
     """Return the faults of plain data, each with its remedies: changes that `judge` accepts, if possible `whole` too.
@@ -95,7 +95,9 @@ def _with_offer(fault: Fault, nearest: Any) -> Fault:
     if nearest == fault.nearest:
         return fault
     message, _, _ = fault.message.partition(NEAREST)
-    return replace(fault, nearest=nearest, message=message if nearest is None else message + NEAREST + shown(nearest))
+    return replace(
+        fault, nearest=nearest, message=message if nearest is None else message + NEAREST + format_value(nearest)
+    )
 
 
 def _offer(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool, judge: Judge, whole: Judge) -> Any:
@@ -112,7 +114,7 @@ def _offer(fault: Fault, data: Mapping[str, Any], own: Edit | None, alone: bool,
 
 def _onwards(data: Mapping[str, Any], path: str, value: Any, judge: Judge) -> Any:
     """Return a value that is accepted at a path: the given one, or the one that its refusals offer in its place."""
-    changes, _ = followed(Refusal(path, None, "", value), data, judge)
+    changes, _ = follow(Refusal(path, None, "", value), data, judge)
     return changes[path] if set(changes) == {path} else None
 
 
@@ -145,7 +147,7 @@ def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge, whole: Judge) ->
     if not is_number(bad) or not is_number(good):
         return None
     for strict in (whole, judge):
-        if refused(data, {edit.path: good}, strict) is None:
+        if find_refusal(data, {edit.path: good}, strict) is None:
             return nearest_number(data, edit.path, good, bad, strict)
     return None
 
@@ -164,4 +166,4 @@ def _after(data: Mapping[str, Any], edit: Edit) -> dict[str, Any]:
 
 
 def _is_accepted(data: Mapping[str, Any], judge: Judge) -> bool:
-    return refused(data, {}, judge) is None
+    return find_refusal(data, {}, judge) is None

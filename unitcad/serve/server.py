@@ -21,7 +21,7 @@ from unitcad.pipeline.write import clear_leftovers
 from unitcad.report.page import page_data
 from unitcad.report.read_results import compound_in, is_variant
 from unitcad.rooms import FileKind, expect_none_but, file_kinds
-from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown
+from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown_host
 from unitcad.serve.answers import answers_about
 from unitcad.serve.application import Live, Setting, application
 from unitcad.serve.jobs import RESULTS
@@ -156,7 +156,7 @@ def serve(
             Trusted([source for source in trusted if source.named]), starts, token, hosts(host, bound), bound,
             batch, campaign,
         )  # fmt: skip
-        address = f"http://{shown(host)}:{bound}/?token={token}"
+        address = f"http://{shown_host(host)}:{bound}/?token={token}"
         live = Live(setting)
         config = uvicorn.Config(
             application(live), log_level="error", access_log=False, server_header=False, date_header=False,

@@ -17,7 +17,7 @@ from unitcad.estimate_inputs import closed_forms, estimate_spec, motor_mass
 from unitcad.export.svg import unit_section
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import glb_content
-from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
+from unitcad.pipeline.scenes import exploded_moves, moments, unit_apart
 from unitcad.report.page import cells
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Trusted
@@ -134,7 +134,7 @@ def _moulds(spec: Spec, answer: Answer) -> None:
         "moulds": glb_content(moulds, moulds.plan.tools),
         "cells": cells(moulds),
         "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(moulds)],
-        "moulds_apart": {name: list(offset) for name, offset in taken_apart(moulds).items()},
+        "moulds_apart": {name: list(offset) for name, offset in exploded_moves(moulds).items()},
     }
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
     answer.lines = list(casting_summary(asdict(unit_procedure(moulds))))

@@ -1,7 +1,7 @@
 """The raw and the resolved spec: the tables of a TOML spec, and the resolved spec with every value there."""
 
 from unitcad.spec.convert import check_plain, convert
-from unitcad.spec.resolved import MOTOR_SIZES, Spec, assumed_lengths, motor_of, printer_of, said_of, with_formats
+from unitcad.spec.resolved import MOTOR_SIZES, Spec, assumed_lengths, length_text, motor_of, printer_of, with_formats
 from unitcad.spec.toml import from_json, parse_toml, read_toml, spec_hash, to_data, to_json, to_toml
 
 __all__ = [
@@ -11,11 +11,11 @@ __all__ = [
     "check_plain",
     "convert",
     "from_json",
+    "length_text",
     "motor_of",
     "parse_toml",
     "printer_of",
     "read_toml",
-    "said_of",
     "spec_hash",
     "to_data",
     "to_json",

@@ -30,8 +30,10 @@ _HALF_PAIR = re.compile(r"[\ud800-\udfff]")
 _MEASURE = re.compile(r"\s*([-+]?\d*[.,]?\d+)\s*([A-Za-z%]*)\s*")
 _MM = {"mm": 1, "cm": 10, "m": 1000, "um": 0.001, "in": 25.4}
 """Millimetres in a unit of length."""
-_MOST_KEYS = 5
-"""Keys of a table that a refusal names."""
+_MOST_KEYS, _MOST_WORDS = 5, 8
+"""Keys of a table, and words of a key, that a refusal names."""
+_SWITCH = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
+"""Texts that mean true or false."""
 _LARGEST_INT = 2**63 - 1
 SOURCES = frozenset({"design_source", "fit_source"})
 """The fields whose text has lines."""
@@ -146,7 +148,15 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     if not (given in known or (given is int and float in known)):
         names = [_name(plain, kind) for plain in _NAMES if plain in known]
         limit = f"takes {', or '.join(names) if table else ' or '.join(names)}"
-        meant = _in_list(value, kind) if list in known else _number(value, field) if known & {int, float} else None
+        meant = (
+            _in_list(value, kind)
+            if list in known
+            else _number(value, field)
+            if known & {int, float}
+            else _SWITCH.get(str(value))
+            if bool in known
+            else None
+        )
         return Refusal(field, value, limit, meant if _fits(meant, kind) else None)
     if isinstance(value, int | float):
         return next(_out_of_range(value, kind, field))
@@ -197,6 +207,8 @@ def _name(plain: type, kind: Any) -> str:
     table = table_in(kind)
     if plain is list:
         return f"a list{_list_of(kind)}"
+    if plain is str and (words := _words(kind)[:_MOST_WORDS]):
+        return f"one of {', '.join(words)}" if len(words) > 1 else f'"{words[0]}"'
     if plain is not dict or not table:
         return _NAMES[plain]
     fields = fields_of(table)

@@ -78,7 +78,7 @@ def notes(kind: Any) -> Iterator[msgspec.Meta]:
             yield from notes(member)
 
 
-def titled(kind: Any) -> str:
+def title_of(kind: Any) -> str:
     """Return the title that a kind is annotated with, or nothing."""
     return next((note.title for note in notes(kind) if note.title), "")
 
@@ -125,7 +125,7 @@ def _range(kind: Any, number: type) -> str:
     return f"{low:g} to {high:g}{', whole' if number is int else ''}"
 
 
-def documented(table: type[msgspec.Struct]) -> str:
+def document(table: type[msgspec.Struct]) -> str:
     """Return the docstring of a table with its keys as the parameters of numpydoc."""
     about, _, examples = inspect.cleandoc(table.__doc__ or "").partition("Examples\n")
     lines = [about.rstrip(), "", "Parameters", "----------"]

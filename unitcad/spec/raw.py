@@ -87,7 +87,7 @@ class FpcbTable(Table, frozen=True, kw_only=True):
     tail_width_mm: Annotated[
         TailWidth, Meta(description="width of the tail; half of it is at most 0.7 of the core's radius")
     ] = 3.0
-    tail_length_mm: Annotated[Length, Meta(description="length of the tail outside the body")] = 10.0
+    tail_length_mm: Annotated[Length, Meta(description="length of the tail outside the unit")] = 10.0
     pad_diameter_mm: Annotated[
         Length | None, Meta(description="diameter of the pad on the motor; default: as wide as the design allows")
     ] = None
@@ -109,7 +109,7 @@ class WiresTable(Table, frozen=True, kw_only=True):
 
     diameter_mm: Annotated[float, Meta(ge=0.05, le=20, description="diameter of one wire with its insulation")]
     count: Annotated[int, Meta(ge=1, le=8, description="number of wires")] = 2
-    length_mm: Annotated[Length, Meta(description="length of the wires outside the body")] = 10.0
+    length_mm: Annotated[Length, Meta(description="length of the wires outside the unit")] = 10.0
 
 
 class LayerTable(Table, frozen=True, kw_only=True):
@@ -244,7 +244,7 @@ class EstimateTable(Table, frozen=True, kw_only=True):
         kinds.Amplitude | None, Meta(description="amplitude of the motor; default: the motor's own")
     ] = None
     tissue: Annotated[
-        str, Meta(description="body under the unit, of the catalogue or of the spec's own [tissue.NAME.LAYER]")
+        str, Meta(description="tissue under the unit, of the catalogue or of the spec's own [tissue.NAME.LAYER]")
     ] = "forearm"
     models: Annotated[
         tuple[Model, ...], Meta(min_length=1, description="models of the level; fem are the finite elements")

@@ -251,8 +251,8 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
         """Name, design, diameter and layers in at most 160 characters."""
         layers = [f"{layer.material} {layer.wall_mm:g}" for layer in self.layers]
         listed = " / ".join(layers) if len(layers) <= _MOST_LAYERS else f"{len(layers)} layers"
-        unit = f"{text.shortened(self.design, 40)}, {self.diameter_mm:g} mm"
-        return text.shortened(f"{text.shortened(self.name, 40)!r}: {unit}, {listed}", 160)
+        unit = f"{text.shorten(self.design, 40)}, {self.diameter_mm:g} mm"
+        return text.shorten(f"{text.shorten(self.name, 40)!r}: {unit}, {listed}", 160)
 
     def __repr__(self) -> str:
         return f"Spec({self.summary})"
@@ -324,7 +324,7 @@ def assumed_lengths(spec: Spec, given: Container[str] = (), path: str = "") -> d
     return {key: how for key, how in found.items() if path + key not in given}
 
 
-def said_of(spec: Spec, key: str) -> str:
+def length_text(spec: Spec, key: str) -> str:
     """Return "key = value" for a length of a spec."""
     table, _, name = key.partition(".")
     return f"{key} = {number(getattr(getattr(spec, table), name), 3)}"

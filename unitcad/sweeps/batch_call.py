@@ -16,13 +16,13 @@ from unitcad.arguments import check_number, path, texts
 from unitcad.cache import DiskStore, MemoryStore, MissingContent, SharedStore, default_root
 from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.pipeline.make import Progress, Subject
-from unitcad.pipeline.plan import body_key, checked_outputs, groups
+from unitcad.pipeline.plan import body_key, check_outputs, groups
 from unitcad.pipeline.subjects import subject
 from unitcad.pipeline.write import ADDRESS, STORE
 from unitcad.report import write_report
 from unitcad.report.read_results import read_batch
 from unitcad.spec.raw import OUTPUTS, Format
-from unitcad.sweeps.destination import found_at, note_store
+from unitcad.sweeps.destination import note_store, resolve_address
 from unitcad.sweeps.estimate_table import write_estimates
 from unitcad.sweeps.executors import Workers
 from unitcad.sweeps.insensitive_keys import swept_estimate
@@ -30,7 +30,7 @@ from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Journal, JournalEntry, Preview, RefusedVariant, Summary
 from unitcad.sweeps.result_folders import folders_wanted, lost, make_folders
 from unitcad.sweeps.results import TABLES, columns_of, tables_of, write_results
-from unitcad.sweeps.run import NEXT, Watch, batch_head, count_entry, counted, run, trim
+from unitcad.sweeps.run import NEXT, Watch, batch_head, count_entry, count_variants, run, trim
 from unitcad.sweeps.shards import BatchOptions, ShardRecord, read_shards, shard_folders, shard_of, store_of
 from unitcad.sweeps.sweep import Sweep, load_sweep
 from unitcad.text import some, toml
@@ -52,8 +52,8 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     Every counted variant is validated; `refused` has the first refusals. Raises UnitcadError
     if all are.
     """
-    only = checked_outputs(options.only)
-    whole = counted(sweep, options.limit)
+    only = check_outputs(options.only)
+    whole = count_variants(sweep, options.limit)
     indices = options.shard.indices(whole) if options.shard else range(whole)
     count = len(indices)
     looked = min(count, LOOKED_AT)
@@ -146,7 +146,7 @@ class BatchResult:
 
     def __repr__(self) -> str:
         s = self.summary
-        stopped = f", stopped: {text.shortened(s.stopped, 60)}" if s.stopped else ""
+        stopped = f", stopped: {text.shorten(s.stopped, 60)}" if s.stopped else ""
         return f"BatchResult({s.ok} of {s.variants} made, {s.failed} failed{stopped}; {self.folder.name})"
 
     def _repr_html_(self) -> str:
@@ -175,8 +175,8 @@ def make(
     if options.shard:
         if options.only == ("estimate",):
             raise WrongArgument("shard", str(options.shard), "estimates only are one table: leave it out")
-        whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
-        variants = counted(sweep, options.limit)
+        whole = batch_head(sweep, check_outputs(options.only), replace(options, shard=None))
+        variants = count_variants(sweep, options.limit)
         store = store_of(folder, options.shard, whole.batch, variants, options.store)
         folder, options = folder / options.shard.folder, replace(options, store=store)
     if options.only == ("estimate",) and not sweep.of_compounds:
@@ -241,7 +241,7 @@ def batch(
         where,
         store=stored,
         folders=folders_for(report, folders, chosen_outputs),
-        tables=checked_tables(None if tables is None else texts("tables", tables), report),
+        tables=check_tables(None if tables is None else texts("tables", tables), report),
         shard=None if shard is None else shard_of(shard),
     )
     summary = make(wanted, folder, options, Workers(jobs))
@@ -255,7 +255,7 @@ def folders_for(report: bool, asked: bool | None, only: Sequence[str] = OUTPUTS)
     return True if report and asked is None and tuple(only) != ("estimate",) else asked
 
 
-def checked_tables(names: Sequence[str] | None, report: bool = False) -> tuple[str, ...] | None:
+def check_tables(names: Sequence[str] | None, report: bool = False) -> tuple[str, ...] | None:
     """Return names of tables; with `report` the page's is among them. Raises WrongArgument for an unknown one."""
     for name in names or ():
         if name not in TABLES:
@@ -273,7 +273,7 @@ def merge(out: Path, folders: Sequence[Path], options: BatchOptions) -> Summary:
     start = time.perf_counter()
     shards = read_shards(folders)
     first = shards[0][1]
-    addresses = {folder: found_at(folder, record.store) for folder, record in shards}
+    addresses = {folder: resolve_address(folder, record.store) for folder, record in shards}
     opened = {address: SharedStore(address) for address in set(addresses.values())}
     stores = {folder: opened[address] for folder, address in addresses.items()}
     wanted = folders_wanted(options, first.variants)

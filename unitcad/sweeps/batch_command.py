@@ -34,7 +34,7 @@ from unitcad.meshcheck.findings import counted
 from unitcad.pipeline.write import PAGE
 from unitcad.report import write_report
 from unitcad.sweeps import load_sweep
-from unitcad.sweeps.batch_call import checked_tables, folders_for, make, merge, preview
+from unitcad.sweeps.batch_call import check_tables, folders_for, make, merge, preview
 from unitcad.sweeps.executors import Certificates, Workers
 from unitcad.sweeps.journal import Preview, Summary
 from unitcad.sweeps.result_folders import export_variants
@@ -108,7 +108,10 @@ PAGE_UP_TO = 100
 def batch(
     ctx: typer.Context,
     sweep: Annotated[
-        str, typer.Argument(metavar="SWEEP", help="Sweep file, or name of a shipped one; or merge, and shards.")
+        str,
+        typer.Argument(
+            metavar="SWEEP", help="Sweep file, or name of a shipped one (unitcad list sweeps); merge joins shards."
+        ),
     ],
     shards: Annotated[
         list[Path] | None,
@@ -202,7 +205,7 @@ def batch(
     if sweep == "merge":
         _confirm_merges(ctx)
         paged = bool(page)
-        options = BatchOptions(folders=folders_for(paged, folders), cache=cache, tables=checked_tables(named, paged))
+        options = BatchOptions(folders=folders_for(paged, folders), cache=cache, tables=check_tables(named, paged))
         _merge(shards or [], out, options, paged, as_json)
         return
     if shards:
@@ -215,7 +218,7 @@ def batch(
     usual = only is None and not (folders is False or table or store or part or scheduler)
     page = usual and wanted.count <= PAGE_UP_TO if page is None else page
     options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, store,
-        folders_for(page, folders, chosen), checked_tables(named, page), part)  # fmt: skip
+        folders_for(page, folders, chosen), check_tables(named, page), part)  # fmt: skip
     if dry_run:
         size = preview(wanted, options)
         print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)

@@ -19,7 +19,7 @@ from unitcad.pipeline.plan import code_version
 from unitcad.pipeline.write import ADDRESS, STORE, replacing, sync, whole
 from unitcad.sweeps import task as tasks
 from unitcad.sweeps.journal import JournalEntry
-from unitcad.sweeps.record_packs import export, intact, packed_specs
+from unitcad.sweeps.record_packs import export, intact, pack_specs
 from unitcad.sweeps.task import Task, VariantOutcome
 
 
@@ -54,7 +54,7 @@ class Folders:
 
     def stands(self, entry: JournalEntry) -> bool:
         folder = self.out / entry.folder
-        if not made(entry) or (whole(folder, hashes=self.verify) is None and not self._restored(entry, folder)):
+        if not is_made(entry) or (whole(folder, hashes=self.verify) is None and not self._restored(entry, folder)):
             return False
         return not self.verify or digest((folder / "manifest.json").read_bytes()) == entry.manifest
 
@@ -97,7 +97,7 @@ class InStore:
 
     def stands(self, entry: JournalEntry) -> bool:
         place = entry.record
-        if place is None or not made(entry) or self.packs.get(place.pack, 0) < place.end:
+        if place is None or not is_made(entry) or self.packs.get(place.pack, 0) < place.end:
             return False
         return not self.verify or intact(self.store, place, entry.manifest)
 
@@ -105,7 +105,7 @@ class InStore:
         return entry.manifest if entry.record else ""
 
     def task(self, task: Task) -> Task:
-        specs = packed_specs(self.store, [job.spec for job in task.jobs])
+        specs = pack_specs(self.store, [job.spec for job in task.jobs])
         jobs = tuple(replace(job, spec="") for job in task.jobs)
         cache = self.cache.root.absolute() if self.cache else None
         return replace(task, jobs=jobs, specs=specs, store=self.store.address, cache=cache)
@@ -122,7 +122,7 @@ class InStore:
         return outcome
 
 
-def made(entry: JournalEntry) -> bool:
+def is_made(entry: JournalEntry) -> bool:
     """Check whether a variant was made, with or without a broken mould check."""
     return entry.status in (tasks.OK, tasks.BROKEN)
 
@@ -170,17 +170,17 @@ def _key(geometry: str) -> str:
 
 def note_store(out: Path, address: str) -> None:
     """Note the store's place in a batch's folder. Raises OSError."""
-    files.write(out / ADDRESS, json.dumps({"store": noted(out, address)}).encode() + b"\n")
+    files.write(out / ADDRESS, json.dumps({"store": note_address(out, address)}).encode() + b"\n")
 
 
-def noted(out: Path, address: str) -> str:
+def note_address(out: Path, address: str) -> str:
     """Return a store's address as a batch in `out` notes it: relative if near the batch, so that both can move."""
     near = {str((place / STORE).absolute()): way for place, way in ((out, STORE), (out.parent, f"../{STORE}"))}
     return near.get(address, address)
 
 
-def found_at(out: Path, address: str) -> str:
-    """Return the address that a batch in `out` has `noted`."""
+def resolve_address(out: Path, address: str) -> str:
+    """Return the address that a batch in `out` has noted (`note_address`)."""
     return absolute(address if "://" in address else os.path.normpath(out / address))
 
 
@@ -188,4 +188,4 @@ def store_noted(out: Path) -> str | None:
     """Return the address of the store that a batch's folder notes, None if it notes none. Raises UnitcadError."""
     if not (out / ADDRESS).is_file():
         return None
-    return found_at(out, str(files.read_json(out / ADDRESS)["store"]))
+    return resolve_address(out, str(files.read_json(out / ADDRESS)["store"]))

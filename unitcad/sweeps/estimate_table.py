@@ -27,7 +27,7 @@ from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import Failure, Journal, JournalEntry, Summary
 from unitcad.sweeps.results import FIRST, write_results, write_timings
-from unitcad.sweeps.run import MOST_FAILURES, batch_head, counted
+from unitcad.sweeps.run import MOST_FAILURES, batch_head, count_variants
 from unitcad.sweeps.shards import BatchOptions
 from unitcad.sweeps.sweep import Sweep
 from unitcad.sweeps.task import OK
@@ -76,7 +76,7 @@ def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
 
     Raises UnitcadError for a folder that isn't ours.
     """
-    count = counted(sweep, options.limit)
+    count = count_variants(sweep, options.limit)
     head = batch_head(sweep, ("estimate",), options)
     journal = Journal(out, head)
     summary, start = Summary(count), time.perf_counter()

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from unitcad.attenuation.edge.estimates import left_out
+from unitcad.attenuation.edge.estimates import leave_one_out_errors
 from unitcad.attenuation.edge.measured import nominal
 from unitcad.attenuation.edge.models import edge_levels, stored
 from unitcad.attenuation.inputs import EstimateInput
@@ -24,7 +24,7 @@ from unitcad.errors import UnitcadError
 from unitcad.estimate_inputs import closed_forms, estimate_input, fit_of
 from unitcad.spec import Spec
 from unitcad.sweeps.sweep import Sweep
-from unitcad.text import listed
+from unitcad.text import join_words
 from unitcad.validation import from_data, put
 
 _OF_THE_UNIT = re.compile(
@@ -72,7 +72,7 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
             if told and all(np.ptp(np.log(levels)) < _SAME for levels in told):
                 unread[model].append(path)
     fit = fit_of(starts[0][1])
-    errors = left_out(starts[0][1].estimate.moduli, fit)
+    errors = leave_one_out_errors(starts[0][1].estimate.moduli, fit)
     ordered = sorted(models, key=lambda model: errors[model])
     return SweptEstimate(
         {model: float(f"{errors[model]:.6g}") for model in ordered},
@@ -107,14 +107,13 @@ def warnings(found: SweptEstimate | None) -> list[str]:
     lines = []
     for paths, models in by_keys.items():
         every = len(models) == len(found.insensitive) and len(models) > 1
-        who = "no model of the edge level reads" if every else f"{listed(models)} {_do(models)} not read"
-        lines.append(
-            f"{who} {listed(paths)}: {'the' if every else 'their' if len(models) > 1 else 'its'} level stays the same"
-        )
+        who = "no model of the edge level reads" if every else f"{join_words(models)} {_do(models)} not read"
+        whose = "the" if every else "their" if len(models) > 1 else "its"
+        lines.append(f"{who} {join_words(paths)}: {whose} level stays the same")
     for length in dict.fromkeys(found.not_measured.values()):
         same = [path for path, one in found.not_measured.items() if one == length]
         lines.append(
-            f"every measured unit had {length:g} mm for {listed(same)}: no measurement supports how a level changes "
+            f"every measured unit had {length:g} mm for {join_words(same)}: no measurement shows how a level changes "
             f"with {'it' if len(same) == 1 else 'them'}, and the error there is not known"
         )
     return lines

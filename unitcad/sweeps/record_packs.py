@@ -120,15 +120,15 @@ def offer_bundle(store: SharedStore, geometry: str, bundle: Bundle, *, anew: boo
     return store.enter(_key(geometry), vars(bundle), anew=anew)
 
 
-def packed_specs(store: SharedStore, specs: Sequence[str]) -> bytes | str:
+def pack_specs(store: SharedStore, specs: Sequence[str]) -> bytes | str:
     """Return specs deflated; the SHA-256 under which the store has them if they are large."""
     deflating = zlib.compressobj(9, zdict=_dictionary())
     packed = deflating.compress(msgspec.json.encode(list(specs))) + deflating.flush()
     return packed if len(packed) <= LARGEST_SPECS * len(specs) else store.keep(packed)
 
 
-def unpacked_specs(store: SharedStore, packed: bytes | str) -> list[str]:
-    """Return the specs of `packed_specs`."""
+def unpack_specs(store: SharedStore, packed: bytes | str) -> list[str]:
+    """Return the specs of `pack_specs`."""
     content = store.content(packed) if isinstance(packed, str) else packed
     return msgspec.json.decode(zlib.decompressobj(zdict=_dictionary()).decompress(content), type=list[str])
 

@@ -15,7 +15,7 @@ from unitcad import files
 from unitcad.cache import DiskStore, MissingContent, SharedStore, absolute
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.pipeline.write import STORE, placing, whole
-from unitcad.sweeps.destination import Destination, Folders, InStore, Receiver, made, note_store, store_noted
+from unitcad.sweeps.destination import Destination, Folders, InStore, Receiver, is_made, note_store, store_noted
 from unitcad.sweeps.journal import JOURNAL, JournalEntry, RecordPlace
 from unitcad.sweeps.record_packs import export, read_record
 from unitcad.sweeps.shards import BatchOptions
@@ -77,7 +77,7 @@ def make_folders(
     done: set[str] = set()
     with files.scratch(out) as scratch:
         for entry in entries:
-            if entry.record is None or not made(entry) or entry.folder in done:
+            if entry.record is None or not is_made(entry) or entry.folder in done:
                 continue
             done.add(entry.folder)
             if whole(out / entry.folder) is not None:
@@ -157,7 +157,7 @@ def _entry_of(batch: Path, wanted: str) -> JournalEntry:
                         found[entry.folder] = entry
     except OSError as error:
         why = (error.strerror or "unreadable").lower()
-        raise UnitcadError(f"{batch / JOURNAL}: {why}; --batch names the folder of a batch") from None
+        raise UnitcadError(f"{batch}: no batch here ({JOURNAL}: {why}); --batch names the folder of a batch") from None
     if not found:
         raise WrongArgument("hash", wanted, f"no variant in {batch} has a hash that begins so")
     if len(found) > 1:

@@ -17,11 +17,11 @@ from pathlib import Path
 from unitcad import __version__
 from unitcad.cache import DiskStore, absolute, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
-from unitcad.pipeline.plan import checked_outputs, code_version, kernel_versions
+from unitcad.pipeline.plan import check_outputs, code_version, kernel_versions
 from unitcad.pipeline.subjects import subject
 from unitcad.pipeline.write import clear_leftovers
 from unitcad.sweeps import task as tasks
-from unitcad.sweeps.destination import Destination, InStore, noted
+from unitcad.sweeps.destination import Destination, InStore, note_address
 from unitcad.sweeps.insensitive_keys import swept_estimate
 from unitcad.sweeps.insensitive_keys import warnings as insensitive_warnings
 from unitcad.sweeps.journal import JOURNAL, BatchHead, Failure, Journal, JournalEntry, Summary
@@ -62,8 +62,8 @@ def run(
     results come back as messages. Variants that an earlier run in `out` finished are not made again. Raises
     UnitcadError if nothing can be run; the summary has the outcome of each variant.
     """
-    head = batch_head(sweep, checked_outputs(options.only), options)
-    count = counted(sweep, options.limit)
+    head = batch_head(sweep, check_outputs(options.only), options)
+    count = count_variants(sweep, options.limit)
     indices = options.shard.indices(count) if options.shard else range(count)
     summary = Summary(len(indices))
     cache = DiskStore(options.cache or default_root())
@@ -116,7 +116,7 @@ def trim(options: BatchOptions) -> None:
 
 def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> BatchHead:
     """Return the batch's identity, for its journal and its tables."""
-    parts = () if options.shard is None else (options.shard, counted(sweep, options.limit))
+    parts = () if options.shard is None else (options.shard, count_variants(sweep, options.limit))
     return BatchHead(
         batch=digest(repr((sweep.hash, only, options.check, *parts)).encode())[:16],
         name=sweep.name,
@@ -127,7 +127,7 @@ def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> Ba
     )
 
 
-def counted(sweep: Sweep, limit: int | None) -> int:
+def count_variants(sweep: Sweep, limit: int | None) -> int:
     """Count the variants to make. Raises Refusal for more than MOST without a limit, and for a limit below one."""
     if limit is not None and limit < 1:
         raise WrongArgument("limit", limit, "needs a number of variants from 1 on", 1)
@@ -156,7 +156,7 @@ class _Batch:
         self.sweep, self.options, self.executor, self.room = sweep, options, executor, room
         self.watch, self.journal, self.destination, self.summary = watch, journal, destination, summary
         self.indices, self.turn = indices, _turn(options.shard)
-        self.only = checked_outputs(options.only)
+        self.only = check_outputs(options.only)
         self.coming = self._to_make()
         self.groups: dict[str, _GeometryJobs] = {}
         self.waiting = 0
@@ -345,7 +345,7 @@ def count_entry(summary: Summary, status: str, entry: Callable[[], JournalEntry 
 def shard_record(out: Path, sweep: Sweep, head: BatchHead, options: BatchOptions, count: int) -> ShardRecord:
     """Return the head of a shard's journal: that of the batch without shards."""
     assert options.shard
-    whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
+    whole = batch_head(sweep, check_outputs(options.only), replace(options, shard=None))
     return ShardRecord(
         number=options.shard.number,
         of=options.shard.of,
@@ -353,7 +353,7 @@ def shard_record(out: Path, sweep: Sweep, head: BatchHead, options: BatchOptions
         head=whole,
         shard_head=head,
         code=code_version(),
-        store=noted(out, absolute(options.store or "")),
+        store=note_address(out, absolute(options.store or "")),
         sweep=replace(sweep, written=()),  # paths of this machine
     )
 

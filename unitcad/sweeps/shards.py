@@ -18,7 +18,7 @@ from unitcad.cache import DEFAULT_LIMIT_MB, absolute
 from unitcad.errors import UnitcadError, WrongArgument
 from unitcad.pipeline.write import STORE
 from unitcad.spec.raw import OUTPUTS
-from unitcad.sweeps.destination import found_at
+from unitcad.sweeps.destination import resolve_address
 from unitcad.sweeps.journal import SHARDS, BatchHead, batch_in
 from unitcad.sweeps.sweep import Sweep
 from unitcad.text import some
@@ -104,7 +104,7 @@ def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | No
         raise UnitcadError(f"{out}: has another batch, so shards can not be merged there; choose another with -o")
     kept, own = None, out / shard.folder
     if asked is None and (begun := _record(own)) is not None:
-        asked = found_at(own, begun.store)
+        asked = resolve_address(own, begun.store)
     for other in shard_folders(out):
         of = int(other.name.rpartition("-")[2])
         if of != shard.of:
@@ -119,7 +119,7 @@ def store_of(out: Path, shard: Shard, batch: str, variants: int, asked: str | No
                 f"{out}: {other.name} is of another batch (sweep, --set, --only, --no-check or --limit), so this shard "
                 "can't be merged with it; run it as that one was, or choose another folder with -o"
             )
-        kept = found_at(other, record.store)
+        kept = resolve_address(other, record.store)
         if asked is not None and absolute(asked) != kept:
             raise UnitcadError(
                 f"{out}: {other.name} has its results in the store {kept}, so this shard can't have them in "
@@ -147,7 +147,7 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
     Raises UnitcadError if one is missing, there twice, or of another batch.
     """
     if not folders:
-        raise UnitcadError("there are no shards to merge: name their folders, or their common parent")
+        raise UnitcadError("SHARD...: is required: folders of shards, or their common parent; see unitcad batch --help")
     records: dict[int, tuple[Path, ShardRecord]] = {}
     for folder in folders:
         try:

@@ -27,7 +27,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from msgspec import Meta, Struct, field, structs
 
 from unitcad.cache import digest
-from unitcad.errors import Refusal, UnitcadError, UnknownKey
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, format_value
 from unitcad.files import names_device, read_text
 from unitcad.pipeline.subjects import subject_of_data
 from unitcad.rooms import load
@@ -404,7 +404,8 @@ def _values(path: str, given: Any, mode: Mode) -> Sequence[Any] | Range:
     seen = [json.dumps(value) for value in values]
     twice = next((value for value, text in zip(values, seen, strict=True) if seen.count(text) > 1), None)
     if mode != "zip" and len(set(seen)) < len(seen) and len(seen) <= 10_000:
-        raise Refusal(f"sweep.{path}", twice, "is there twice")
+        once = [json.loads(text) for text in dict.fromkeys(seen)]
+        raise Refusal(f"sweep.{path}", values, f'has {format_value(twice)} twice; only mode = "zip" may repeat', once)
     return values
 
 

@@ -47,7 +47,7 @@ class Job:
 class Task:
     """Variants of one geometry, and how to make them.
 
-    With `store` (an address) results go there, and `specs` are the jobs' specs by `record_packs.packed_specs`; work is
+    With `store` (an address) results go there, and `specs` are the jobs' specs by `record_packs.pack_specs`; work is
     then shared by `cache` if there is one, else by the store. With `out` and `cache` (folders that the worker
     reaches) results go there. Without, they are in the outcomes, and `known` are the caller's files of this geometry.
     `allowed` is the code that the caller may run, and so may the worker.
@@ -131,7 +131,7 @@ def _into_store(task: Task, store: SharedStore) -> list[VariantOutcome]:
     """Make a task's variants, put new contents into the store, and return rows: when they return, all is there."""
     anew = any(job.damaged for job in task.jobs)
     try:
-        specs = record_packs.unpacked_specs(store, task.specs)
+        specs = record_packs.unpack_specs(store, task.specs)
         known = None if anew or task.cache else record_packs.known_bundle(store, task.geometry)
     except Exception as error:
         return [failure(job.index, error) for job in task.jobs]

@@ -22,8 +22,8 @@ from unitcad.spec.custom_code import is_body_file, with_source
 from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import line_of
 from unitcad.validation.defaults import resolve
-from unitcad.validation.plain_data import ABSENT, Changes, Source, asked_of, at, changes_of, plain, put
-from unitcad.validation.suggestions import every_fault, suggested
+from unitcad.validation.plain_data import ABSENT, Changes, Source, at, changes_of, plain, put, requested_data
+from unitcad.validation.suggestions import every_fault, suggest
 
 
 def shipped_files(kind: str = "") -> dict[str, Path]:
@@ -43,7 +43,7 @@ def is_path(text: str) -> bool:
     return os.sep in text or "/" in text or text.endswith(".toml")
 
 
-def spelled(text: str, known: Iterable[str]) -> str:
+def spell_path(text: str, known: Iterable[str]) -> str:
     """Return a text that names a file by its path, or one of `known`; for NAME of a file NAME.toml here, NAME.toml."""
     own = f"{text}.toml"
     return own if text not in known and not is_path(text) and os.path.isfile(own) else text
@@ -57,8 +57,8 @@ def expect_kind(data: Mapping[str, object], source: str, kind: str) -> None:
 
 
 def named_file(text: str, known: Mapping[str, Path], field: str, kind: type[Refusal] = Refusal) -> Path:
-    """Return the file that a text names, see `spelled`, there or not. Raises `kind`, of that field, for other text."""
-    text = spelled(text, known)
+    """Return the file that a text names (`spell_path`), there or not. Raises `kind`, of that field, for other text."""
+    text = spell_path(text, known)
     if text in known:
         return known[text]
     path = Path(text)
@@ -142,7 +142,7 @@ def compound_kind(source: object) -> FileKind | None:
         return next((kind for kind in _compounds() if all(key in source for key in kind.keys)), None)
     if not isinstance(source, str | os.PathLike):
         return None
-    text = spelled(os.fspath(source), every_template())
+    text = spell_path(os.fspath(source), every_template())
     if text in templates():
         return None
     if not is_path(text):
@@ -154,9 +154,9 @@ def compound_kind(source: object) -> FileKind | None:
 
 
 def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArgument) -> str:
-    """Return a name as `spelled` does. Raises `kind`, of that field, for a name of no template and no file's path."""
+    """Return a name as `spell_path` does. Raises `kind`, of that field, if it names no template or file."""
     named_file(name, every_template(), field, kind)
-    return spelled(name, every_template())
+    return spell_path(name, every_template())
 
 
 def default_template() -> str:
@@ -211,8 +211,8 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
             raise UnitcadError(f"{given} is no spec: name a template or a file, or give a dict, a Spec or a Variant")
         if not changes and not makeable:
             return spec
-        data = asked_of(spec, from_data)
-    data = changed(data, changes)
+        data = requested_data(spec, from_data)
+    data = apply_changes(data, changes)
     whole = with_source(data, Path())
 
     def settled(data: dict[str, Any]) -> Spec:
@@ -228,7 +228,7 @@ def load(source: Source, set: Changes = (), makeable: Callable[[Spec], object] |
         raise _locate(every, data, source) from None
 
 
-def changed(data: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]) -> dict[str, Any]:
+def apply_changes(data: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]) -> dict[str, Any]:
     """Return `data` with changes by `changes_of` put in."""
     result = dict(data)
     for change in changes:
@@ -287,7 +287,7 @@ def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
     except UnknownKey:
         raise
     except Refusal as refusal:
-        raise suggested(refusal, plain, judge, _sound(plain)) from None
+        raise suggest(refusal, plain, judge, _sound(plain)) from None
 
 
 def judge(data: dict[str, Any]) -> dict[str, Any]:
@@ -339,7 +339,7 @@ def all_faults(first: Refusal, data: Mapping[str, Any], text: str) -> list[Refus
 def _file(source: Source) -> Path | None:
     """Return the file that a text names by its path."""
     known = every_template()
-    text = spelled(os.fspath(source), known) if isinstance(source, str | os.PathLike) else ""
+    text = spell_path(os.fspath(source), known) if isinstance(source, str | os.PathLike) else ""
     return Path(text) if is_path(text) and text not in known else None
 
 

@@ -148,7 +148,7 @@ def plain(node: object, field: str = "") -> Any:
     raise Refusal(field, None, f"takes no {type(node).__name__}: only numbers, texts, lists and tables")
 
 
-def asked_of(spec: Spec, settle: Callable[[dict[str, Any]], Spec]) -> dict[str, Any]:
+def requested_data(spec: Spec, settle: Callable[[dict[str, Any]], Spec]) -> dict[str, Any]:
     """Return a spec's data without the values that `settle` works out alike, so that they follow a change of others."""
     data = to_data(spec)
     bare = copy.deepcopy(data)

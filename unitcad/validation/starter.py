@@ -20,7 +20,7 @@ _ABOUT_TABLES = (
 )
 
 
-def commented(template: Path, name: str, model: type[Struct], schema: str) -> str:
+def comment_template(template: Path, name: str, model: type[Struct], schema: str) -> str:
     """Return a template's text under another name, with the further keys of its `model` commented out below.
 
     Its first line names the `schema` file for an editor.

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Any, TypeGuard
 
-from unitcad.errors import Refusal, UnitcadError, UnknownKey, shown
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, format_value
 from unitcad.text import number
 from unitcad.validation.plain_data import ABSENT, at, drop, put
 
@@ -43,7 +43,7 @@ def with_changes(data: Mapping[str, Any], changes: Changes) -> dict[str, Any]:
     return changed
 
 
-def refused(data: Mapping[str, Any], changes: Changes, judge: Judge) -> Refusal | None:
+def find_refusal(data: Mapping[str, Any], changes: Changes, judge: Judge) -> Refusal | None:
     """Return why data are refused after changes; None if they are accepted."""
     try:
         judge(with_changes(data, changes))
@@ -54,7 +54,7 @@ def refused(data: Mapping[str, Any], changes: Changes, judge: Judge) -> Refusal 
     return None
 
 
-def followed(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> tuple[dict[str, object], list[Refusal]]:
+def follow(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> tuple[dict[str, object], list[Refusal]]:
     """Put in the value that a refusal offers, then the one that the next refusal offers, and so on.
 
     Returns the changes with which data are accepted, {} if none are found, and the refusals on the way.
@@ -66,7 +66,7 @@ def followed(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> tuple[d
         if last.nearest is None or isinstance(last, UnknownKey) or changes.get(last.field) == last.nearest:
             break
         changes[last.field] = last.nearest
-        after = refused(data, changes, judge)
+        after = find_refusal(data, changes, judge)
         if after is None:
             return changes, met
         met.append(after)
@@ -77,7 +77,7 @@ def nearest_number(data: Mapping[str, Any], path: str, good: float, bad: float, 
     """Return the accepted number nearest to a refused one, on the way from an accepted one; a short one if it can."""
 
     def taken(value: float) -> bool:
-        return refused(data, {path: value}, judge) is None
+        return find_refusal(data, {path: value}, judge) is None
 
     whole = isinstance(good, int) and isinstance(bad, int) and not taken(good + (bad > good) - 0.5)
     low, high = good, bad
@@ -93,7 +93,7 @@ def nearest_number(data: Mapping[str, Any], path: str, good: float, bad: float, 
     return next((value for value in rounded if least <= value <= most and taken(value)), low)
 
 
-def suggested(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Refusal:
+def suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Refusal:
     """Return the first refusal of data with a suggestion, whatever further faults the data have.
 
     `sound` is the data of a file without faults.
@@ -104,7 +104,7 @@ def suggested(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Ma
 
 
 def every_fault(first: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> list[Refusal]:
-    """Return the faults of data, `first` among them, the one that was met. `sound`: see `suggested`."""
+    """Return the faults of data, `first` among them, the one that was met. `sound`: see `suggest`."""
     try:
         every = faults(data, judge, sound)
     except RecursionError:  # nested too deeply to be looked through again
@@ -116,7 +116,7 @@ def every_fault(first: Refusal, data: Mapping[str, Any], judge: Judge, sound: Ma
 
 def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> list[Refusal]:
     """Return the faults of data, in the order in which they are met, each with a suggestion for when the others are
-    gone. `sound`: see `suggested`.
+    gone. `sound`: see `suggest`.
     """
     typed: list[tuple[Refusal, Changes]] = []
     renamed = False
@@ -129,7 +129,7 @@ def faults(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> l
         first = typed[0][0]
         if first.field in culprit:
             return [Refusal(first.field, first.value, first.limit, culprit[first.field])]
-        return [Refusal(first.field, first.value, f"{first.limit}; {listed(culprit, 'and')} would do")]
+        return [Refusal(first.field, first.value, f"{first.limit}; {write_changes(culprit, 'and')} would do")]
     every = []
     for refusal, _ in typed:
         others = {path: value for other, passed in typed if other is not refusal for path, value in passed.items()}
@@ -144,7 +144,7 @@ def _accepted_together(
     """Return faults whose suggestions are accepted together, if there are any such."""
     passes = {path: value for _, passed in typed for path, value in passed.items()}
     offers = {one.field: one.nearest for one in every if not isinstance(one, UnknownKey) and one.nearest is not None}
-    if refused(data, {**passes, **offers}, judge) is None or refused(data, passes, judge) is not None:
+    if find_refusal(data, {**passes, **offers}, judge) is None or find_refusal(data, passes, judge) is not None:
         return every
     return [
         one
@@ -154,10 +154,12 @@ def _accepted_together(
     ]
 
 
-def listed(changes: Changes, word: str) -> str:
+def write_changes(changes: Changes, word: str) -> str:
     """Write changes as a person types them."""
     texts = [
-        f"no {path}" if value is None else f"{path} = {number(value, 6) if isinstance(value, float) else shown(value)}"
+        f"no {path}"
+        if value is None
+        else f"{path} = {number(value, 6) if isinstance(value, float) else format_value(value)}"
         for path, value in changes.items()
     ]
     return f" {word} ".join(texts)
@@ -170,7 +172,7 @@ def is_number(value: object) -> TypeGuard[float]:
 
 def _does(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> bool:
     """Tell whether data are accepted with the value that a refusal offers."""
-    return refusal.nearest is not None and refused(data, {refusal.field: refusal.nearest}, judge) is None
+    return refusal.nearest is not None and find_refusal(data, {refusal.field: refusal.nearest}, judge) is None
 
 
 def _suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Refusal:
@@ -178,7 +180,7 @@ def _suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Map
     if isinstance(refusal, UnknownKey) or _does(refusal, data, judge):
         return refusal
     field, value, limit = refusal.field, refusal.value, refusal.limit
-    together, met = followed(refusal, data, judge)
+    together, met = follow(refusal, data, judge)
     own = [one for one in met if one.field == field]
     if own[-1].limit != limit:
         limit = f"{limit}, and {own[-1].limit}"
@@ -188,13 +190,13 @@ def _suggest(refusal: Refusal, data: Mapping[str, Any], judge: Judge, sound: Map
     if bad is not None:
         for good in good_numbers(data, field, judge, sound):
             if own[-1].nearest is not None and met[-1] is not own[-1]:
-                limit = f"{limit}; at {shown(bad)}, {bare(met[met.index(own[-1]) + 1])}"
+                limit = f"{limit}; at {format_value(bad)}, {bare(met[met.index(own[-1]) + 1])}"
             return Refusal(field, value, limit, nearest_number(data, field, good, bad, judge))
     if culprit := culprit_of(data, judge, sound):
-        return Refusal(field, value, f"{limit}; {listed(culprit, 'and')} would do")
+        return Refusal(field, value, f"{limit}; {write_changes(culprit, 'and')} would do")
     if field in together:
         rest = {path: other for path, other in together.items() if path != field}
-        limit = f"{limit}; the value offered here also needs {listed(rest, 'and')}"
+        limit = f"{limit}; the value offered here also needs {write_changes(rest, 'and')}"
         return Refusal(field, value, limit, together[field])
     return Refusal(field, value, limit)
 
@@ -261,7 +263,7 @@ def _is_wrong_by_itself(refusal: Refusal, data: Mapping[str, Any], judge: Judge,
     given, table = at(data, refusal.field), refusal.field.rpartition(".")[0]
     if given is not ABSENT and table and at(data, table) is ABSENT:  # a key with dots in it, as a sweep has them
         return True
-    return refused(sound, {refusal.field: None if given is ABSENT else given}, judge) is not None
+    return find_refusal(sound, {refusal.field: None if given is ABSENT else given}, judge) is not None
 
 
 def _refusals(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -> Iterator[tuple[Refusal, Changes]]:
@@ -269,7 +271,7 @@ def _refusals(data: Mapping[str, Any], judge: Judge, sound: Mapping[str, Any]) -
     changes: dict[str, object] = {}
     seen = set[str]()
     while len(seen) < MOST:
-        refusal = refused(data, changes, judge)
+        refusal = find_refusal(data, changes, judge)
         if refusal is None or not refusal.field or refusal.field in seen:
             return
         seen.add(refusal.field)
@@ -297,7 +299,7 @@ def _pass_over(
     ways += [{path: None} for path in (field, table) if path]
     first: Changes = {}
     for way in ways:
-        after = refused(data, {**changes, **way}, judge)
+        after = find_refusal(data, {**changes, **way}, judge)
         if after is None:
             return way
         if after.field != field:

@@ -19,7 +19,7 @@ from unitcad.arrays.piece_seams import (
     on_pieces,
     round_units,
     sheet_mm2,
-    sized,
+    size_tool,
     too_much,
 )
 from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile, stopped_ring
@@ -42,7 +42,7 @@ from unitcad.moulds.pieces import (
     blade_piece,
     corner_labels,
     cup_piece,
-    engraved,
+    engrave,
     filament_pieces,
     row_width,
     set_label,
@@ -133,14 +133,14 @@ def _cut(drawn: Drawing) -> Drawing:
         return pry_slots(drawn.spec, drawn.lay, found, drawn.pins.places, drawn.hole)
 
     under = [box_feature(*filament.groove(drawn.spec, drawn.lay, cell)) for cell in drawn.lay.cells]
-    bases = sized(array, (-plate[0], -plate[1], *plate), clear, close, under)
+    bases = size_tool(array, (-plate[0], -plate[1], *plate), clear, close, under)
     try:
         base = seams(bases, what, play, fault=lambda found: levers(found)[1])
     except Refusal:
         # The bed that would do must do for the cups too.
         base = seams(bases, what, play, fault=lambda found: levers(found)[1] or fault(found))
     what = f"a cup of {2 * x:.4g} x {2 * y:.4g} mm"
-    cups = seams(sized(array, (-x, -y, x, y), clear, close), what, play, base, fault)
+    cups = seams(size_tool(array, (-x, -y, x, y), clear, close), what, play, base, fault)
     cut_at = replace(drawn, base_seams=base, cup_seams=cups, pry=levers(base)[0])
     return replace(cut_at, pins=replace(drawn.pins, places=(*drawn.pins.places, *_more_pins(cut_at))))
 
@@ -254,11 +254,11 @@ def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: boo
     sheets = [last and pour == len(cast) for pour in pours]
     blanks = [_base(drawing), *(_cup(drawing, pour - 1, last=sheets[pour - 1]) for pour in pours)]
     label = label or set_label((*blanks, *(shape for shapes in cast for shape in shapes)))
-    base = base_piece(engraved(blanks[0], _base_letters(drawing, f"B{label}")))
+    base = base_piece(engrave(blanks[0], _base_letters(drawing, f"B{label}")))
     base = replace(base, removal=DOWN) if last else base
     cups = []
     for pour, blank in zip(pours, blanks[1:], strict=True):
-        cup = cup_piece(pour, engraved(blank, _cup_letters(drawing, pour, label)))
+        cup = cup_piece(pour, engrave(blank, _cup_letters(drawing, pour, label)))
         # The last cup is a tray for the sheet: printed as drawn, and the patch leaves it, not it the patch.
         cups.append(replace(cup, upside_down=False, removal=None) if sheets[pour - 1] else cup)
     filaments = filament_pieces([filament.piece(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
@@ -695,7 +695,7 @@ def plan(array: Array) -> Plan:
     return tools_plan(array, layers(array))
 
 
-def greased(array: Array, pour: int) -> str:
+def seal_places(array: Array, pour: int) -> str:
     """Return the places at which the slits of the fins are sealed before the cup of a pour (from 1) is put on."""
     ridges = fins(array, wiring(array))
     if not ridges:
@@ -734,5 +734,5 @@ CONSTRUCTION = Construction(
     bodies=bodies,
     plan=plan,
     assembly=assembly,
-    greased=greased,
+    greased=seal_places,
 )

@@ -19,7 +19,7 @@ from unitcad.errors import Refusal
 from unitcad.moulds.base import core
 from unitcad.moulds.cup import PIN_RADIUS, Pins, pin_holes, standing_pins
 from unitcad.moulds.lid import MESH_ROOM, THICKNESS, TILT_DEG, VENT, deepest
-from unitcad.moulds.pieces import CAST, Removal, base_piece, engraved, filament_pieces, lid_piece, set_label
+from unitcad.moulds.pieces import CAST, Removal, base_piece, engrave, filament_pieces, lid_piece, set_label
 from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import (
     Common,
@@ -185,8 +185,8 @@ def curved_plan(
     pour = len(flat) + 1
     base, lid = _base(former), _lid(former)
     label = set_label((base, lid, poured, *(shape for shapes in flat for shape in shapes)))
-    base = base_piece(engraved(base, _base_letters(former, f"B{pour:X}{label}")))
-    lid = lid_piece(pour, engraved(lid, _lid_letters(former, f"L{pour:X}{label}")))
+    base = base_piece(engrave(base, _base_letters(former, f"B{pour:X}{label}")))
+    lid = lid_piece(pour, engrave(lid, _lid_letters(former, f"L{pour:X}{label}")))
     ways = [_down(axis(array, place.x)) for place in array.places]
     filaments = [
         replace(piece, removal=way) for piece, way in zip(filament_pieces(_filaments(former)), ways, strict=True)
@@ -471,7 +471,7 @@ def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Le
     return Level(top - thickness, top, top - roof)
 
 
-def laid_in(array: Array) -> tuple[tuple[Shape, ...], ...]:
+def draw_inner_layers(array: Array) -> tuple[tuple[Shape, ...], ...]:
     """Draw the inner layers at their places around the limb, pour by pour, a solid a unit."""
     drawn, count = _of_place(array), len(array.unit.layers) - 1
     return tuple(
@@ -518,7 +518,7 @@ def poured(array: Array) -> Shape:
 
 def bodies(array: Array) -> tuple[Body, ...]:
     """Return the silicone as it is worn, a body a pour."""
-    shapes = [*(union(pour) for pour in laid_in(array)), poured(array)]
+    shapes = [*(union(pour) for pour in draw_inner_layers(array)), poured(array)]
     return tuple(
         Body(f"layer{i + 1}", "unit", "layer", shape, layer_colour(i), made="cast", step=i + 1)
         for i, shape in enumerate(shapes)
@@ -534,7 +534,7 @@ def plan(array: Array) -> Plan:
         return radius + (there.low + there.high) / 2
 
     check_limb(array, back_sheet.apart(spec)[0], middle)
-    return curved_plan(array, back_sheet.layers(array)[:-1], laid_in(array), poured(array))
+    return curved_plan(array, back_sheet.layers(array)[:-1], draw_inner_layers(array), poured(array))
 
 
 def assembly(array: Array) -> tuple[Fitting, ...]:
@@ -559,5 +559,5 @@ CONSTRUCTION = Construction(
     bodies=bodies,
     plan=plan,
     assembly=assembly,
-    greased=back_sheet.greased,
+    greased=back_sheet.seal_places,
 )

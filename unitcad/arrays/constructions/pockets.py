@@ -13,7 +13,7 @@ from unitcad.arrays.piece_seams import (
     on_pieces,
     round_units,
     sheet_mm2,
-    sized,
+    size_tool,
     too_much,
 )
 from unitcad.arrays.sheet import bent_stretches, rounded, slot_profile
@@ -24,7 +24,7 @@ from unitcad.kernels.mesh import realise, segment_count, thick_pieces
 from unitcad.moulds.cavities import united
 from unitcad.moulds.cuts import Seam, seams, split
 from unitcad.moulds.layout import groove_depth_of
-from unitcad.moulds.pieces import CAST, Removal, bar, base_piece, blade_piece, engraved, set_label
+from unitcad.moulds.pieces import CAST, Removal, bar, base_piece, blade_piece, engrave, set_label
 from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import Extrude, Shape, cut, cylinder, moved, ring, union
 from unitcad.shape.lettering import HEIGHT
@@ -56,7 +56,7 @@ def tray_plan(array: Array, cast: Shape) -> Plan:
     letters = on_pieces(Strip(outer, wall, stroke, heights, "bottom"), [(f"B{label}",)], cut_at)
     half = (outer[2] - outer[0]) / 2, (outer[3] - outer[1]) / 2
     strike = blade_piece(bar(half[1], sheet.thickness_mm), too_long=longer_than_bed(spec, 2 * half[1]))
-    tools = base_piece(engraved(drawn, letters)), strike
+    tools = base_piece(engrave(drawn, letters)), strike
     layout = Layout((Cell(0.0, 0.0, ()),), 0.0, 0.0, half, half, half, HEIGHT * stroke)
     step = Step(
         index=1,
@@ -129,7 +129,7 @@ def _seams(array: Array, outer: Box) -> tuple[Seam, ...]:
     plate, thickness = array.unit.moulds.plate_mm, array.sheet.thickness_mm
     area = sheet_mm2(array) - sum(math.pi * (place.radius - array.sheet.hold_mm) ** 2 for place in array.places)
     fault = too_much(array, outer, (plate, plate + thickness), area * thickness)
-    return seams(sized(array, outer, kept, kept), what, array.unit.moulds.plinth_clearance_mm, fault=fault)
+    return seams(size_tool(array, outer, kept, kept), what, array.unit.moulds.plinth_clearance_mm, fault=fault)
 
 
 LEAST_WEB = 2.0

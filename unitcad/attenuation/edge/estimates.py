@@ -16,7 +16,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from unitcad.attenuation.curve import decay_at, layered_block
-from unitcad.attenuation.edge.level import edge_level, model_block, ranged, unknown
+from unitcad.attenuation.edge.level import edge_level, model_block, range_notes, unknown
 from unitcad.attenuation.edge.measured import (
     CLASSES,
     LENGTHS,
@@ -37,15 +37,15 @@ from unitcad.attenuation.edge.models import (
     Assessment,
     assessments,
     choice,
-    classes_out,
     in_order,
+    leave_one_class_out,
     pairwise,
     rules,
 )
-from unitcad.attenuation.edge.ranges import LabFit, error_block, held, lead_of, own_block, predictive_of
+from unitcad.attenuation.edge.ranges import LabFit, coverage, error_block, lead_of, own_block, predictive_of
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import measurements
-from unitcad.text import listed, number
+from unitcad.text import join_words, number
 
 PAPER = "the paper"
 """Who measured the catalogue's levels."""
@@ -73,19 +73,19 @@ def answer(
     `too_far` from the measured ones). `p10`, `p50` and `p90`: the leading model's median and 80 % range, fractions of
     the motor's amplitude. `analytic`: the levels of the paper's model.
 
-    Errors are factors with the unit left out. `held`: how many of the nine measured units lay in the range that was
+    Errors are leave-one-out factors. `coverage`: how many of the nine measured units are in the range that was
     predicted without them. `class_mean` is the baseline.
 
     With a lab's fit `measured` and `nearest` are the lab's own; `elsewhere` is the paper's measurement of this unit.
     """
-    lead, errors = lead_of(variant.moduli, fit), left_out(variant.moduli, fit)
+    lead, errors = lead_of(variant.moduli, fit), leave_one_out_errors(variant.moduli, fit)
     expected = predictive_of([variant], fit)
     low, middle, high = (float(end[0]) for end in expected.range)
     known, measured = bool(np.isfinite([low, middle, high]).all()), _measured(estimated, fit)
     far = known and not measured and (high > _WIDEST * low or high > _MOST)
     group = int(unit_class(nominal(variant))[0])
     stated = not far and levels[lead.model]["value"] is not None
-    best = assessments(variant.moduli)[lead.model].left_out
+    best = assessments(variant.moduli)[lead.model].leave_one_out
     data: dict[str, Any] = {
         "model": lead.model if known else None,
         "level": measured[0]["level"] if measured else middle if stated else None,
@@ -99,12 +99,12 @@ def answer(
         "class": CLASSES[group],
         "class_mean": _class_mean(variant, group, fit),
         "baseline_error": errors[BASELINE],
-        "held": None if fit else held(variant.moduli),
+        "coverage": None if fit else coverage(variant.moduli),
         "measured": measured,
         "elsewhere": _of_paper(estimated) if fit else [],
         "nearest": _nearest(variant, fit),
         "highest": _highest(fit),
-        "analytic": {name: {**levels[name], "left_out": errors[name]} for name in ANALYTIC},
+        "analytic": {name: {**levels[name], "leave_one_out": errors[name]} for name in ANALYTIC},
     }
     headline = _headline(data, levels, fit)
     return {
@@ -115,11 +115,11 @@ def answer(
     }
 
 
-def left_out(moduli: Moduli = "small-strain", fit: LabFit | None = None) -> dict[str, float]:
-    """Return each model's typical factor with the unit left out: on the lab's own units, or on the paper's nine."""
+def leave_one_out_errors(moduli: Moduli = "small-strain", fit: LabFit | None = None) -> dict[str, float]:
+    """Return each model's leave-one-out error, a factor: on the lab's own units, or on the paper's nine."""
     if fit:
-        return {name: one.own_left_out or one.left_out for name, one in fit.model.items()}
-    return {name: one.left_out.geometric_mean for name, one in assessments(moduli).items()}
+        return {name: one.own_leave_one_out or one.leave_one_out for name, one in fit.model.items()}
+    return {name: one.leave_one_out.geometric_mean for name, one in assessments(moduli).items()}
 
 
 def percent(level: float) -> str:
@@ -240,10 +240,10 @@ def _second(data: dict[str, Any]) -> str:
         f", above every measured level ({percent(most)})" if max(published["high"], corrected["high"]) > most else ""
     )
     return (
-        f"The paper's analytic model from this unit's moduli: {_level(published)} as published, {_level(corrected)} "
-        f"corrected{above} (its path of u_z through the walls, scaled to the measured units). Typical error on "
-        f"measured units left out: x {number(published['left_out'], 3, zeros=True)}; of four class means "
-        f"x {number(data['baseline_error'], 3, zeros=True)}."
+        f"The paper's analytic model with this unit's moduli: {_level(published)} as published, {_level(corrected)} "
+        f"corrected{above} (its path of u_z through the walls, scaled to the measured units). Leave-one-out error: "
+        f"factor {number(published['leave_one_out'], 3, zeros=True)}; baseline, the means of four classes: "
+        f"{number(data['baseline_error'], 3, zeros=True)}."
     )
 
 
@@ -260,21 +260,19 @@ def _details(
 ) -> Iterator[str]:
     """Say how sure the answer is: errors, unmeasured inputs, units that the models can't tell apart, the skin."""
     name, error = data["model"] or RULE, number(data["typical_error"], 3, zeros=True)
-    worst = (
-        f", worst x {number(data['worst_error'], 3, zeros=True)} ({data['worst_at']})" if data["worst_error"] else ""
-    )
+    worst = f", worst {number(data['worst_error'], 3, zeros=True)} ({data['worst_at']})" if data["worst_error"] else ""
     if name == RULE and fit is None:
         chosen = number(choice(variant.moduli).score.geometric_mean, 3, zeros=True)
-        worst += f"; x {chosen} if its form is chosen without the unit too"
+        worst += f"; {chosen} if the form of the rule is chosen without the unit too"
     units = f"the units of {fit.name}" if fit else "the nine measured units"
     yield (
-        f"Error of {name} on {units}, each left out: x {error} typical{worst}; four class means: x "
+        f"Leave-one-out error of {name} on {units}: factor {error} typical{worst}; baseline: "
         f"{number(data['baseline_error'], 3, zeros=True)}. Leaving out a whole class costs more: see the table of "
         "classes."
     )
-    if data["held"] is not None:
-        knows = " The range above knows this unit's own level, so it is narrower." if data["measured"] else ""
-        yield f"80 % range: it held {data['held']} of the nine measured units, each predicted without it.{knows}"
+    if data["coverage"] is not None:
+        knows = " The range above also uses this unit's own level, so it is narrower." if data["measured"] else ""
+        yield f"Coverage of the 80 % range: {data['coverage']} of 9 measured units, each predicted without it.{knows}"
     middle, value = data["p50"], levels[name]["value"]
     if middle is not None and value is not None and percent(middle) != percent(value):
         yield (
@@ -285,14 +283,14 @@ def _details(
         yield f"{PAPER.capitalize()} measured {percent(data['elsewhere'][0]['level'])} for this unit, in its own lab."
     others = [f"{number(100 * one['level'], 3)} %" for one in data["measured"][1:]]
     if others:
-        yield f"Also measured: {listed(others)}."
+        yield f"Also measured: {join_words(others)}."
     if differs := data["nearest"]["differs_in"]:
         yield (
             f"Nearest measured unit: {data['nearest']['unit']}, {number(100 * data['nearest']['level'], 3)} %. This "
-            f"unit differs in {listed(differs)}: the range is wider for it, by an assumed slope."
+            f"unit differs in {join_words(differs)}: the range is wider for it, by an assumed slope."
         )
     if unread := data["nearest"]["not_read"]:
-        yield f"Not measured, and not in the range: {listed(unread)}."
+        yield f"Not measured, and not in the range: {join_words(unread)}."
     if len(variant.layers) == 1:
         yield "The rule gives every one-material unit the same level; 39.5, 45.2 and 60.2 % were measured."
     yield SURFACE
@@ -311,7 +309,7 @@ def _skin(layered: dict[str, Any]) -> Iterator[str]:
     places = [(r, layered["r_mm"].index(r)) for r in SKIN_MM if r in layered["r_mm"]]
     ends = {r: _range(drive["u"]["low"][i], drive["u"]["high"][i]).removesuffix(" %") for r, i in places}
     told = [f"{percent(drive['u']['value'][i])} ({ends[r]}) after {r} mm" for r, i in places]
-    yield f"On the skin ({layered['tissue']}), of the motion at the edge: {listed(told)}."
+    yield f"On the skin ({layered['tissue']}), of the motion at the edge: {join_words(told)}."
     if "far" in layered:
         yield layered["far"]
 
@@ -341,35 +339,35 @@ def summary(estimated: dict[str, Any]) -> dict[str, Any]:
 SIGNIFICANT_DIGITS = 9
 ASSUMPTIONS = [
     "A flat ERM's sideways force turns in the skin's plane. The layered curve takes it so (`layered.drives`); the "
-    "models of the edge level know no direction of the force.",
+    "models of the edge level do not use the direction of the force.",
     "The edge is the skin at r = D/2, z = 0; a level is an amplitude over the motor's. published and corrected are "
-    "|u_z|; the paper states neither surface nor axis of what it measured, to which the rule is fitted.",
+    "|u_z|; the rule is fitted to the paper's levels, whose surface and axis the paper does not state.",
     "Poisson's ratio and loss factor of the silicones are assumed, with ranges; nobody has measured them for this.",
-    "The cavity's air, the circuit's stiffness, the bond and the motor's mass are in none of the closed forms.",
+    "No closed form contains the cavity's air, the circuit's stiffness, the bond or the motor's mass.",
 ]
 TABLE_NOTE = (
     "nine measured levels; twelve ratios of six units to the controls of their own materials (eight of them "
-    "independent); geometric-mean factor, 1 is exact; left out: each unit predicted by constants fitted without it; "
-    "baseline: the mean of each of four classes; computed when this was made"
+    "independent); geometric-mean factor, 1 is exact; leave-one-out: each unit predicted by constants fitted without "
+    "it; baseline: the mean of each of four classes; computed when this was made"
 )
 RANGE_NOTE = (
-    "5 to 95 % of the score over units drawn again with replacement; of nine units it holds the score of new ones less "
-    "often than that (docs/explanation/estimate.md has the share)"
+    "5 to 95 % of the score over units drawn again with replacement; with nine units it contains the score of new ones "
+    "less often (docs/explanation/estimate.md has the share)"
 )
 P_NOTE = (
-    "two-sided p of the mean difference of two models' errors with the unit left out, over all flips of the units' "
+    "two-sided p of the mean difference of two models' leave-one-out errors, over all flips of the units' "
     "signs; not corrected for the number of pairs"
 )
 CHOICE_NOTE = (
-    "the rule when its form, n and what counts, is chosen without the unit too: each unit predicted by the form that "
-    "is best on the other units, its constants fitted without the unit"
+    "the rule if its form is chosen without the unit too: each unit is predicted by the form that is best on the other "
+    "units, with constants fitted without the unit"
 )
 CLASSES_NOTE = (
-    "geometric-mean factor error of each class, predicted by constants fitted without the whole class; the baseline, "
-    "which has no mean of it, takes that of all others. Four classes calibrate nothing"
+    "geometric-mean factor error of each class, predicted by constants fitted without the whole class; the baseline "
+    "has no mean of that class, so it takes the mean of all others. Four classes are too few to calibrate a range"
 )
 SAME_P = 0.05
-"""Two models whose sign-flip p is above it are not told apart."""
+"""Largest sign-flip p at which the difference of two models is significant."""
 DECAY_AT_MM = (5.0, 10.0, 20.0, 30.0)
 
 
@@ -391,8 +389,8 @@ def estimate(
 
     `models` have a block each; the answer does not depend on them. With a lab's `fit` the constants are its own, each
     model has a predictive range, and the data have `fit` and `own_measured`. `layered` gives the layered solver's
-    block, rounded; it reads no silicone: variants on one body share it. A quantity that can't be given is null next to
-    a `reason`. Raises `Refusal` for values that no body has.
+    block, rounded; it reads no silicone: variants on one tissue share it. A quantity without a value is null, with
+    a `reason`. Raises `Refusal` for impossible tissues.
     """
     errors = table_error(variant.moduli)
     blocks = {}
@@ -410,7 +408,7 @@ def estimate(
         "table_error": errors,
         "assumptions": [
             *ASSUMPTIONS,
-            *(f"A range, not a value: {note}" for note in ranged(variant)),
+            *(f"A range, not a value: {note}" for note in range_notes(variant)),
             *dict.fromkeys(_noted(variant)),
         ],
     }
@@ -432,8 +430,8 @@ def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
         "own_units": fit.units,
         "include_paper_units": fit.include_paper_units,
         "moduli": fit.moduli,
-        "left_out": {
-            name: {"geometric_mean": one.left_out, "low": one.left_out_low, "high": one.left_out_high}
+        "leave_one_out": {
+            name: {"geometric_mean": one.leave_one_out, "low": one.leave_one_out_low, "high": one.leave_one_out_high}
             for name, one in scores.items()
         },
         "at_bound": {name: one.at_bound for name, one in scores.items() if one.at_bound},
@@ -500,8 +498,9 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
 def table_error(moduli: Moduli = "small-strain") -> dict[str, Any]:
     """Return every model's errors against the measured table by such moduli, the baseline's too, to nine digits.
 
-    `order`: by the score with a unit left out, the best first. `sign_flip`: p of each pair, the better one first.
-    `chosen_without`: the rule's score when its form is chosen without the unit too. `classes_out`: by class left out.
+    `order`: by the leave-one-out error, the best first. `sign_flip`: p of each pair, the better one first.
+    `chosen_without`: the rule's score when its form is chosen without the unit too.
+    `leave_one_class_out`: the error of each class, by constants fitted without it.
     """
     found = assessments(moduli)
     order = in_order(found)
@@ -509,26 +508,26 @@ def table_error(moduli: Moduli = "small-strain") -> dict[str, Any]:
     best = {worse: p for better, worse, p in pairwise(found) if better == order[0]}
     for name in order:
         p = best.get(name)
-        by_model[name]["against_best"] = {"model": order[0], "p": p, "told_apart": p is not None and p <= SAME_P}
+        by_model[name]["against_best"] = {"model": order[0], "p": p, "significant": p is not None and p <= SAME_P}
     chosen = choice(moduli)
     table = {
         **by_model,
-        "what": TABLE_NOTE + ("; by moduli of a slow pull" if moduli == "quasi-static" else ""),
+        "note": TABLE_NOTE + ("; by moduli of a slow pull" if moduli == "quasi-static" else ""),
         "moduli": moduli,
         "range": RANGE_NOTE,
         "order": order,
         "sign_flip": {
-            "what": P_NOTE,
+            "note": P_NOTE,
             "pairs": [{"better": better, "worse": worse, "p": p} for better, worse, p in pairwise(found)],
         },
         "chosen_without": {
-            "what": CHOICE_NOTE,
+            "note": CHOICE_NOTE,
             **asdict(chosen.score),
             "range": _ends_of(chosen.range),
             "forms": list(rules()),
             "chosen": list(chosen.chosen),
         },
-        "classes_out": {"what": CLASSES_NOTE, "by_class": classes_out(moduli)},
+        "leave_one_class_out": {"note": CLASSES_NOTE, "by_class": leave_one_class_out(moduli)},
     }
     return rounded(table)
 
@@ -539,9 +538,9 @@ def assessment_block(assessment: Assessment) -> dict[str, Any]:
         "levels": asdict(assessment.levels),
         "ratios": asdict(assessment.ratios),
         "directions": {"right": assessment.directions, "of": assessment.ratios.count},
-        "leave_one_unit_out": {
-            "levels": {**asdict(assessment.left_out), "range": _ends_of(assessment.left_out_range)},
-            "ratios": asdict(assessment.left_out_ratios) if assessment.left_out_ratios else None,
+        "leave_one_out": {
+            "levels": {**asdict(assessment.leave_one_out), "range": _ends_of(assessment.leave_one_out_range)},
+            "ratios": asdict(assessment.leave_one_out_ratios) if assessment.leave_one_out_ratios else None,
         },
     }
 

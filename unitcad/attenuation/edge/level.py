@@ -21,7 +21,7 @@ from unitcad.attenuation.edge.measured import (
     FIELDS,
     measured_slopes,
     nominal,
-    stacked,
+    stack_inputs,
     unit_class,
     whole_ratio,
 )
@@ -52,13 +52,13 @@ def sensitivities(variant: EstimateInput, levels: Levels, step: float = STEP) ->
     with np.errstate(all="ignore"):
         low, high = np.log(np.asarray(levels(ends(variant, step)), dtype=float)).reshape(-1, 2).T
     if not np.all(np.isfinite([low, high])):
-        return {"by": None, "not_seen": None, "reason": "no finite level at the middle of the inputs' ranges"}
+        return {"by": None, "no_effect": None, "reason": "no finite level at the middle of the inputs' ranges"}
     slopes = {
         name: round(float(d), _DIGITS) for name, d in zip(changed(variant), (high - low) / (2 * step), strict=True)
     }
     return {
         "by": {name: slope for name, slope in slopes.items() if slope},
-        "not_seen": [name for name, slope in slopes.items() if not slope],
+        "no_effect": [name for name, slope in slopes.items() if not slope],
     }
 
 
@@ -274,7 +274,7 @@ def unknown(variant: EstimateInput) -> str:
 
 
 @lru_cache(maxsize=4)
-def ranged(variant: EstimateInput) -> tuple[str, ...]:
+def range_notes(variant: EstimateInput) -> tuple[str, ...]:
     """Return the assumptions of the inputs that are known as a range only: their result is a range without a value."""
     return tuple(
         f"{name} {field}: {quantity.note}"
@@ -294,10 +294,10 @@ def spread(variant: EstimateInput, values: Any) -> dict[str, Any]:
     values = np.atleast_1d(values)
     if not np.all(np.isfinite(values)):
         return {"value": _number(values[0]), "low": None, "high": None, "reason": _NOT_FINITE}
-    value = None if ranged(variant) else float(values[0])
+    value = None if range_notes(variant) else float(values[0])
     level: dict[str, Any] = {"value": value, "low": float(values.min()), "high": float(values.max())}
-    if ranged(variant):
-        level["reason"] = "; ".join(ranged(variant))
+    if range_notes(variant):
+        level["reason"] = "; ".join(range_notes(variant))
     return level
 
 
@@ -343,14 +343,14 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
         block |= _published_details(variant, controls)
     if model == "corrected":
         block["wave_of_the_level"] = "s"
-    block["sensitivities"] = tested(
-        variant, sensitivities(variant, lambda changed: edge_levels(stacked(changed), model, constants))
+    block["sensitivities"] = test_slopes(
+        variant, sensitivities(variant, lambda changed: edge_levels(stack_inputs(changed), model, constants))
     )
     block["assumptions"] = ASSUMPTIONS[model]
     return block
 
 
-def tested(variant: EstimateInput, seen: dict[str, Any]) -> dict[str, Any]:
+def test_slopes(variant: EstimateInput, seen: dict[str, Any]) -> dict[str, Any]:
     """Return slopes (`sensitivities`) with `tested`: for each how many measured pairs agree in sign, and its range.
 
     The range holds the slope and the pairs' own, and 0 unless two pairs or more were measured and all agree.
@@ -380,7 +380,7 @@ def _controls(variant: EstimateInput) -> list[int]:
 def _published_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any]:
     if unknown(variant):
         return {"wave_of_the_level": "s", "reading_of_eta": "loss_modulus", "constraints": None, "readings": None}
-    units = corners(variant) if ranged(variant) else nominal(variant)
+    units = corners(variant) if range_notes(variant) else nominal(variant)
     alone = {i: units.control(i) for i in controls}
     coefficients = {}
     for wave in _WAVES:
@@ -465,7 +465,7 @@ def _by_corner(name: str, values: Any, variant: EstimateInput) -> dict[str, Any]
         return [_number(v) for v in row] if np.ndim(row) else _number(row)
 
     values = np.asarray(values)
-    if not ranged(variant):
+    if not range_notes(variant):
         return {name: plain(values[0])}
     none = [None] * values.shape[1] if values.ndim > 1 else None
     return {name: none, f"{name}_low": plain(values.min(axis=0)), f"{name}_high": plain(values.max(axis=0))}

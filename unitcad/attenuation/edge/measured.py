@@ -156,10 +156,10 @@ FIELDS = ("youngs_modulus", "poisson_ratio", "tan_delta")
 
 def nominal(variant: EstimateInput) -> Units:
     """Return the variant's middle values as closed-form input."""
-    return stacked([variant])
+    return stack_inputs([variant])
 
 
-def stacked(variants: Sequence[EstimateInput]) -> Units:
+def stack_inputs(variants: Sequence[EstimateInput]) -> Units:
     """Return the middle values of variants of one number of layers as closed-form input, a row each."""
     layers = [variant.layers for variant in variants]
     return Units(
@@ -172,8 +172,8 @@ def stacked(variants: Sequence[EstimateInput]) -> Units:
     )
 
 
-def merged(variant: EstimateInput, within: float = 0.0) -> EstimateInput:
-    """Return a unit with neighbouring layers of one material as one layer: how a body is cut changes no level.
+def merge_layers(variant: EstimateInput, within: float = 0.0) -> EstimateInput:
+    """Return a unit with neighbouring layers of one material as one layer: a cut between them changes no level.
 
     `within`: layers whose properties differ by less, relative, are of one material too, that of the innermost.
     """
@@ -234,7 +234,8 @@ def lengths(variants: Sequence[EstimateInput]) -> Lengths:
 
 
 def coordinates(units: Units, of: Lengths) -> np.ndarray:
-    """Return the `COORDINATES` of units, shape (rows, 12). They change continuously with the body, however it is cut.
+    """Return the `COORDINATES` of units, shape (rows, 12). They change continuously with the lengths and
+    do not depend on cuts within a layer.
 
     A border between layers counts as much as `borders` says; its place is the silicone outside it over the measured
     units'. Caps count only if a unit has them.
@@ -270,7 +271,7 @@ def coordinates(units: Units, of: Lengths) -> np.ndarray:
 
 def coordinates_of(variant: EstimateInput) -> np.ndarray:
     """Return the `COORDINATES` of one variant, shape (12,)."""
-    return coordinates(stacked([variant]), lengths([variant]))[0]
+    return coordinates(stack_inputs([variant]), lengths([variant]))[0]
 
 
 def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
@@ -281,7 +282,7 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
     table, layers = measured_table(), tuple(layer.material for layer in variant.layers)
     design = CONTROL if len(layers) == 1 else variant.design
     rows = [i for i in range(len(table.names)) if table.designs[i] == design and table.layers[i] == layers]
-    extra = printed_besides(design, layers)
+    extra = other_prints(design, layers)
     if not rows:
         return extra and {"level": None, **extra}
     index, shared, differs = rows[0], measurements().unit, _differs_from_all(variant)
@@ -314,7 +315,7 @@ def nearest(variant: EstimateInput) -> dict[str, Any]:
     table, layers = measured_table(), tuple(layer.material for layer in variant.layers)
     known = _moduli(variant.moduli)
     own = CONTROL if len(layers) == 1 else variant.design
-    kind = int(unit_class(stacked([variant]))[0])
+    kind = int(unit_class(stack_inputs([variant]))[0])
     alike = [i for i, group in enumerate(table.classes) if group == kind]
     alike = [i for i in alike if table.designs[i] == own] or alike
     ends = np.log([layer.youngs_modulus.middle for layer in (variant.layers[0], variant.layers[-1])])
@@ -349,7 +350,7 @@ def _not_read(variant: EstimateInput) -> list[str]:
     motor = motors()[shared.motor]
     return [
         *(["drive"] if motor.drive is not None and variant.drive != motor.drive.value else []),
-        *(["body"] if variant.tissue_name != shared.tissue else []),
+        *(["tissue"] if variant.tissue_name != shared.tissue else []),
         *variant.unread,
     ]
 
@@ -360,7 +361,7 @@ def differing(place: np.ndarray) -> list[str]:
     return list(dict.fromkeys(name for name, far in own if abs(far) > _SAME))
 
 
-def printed_besides(design: str, layers: tuple[str, ...]) -> dict[str, Any] | None:
+def other_prints(design: str, layers: tuple[str, ...]) -> dict[str, Any] | None:
     """Return the second print of a level, a ratio to an unnamed control, and directions stated without a figure."""
     data = measurements()
     short = {full: name for name, full in data.names.items()}

@@ -45,43 +45,43 @@ class Score:
 class Assessment:
     """A model against the table. `directions`: of how many ratios the side of 1 is right.
 
-    `left_out` and `left_out_ratios`: each unit predicted by constants fitted without it (None: none in it).
-    `left_out_errors`: |ln(predicted/measured)| of each of them; `left_out_range`: the score's over resampled units.
+    `leave_one_out` and `leave_one_out_ratios`: each unit predicted by constants fitted without it (None: none in it).
+    `leave_one_out_errors`: |ln(predicted/measured)| of each; `leave_one_out_range`: over resampled units.
     """
 
     levels: Score
     ratios: Score
     directions: int
-    left_out: Score
-    left_out_ratios: Score | None
-    left_out_errors: np.ndarray
-    left_out_range: tuple[float, float]
+    leave_one_out: Score
+    leave_one_out_ratios: Score | None
+    leave_one_out_errors: np.ndarray
+    leave_one_out_range: tuple[float, float]
 
 
 def assess(fit: Fit, fitted_ratios: bool, table: MeasuredTable) -> Assessment:
     """Fit to all units and to all but one, and compare. `fitted_ratios`: a fitted constant enters the ratios too."""
     everyone = np.ones((1, len(table.names)), dtype=bool)
     levels, *without = fit(table, np.concatenate([everyone, all_but_one(table)]))
-    left_out = np.diagonal(without)
+    leave_one_out = np.diagonal(without)
     pairs = table.pairs
     measured = np.array([table.levels[i] / table.levels[c] for i, c in pairs])
     ratios = np.array([levels[i] / levels[c] for i, c in pairs])
     names = [f"{table.names[i]} to {table.names[c]}" for i, c in pairs]
-    errors = np.abs(np.log(left_out / table.levels))
+    errors = np.abs(np.log(leave_one_out / table.levels))
     return Assessment(
         levels=_score(levels, table.levels, table.names),
         ratios=_score(ratios, measured, names),
         directions=int(np.sum(np.sign(_log(ratios)) == np.sign(np.log(measured)))),
-        left_out=_score(left_out, table.levels, table.names),
-        left_out_ratios=_score(np.array([without[i][i] / without[i][c] for i, c in pairs]), measured, names)
+        leave_one_out=_score(leave_one_out, table.levels, table.names),
+        leave_one_out_ratios=_score(np.array([without[i][i] / without[i][c] for i, c in pairs]), measured, names)
         if fitted_ratios
         else None,
-        left_out_errors=errors,
-        left_out_range=bootstrap_range(errors),
+        leave_one_out_errors=errors,
+        leave_one_out_range=bootstrap_range(errors),
     )
 
 
-def left_out_levels(fit: Fit, table: MeasuredTable) -> np.ndarray:
+def leave_one_out_levels(fit: Fit, table: MeasuredTable) -> np.ndarray:
     """Return the level of each unit, predicted by constants fitted without it."""
     return np.diagonal(fit(table, all_but_one(table)))
 
@@ -328,15 +328,17 @@ def assess_all(table: MeasuredTable) -> dict[str, Assessment]:
 
 
 def in_order(found: Mapping[str, Assessment]) -> list[str]:
-    """Return the models by their score with a unit left out, the best first; of equals the one of fewer constants."""
-    return sorted(found, key=lambda name: (round(found[name].left_out.geometric_mean, 3), len(COMPARED[name].names)))
+    """Return the models by leave-one-out error, the best first; of equals the one of fewer constants."""
+    return sorted(
+        found, key=lambda name: (round(found[name].leave_one_out.geometric_mean, 3), len(COMPARED[name].names))
+    )
 
 
 def pairwise(found: Mapping[str, Assessment]) -> list[tuple[str, str, float]]:
-    """Return (better, worse, p) of each pair, in order: the sign-flip test of their errors with the unit left out."""
+    """Return (better, worse, p) of each pair, in order: the sign-flip test of their leave-one-out errors."""
     names = in_order(found)
     return [
-        (a, b, sign_flip_p(found[a].left_out_errors, found[b].left_out_errors))
+        (a, b, sign_flip_p(found[a].leave_one_out_errors, found[b].leave_one_out_errors))
         for i, a in enumerate(names)
         for b in names[i + 1 :]
     ]
@@ -363,7 +365,7 @@ def choice(moduli: Moduli = "small-strain") -> Choice:
 
 
 @cache
-def classes_out(moduli: Moduli = "small-strain") -> dict[str, dict[str, float]]:
+def leave_one_class_out(moduli: Moduli = "small-strain") -> dict[str, dict[str, float]]:
     """Return the geometric-mean factor error of each class by each model, fitted without the whole class."""
     table = measured_table(moduli)
     own = table.classes == np.arange(len(CLASSES))[:, None]
@@ -399,6 +401,6 @@ def edge_levels(units: Units, model: str, constants: Mapping[str, float] | None 
         return np.exp(found.logs(units, np.array([own[name] for name in found.names])))
 
 
-def left_out_logs(model: str, table: MeasuredTable) -> np.ndarray:
+def leave_one_out_logs(model: str, table: MeasuredTable) -> np.ndarray:
     """Return ln(measured/predicted) of each unit, predicted by constants fitted without it."""
-    return np.log(table.levels / left_out_levels(COMPARED[model].levels, table))
+    return np.log(table.levels / leave_one_out_levels(COMPARED[model].levels, table))

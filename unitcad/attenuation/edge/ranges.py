@@ -33,7 +33,7 @@ from unitcad.attenuation.edge.measured import (
     lengths,
     measured_table,
     nominal,
-    stacked,
+    stack_inputs,
 )
 from unitcad.attenuation.edge.models import (
     BASELINE,
@@ -43,7 +43,7 @@ from unitcad.attenuation.edge.models import (
     assessments,
     edge_levels,
     leader,
-    left_out_logs,
+    leave_one_out_logs,
     stored,
 )
 from unitcad.attenuation.inputs import EstimateInput
@@ -58,7 +58,8 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A model fitted to a lab's units: constants, their stored values, and the predictive.
 
     `model_error`: standard deviation of a unit's ln level about the model. `covariance`: of the constants' logarithms,
-    in the order of `constants`, over model_error^2. `left_out` is the factor with the unit left out.
+    in the order of `constants`, over model_error^2. `leave_one_out`: the typical factor error.
+    `coverage`: units in their 80 % range.
     `at_bound`: the constant that the search left on its bound, None if the units determine all.
     """
 
@@ -69,15 +70,15 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     degrees_of_freedom: Annotated[int, Meta(ge=1, le=100000)]
     model_error: Annotated[float, Meta(ge=1e-6, le=10)]
     covariance: list[list[Annotated[float, Meta(ge=-1e9, le=1e9)]]]
-    left_out: Positive
-    left_out_low: Positive
-    left_out_high: Positive
-    own_left_out: Positive | None = None
+    leave_one_out: Positive
+    leave_one_out_low: Positive
+    leave_one_out_high: Positive
+    own_leave_one_out: Positive | None = None
     own_by_stored: Positive | None = None
     against_baseline: float | None = None
     against_baseline_error: float | None = None
     against_baseline_p: float | None = None
-    held: str = ""
+    coverage: str = ""
     at_bound: str | None = None
 
 
@@ -185,22 +186,26 @@ def predictive_block(fit: LabFit, model: str, variant: EstimateInput, reason: st
 
 
 def error_block(fit: LabFit, model: str) -> dict[str, Any]:
-    """Return a model's error by a fit, as factors: each unit left out, then of the lab's own units alone.
+    """Return a model's error by a fit, as factors: leave-one-out, over all units and over the lab's own.
 
-    `own_by_stored`: the own units' by the stored constants, without the fit. `baseline`: of the class means.
+    `own_by_stored`: the own units' by the stored constants, without the fit. `baseline`: of the means of four classes.
     """
     one = fit.model[model]
     return {
-        "left_out": {"geometric_mean": one.left_out, "low": one.left_out_low, "high": one.left_out_high},
-        "own_left_out": one.own_left_out,
+        "leave_one_out": {
+            "geometric_mean": one.leave_one_out,
+            "low": one.leave_one_out_low,
+            "high": one.leave_one_out_high,
+        },
+        "own_leave_one_out": one.own_leave_one_out,
         "own_by_stored": one.own_by_stored,
-        "held_80": one.held,
-        BASELINE: fit.model[BASELINE].left_out,
+        "coverage": one.coverage,
+        BASELINE: fit.model[BASELINE].leave_one_out,
     }
 
 
 def unit_key(variant: EstimateInput) -> str:
-    """Return the identity of a unit: a hash of design, silicones and lengths; not of body or frequency."""
+    """Return the identity of a unit: a hash of design, silicones and lengths; not of tissue or frequency."""
     geometry = variant.geometry
     lengths = [
         geometry.cavity_radius,
@@ -346,20 +351,20 @@ def lead_of(moduli: Moduli = "small-strain", fit: LabFit | None = None) -> Lead:
 
 def predictive_of(variants: Sequence[EstimateInput], fit: LabFit | None = None) -> Predictive:
     """Return the distribution of ln level of variants of one number of layers, at their inputs' middle values."""
-    return lead_of(variants[0].moduli, fit).predictive(stacked(variants), lengths(variants))
+    return lead_of(variants[0].moduli, fit).predictive(stack_inputs(variants), lengths(variants))
 
 
 @cache
 def _of_paper(moduli: Moduli) -> Lead:
     found = assessments(moduli)
-    return lead_on(measured_table(moduli), leader({name: one.left_out_errors for name, one in found.items()}))
+    return lead_on(measured_table(moduli), leader({name: one.leave_one_out_errors for name, one in found.items()}))
 
 
 def lead_on(table: MeasuredTable, name: str) -> Lead:
     """Return a model as the leading one on the paper's units, or on some of them."""
     model, everyone = COMPARED[name], np.ones((1, len(table.names)))
     constants = model.fit(table, everyone)[0]
-    off = left_out_logs(name, table)
+    off = leave_one_out_logs(name, table)
     e = np.concatenate([units.youngs_modulus.ravel() for units in table.inputs])
     return Lead(
         model=name,
@@ -401,7 +406,7 @@ def _of_lab(fit: LabFit) -> Lead:
 
 
 @cache
-def held(moduli: Moduli = "small-strain") -> int:
+def coverage(moduli: Moduli = "small-strain") -> int:
     """Return how many of the nine measured units lie in the leading model's 80 % range, predicted without the unit."""
     table, name = measured_table(moduli), _of_paper(moduli).model
     count = 0

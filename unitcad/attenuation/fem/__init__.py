@@ -1,1 +1,1 @@
-"""Finite elements of a unit on its body: model `fem`. Needs scikit-fem (extra `fem`)."""
+"""Finite elements of a unit on tissue: model `fem`. Needs scikit-fem (extra `fem`)."""

@@ -73,7 +73,7 @@ class HarmonicMesh:
     owner   the block of each element
     above   whether a node belongs to the unit; at z = 0 the skin and the unit have nodes of their own
     floor   the lowest z, at which everything is fixed
-    radius  of the body's outer border, which is fixed
+    radius  of the tissue's outer border, which is fixed
     """
 
     basis: skfem.Basis
@@ -124,7 +124,7 @@ def harmonic_mesh(blocks: Sequence[Block], fineness: float, radius: float, corne
     """
     corners = sorted({x for b in blocks for x in (b.r0, b.r1) if x < radius} | {0.0, corner or 0.0})
     levels = sorted({z for b in blocks for z in (b.z0, b.z1)})
-    # Interfaces deep in the body need no fine elements: nothing changes there on a unit's scale.
+    # Interfaces deep in the tissue need no fine elements: nothing changes there on a unit's scale.
     near = [z for z in levels if z > -TINY] or levels[-1:]
     grid = skfem.MeshQuad.init_tensor(
         lines([*corners, radius], corners[1:] or [0.0], fineness), lines(levels, near, fineness)

@@ -1,12 +1,12 @@
-"""A unit on its body by finite elements: its rings, its unknowns, its levels and their range. SI.
+"""A unit on tissue by finite elements: its rings, its unknowns, its levels and their range. SI.
 
 The motor is a rigid cylinder, the circuit's pad an elastic plate. The tail and its slot, which are not round, are
 ignored. Touching parts within the unit are bonded.
 
 A force at the motor's middle drives it: upwards (an axial motor, harmonic 0) or sideways (a flat one, harmonic 1). The
 motor is a rigid cylinder with mass and, about its middle, turning inertia. A level is the amplitude of a reading over
-the amplitude of the motor's middle along the drive, in this unit and on this body. For a force that turns in the plane,
-as a flat ERM's does, every point round the unit has the amplitudes that a sideways force gives at theta = 0 (u_r, u_z)
+the amplitude of the motor's middle along the drive, in this unit on this tissue. For a force that turns in the plane,
+as that of a flat ERM, every point round the unit has the amplitudes that a sideways force gives at theta = 0 (u_r, u_z)
 and at theta = 90 degrees (u_theta).
 """
 
@@ -25,9 +25,9 @@ from msgspec.structs import replace
 from scipy.stats import binom
 
 from unitcad.attenuation.edge.level import sensitivities, unknown
-from unitcad.attenuation.edge.measured import merged
+from unitcad.attenuation.edge.measured import merge_layers
 from unitcad.attenuation.fem.elements import Block, Contact, Fields, Solid, harmonic_mesh, motor_response
-from unitcad.attenuation.inputs import Drive, EstimateInput, Geometry, Quantity, body
+from unitcad.attenuation.inputs import Drive, EstimateInput, Geometry, Quantity, tissue_medium
 from unitcad.attenuation.layered import LayeredMedium
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LossFactor, complex_shear_modulus
 from unitcad.errors import UnitcadError, unknown_name
@@ -108,11 +108,11 @@ class Setting:
     circuit_modulus: float = CIRCUIT_MODULUS[1]
 
 
-def drawn(variant: EstimateInput, draw: Draw) -> tuple[EstimateInput, Setting]:
+def draw_unknowns(variant: EstimateInput, draw: Draw) -> tuple[EstimateInput, Setting]:
     """Return an input with every unknown set by a draw, and the draw's setting.
 
-    Moduli, damping, thicknesses of the body, frequency and the motor's mass lie in their ranges; the ring of air round
-    the motor is open or filled, a floor of Layer 1 under the motor is there or not, and so is the circuit. The ring is
+    Moduli, damping, thicknesses of the tissue, frequency and the motor's mass are in their ranges; the air round the
+    motor is open or filled, a floor of Layer 1 under the motor is there or not, and so is the circuit. The ring is
     filled if the motor would be loose otherwise.
     """
 
@@ -157,14 +157,14 @@ def _geometry(geometry: Geometry, draw: Draw, mass: Quantity) -> Geometry:
     if draw.either("no circuit"):
         made = replace(made, pad=None)
     if made.floor == 0.0 and draw.either("floor"):
-        made = lifted(made, draw.between("floor thickness", *FLOORS))
+        made = lift_unit(made, draw.between("floor thickness", *FLOORS))
     held = made.pad or made.floor or made.layers[0].cap
     if draw.either("gap filled") or not held:
         made = replace(made, cavity_radius=made.motor_radius)
     return made
 
 
-def lifted(geometry: Geometry, floor: float) -> Geometry:
+def lift_unit(geometry: Geometry, floor: float) -> Geometry:
     """Return a unit on a floor of Layer 1 (m) across its cavity: everything in it lies so much higher."""
     pad = geometry.pad
     return replace(
@@ -283,7 +283,7 @@ def level(
     for field, value, names in (("drive", drive, Drive), ("reading", reading, Reading)):
         if value not in get_args(names):
             raise unknown_name(field, str(value), get_args(names))
-    made, setting = drawn(variant_input, draw) if draw else (variant_input, Setting())
+    made, setting = draw_unknowns(variant_input, draw) if draw else (variant_input, Setting())
     moved = motion(replace(made, frequency=Quantity(frequency_hz)), drive, setting, fineness)
     return amplitude(moved.skin if reading == "skin" else moved.edge, drive) / abs(moved.motor)
 
@@ -321,7 +321,7 @@ def unit_fields(
     """Solve one unit under unit motions of its motor: along z, or sideways and turning."""
     omega = 2 * math.pi * variant.frequency.middle
     blocks = [
-        *medium_blocks(body(variant.tissue), omega, radius),
+        *medium_blocks(tissue_medium(variant.tissue), omega, radius),
         *unit_blocks(variant, omega, setting.circuit_modulus),
     ]
     mesh = harmonic_mesh(blocks, fineness, radius)
@@ -340,12 +340,12 @@ MEDIAN_ERROR = (
     "cases or more; wide where bonded and resting levels lie far apart, since the median then falls between them"
 )
 NOT_KNOWN = (
-    "moduli and damping of silicones and body, thicknesses of the body, frequency, mass of the motor; whether the ring "
-    "of air beside the motor is filled, silicone lies under it, the circuit stiffens the unit, and whether skin sticks "
-    "to the unit or lets it slide"
+    "moduli and damping of silicones and tissue, thicknesses of the tissue, frequency, mass of the motor; whether the "
+    "ring of air next to the motor is filled, silicone is under it, the circuit stiffens the unit, and whether skin "
+    "sticks to the unit or lets it slide"
 )
 KIND = (
-    "finite elements of unit and body, the motor a rigid body driven by a force: axial (along z) and flat (sideways); "
+    "finite elements of unit and tissue; a force drives the rigid motor: axial (along z) and flat (sideways); "
     "amplitude along the drive over the motor's, on the skin at r = D/2 and at the unit's own outer edge, at its top"
 )
 
@@ -370,7 +370,7 @@ def range_block(
         "percent": list(PERCENT),
         "median_error": MEDIAN_ERROR,
     }
-    variant = merged(variant, ALIKE)
+    variant = merge_layers(variant, ALIKE)
     if reason := unknown(variant):
         return {**data, "levels": [], "reason": reason}
     cases: list[tuple[Drive, Reading]] = [(drive, at) for drive in get_args(Drive) for at in get_args(Reading)]
@@ -379,7 +379,7 @@ def range_block(
     for index in range(draws):
         say(f"finite elements: draw {index + 1} of {draws}")
         draw = Draw(seed, index, draws)
-        made, setting = drawn(variant, draw)
+        made, setting = draw_unknowns(variant, draw)
         contacts.append(setting.contact)
         for drive, at in cases:
             found[drive, at].append(level(variant, made.frequency.middle, drive, at, draw, FINENESS))
@@ -428,7 +428,7 @@ def fem_sensitivities(
 
     One finite-element solution for each end of each input serves both readings.
     """
-    variant = merged(variant, ALIKE)
+    variant = merge_layers(variant, ALIKE)
     if unknown(variant):
         return []
     drive = variant.drive

@@ -7,7 +7,7 @@ u_r = cos(theta) (A - B), u_theta = -sin(theta) (A + B), u_z = -cos(theta) Z, wh
 
 The path is the real axis. It is where damping puts the path: each pole is on the side where it belongs. A path lifted
 into the upper half plane would be smoother, but waves whose energy runs against their phase (backward waves of plates
-and of layers on a stiff base) and the bending of a stiff layer on a soft one have their poles there. Where a body has
+and of layers on a stiff base) and the bending of a stiff layer on a soft one have their poles there. If a material has
 no damping, poles may lie on the axis or too close to it to pass: there the path goes around each of them,
 on the side on which a little loss would leave it. No loss is put into the medium for that, and nothing is extrapolated.
 
@@ -195,7 +195,7 @@ class LayeredMedium(Stack):
     layers : sequence of Layer
         The layers from the surface down; may be empty.
     half_space : HalfSpace
-        The body under them.
+        The half-space under them.
     least_loss : float, default 0
         Least loss factor of all materials; the solver sets it for undamped media.
 

@@ -24,12 +24,12 @@ from unitcad.attenuation.layered.quadrature import (
     Poles,
     around,
     closeness,
+    cut_pieces,
     evaluate,
     from_origin,
-    halved_towards,
+    halve_towards,
     nodes,
     onwards,
-    pieced,
     poles,
 )
 from unitcad.errors import UnitcadError
@@ -322,7 +322,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         turned = np.concatenate([pieces[now], put_off.pieces[due]]).reshape(-1, 4)
         halves = bad & ~now
         times = np.where(later, 1, _times(found))[halves]
-        cut, origin = halved_towards(pending[halves], found.poles.at[halves], times)
+        cut, origin = halve_towards(pending[halves], found.poles.at[halves], times)
         of = np.where(later, np.cumsum(later) - 1, -1)[halves][origin]
         pending = np.concatenate([cut, turned])
         put_off = _PutOff(np.append(of, np.full(len(turned), -1)), pieces[later], found.hidden[later])
@@ -413,7 +413,7 @@ def _detours(
     which = np.zeros_like(bad)
     which[at[turned]] = True
     pieces = np.zeros((len(panels), 4, 4), dtype=np.complex128)
-    pieces[which] = pieced(panels[which], corners).reshape(-1, 4, 4)
+    pieces[which] = cut_pieces(panels[which], corners).reshape(-1, 4, 4)
     beyond = np.flatnonzero(which & ~now)
     beyond = beyond[np.argsort(hidden[beyond])]
     now[beyond[np.cumsum(hidden[beyond]) <= left]] = True

@@ -5,8 +5,8 @@ A static homogeneous half-space, known in closed form, is taken out of a Hankel 
 Rows are those of a load's kernel, with its `orders`: (u_r, u_z) under an axisymmetric load, and under a sideways one
 (A, B, Z), of which u_r = A - B, u_theta = -(A + B) and u_z = -Z are made.
 
-A normal load (F1 of the paper's equation 2a) is a pressure, positive into the body, with a J0 transform; a radial load
-(F2, equation 2b) is a traction outwards from the axis, with a J1 transform. q(k) = integral of q(r) J(kr) r dr.
+A normal load (F1 of the paper's equation 2a) is a pressure, positive into the medium, with a J0 transform. A radial
+load (F2, equation 2b) is a traction outwards from the axis, with a J1 transform. q(k) = integral of q(r) J(kr) r dr.
 A tangential load is a traction in one direction of the plane, theta = 0. It is the same everywhere on the disc: a
 motor that drives sideways. Its transform is that of the normal one.
 

@@ -10,7 +10,7 @@ of the blocks is made the identity: the impedance T U^-1 or the compliance U T^-
 that neither a clamped nor a free resonance of the lower layers costs digits. The Thomson-Haskell propagator, which
 multiplies growing exponentials, loses all digits where k h is large or omega small.
 
-Time factor e^{+i omega t}; z into the body; u_z with J0(kr), u_r with J1(kr), both k dk; SI throughout.
+Time factor e^{+i omega t}; z into the medium; u_z with J0(kr), u_r with J1(kr), both k dk; SI throughout.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from unitcad.attenuation.layered.propagation import (
     det,
     parameter,
     product,
-    raised,
+    raise_plane,
     shear_compliance,
     underside,
 )
@@ -221,7 +221,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """The body under all layers.
+    """The half-space under all layers.
 
     Parameters
     ----------
@@ -254,16 +254,16 @@ class HalfSpace:
         _check_material("half_space", self, above=False)
 
 
-def _check_material(what: str, body: Layer | HalfSpace, above: bool) -> None:
-    finite(f"{what}.density", body.density)
-    finite(f"{what}.youngs_modulus", body.youngs_modulus, 0.0, above)
-    nu = finite(f"{what}.poisson_ratio", body.poisson_ratio, None)
+def _check_material(what: str, material: Layer | HalfSpace, above: bool) -> None:
+    finite(f"{what}.density", material.density)
+    finite(f"{what}.youngs_modulus", material.youngs_modulus, 0.0, above)
+    nu = finite(f"{what}.poisson_ratio", material.poisson_ratio, None)
     if nu > 0.5:
         raise Refusal(f"{what}.poisson_ratio", nu, "must be at most 0.5", 0.5)
     finite(f"{what}.poisson_ratio", nu, -1.0, above=True)
-    if not isinstance(body.damping, Damping):
+    if not isinstance(material.damping, Damping):
         raise Refusal(
-            f"{what}.damping", str(body.damping), "must be a LossFactor, KelvinVoigt, FractionalKelvinVoigt or None"
+            f"{what}.damping", str(material.damping), "must be a LossFactor, KelvinVoigt, FractionalKelvinVoigt or None"
         )
 
 
@@ -294,8 +294,8 @@ class Stack:
         """Return surface displacement (u_r, u_z) per surface traction (t_r, t_z), in m/Pa, shape k.shape + (2, 2).
 
         k: wavenumbers (1/m) with positive real part, real or complex, any shape; omega >= 0 (rad/s). The traction acts
-        on the body in +r and +z, so a positive pressure pushes into it and counts as t_z. Symmetric. Raises `Refusal`
-        for k, for omega and for a body that nothing holds at omega = 0.
+        on the medium in +r and +z, so a positive pressure pushes into it and counts as t_z. Symmetric. Raises `Refusal`
+        for k, for omega and for a medium without support at omega = 0.
         """
         k = np.asarray(k, dtype=np.complex128)
         wrong = k[~((np.abs(k) <= MOST) & (k.real > 0))]
@@ -315,17 +315,18 @@ class Stack:
         return Stack([layer for layer in self.layers if layer.thickness > 0], self.half_space, self.least_loss)
 
     def with_loss(self, tan_delta: float) -> Stack:
-        """Return the same stack with at least that loss factor in every body."""
+        """Return the same stack with at least that loss factor in every layer and the half-space."""
         return Stack(self.layers, self.half_space, tan_delta)
 
     def materials(self, omega: float) -> tuple[Material, ...]:
-        """Return the layers' and the half-space's complex moduli at omega. Raises `Refusal` for a static free body."""
+        """Return the layers' and the half-space's complex moduli at omega. Raises `Refusal` for a
+        static medium without support."""
         if self._last is None or self._last[0] != omega:
             omega = finite("omega", omega)
             if self.half_space.youngs_modulus == 0.0 and omega == 0.0:
-                raise Refusal("omega", omega, "nothing holds this body: static loads would carry it away")
-            bodies = (*self.layers, self.half_space)
-            self._last = omega, tuple(_material(body, omega, self.least_loss) for body in bodies)
+                raise Refusal("omega", omega, "nothing supports this medium: static loads would carry it away")
+            materials = (*self.layers, self.half_space)
+            self._last = omega, tuple(_material(material, omega, self.least_loss) for material in materials)
         return self._last[1]
 
     def last_pole(self, omega: float) -> float:
@@ -343,7 +344,7 @@ class Stack:
         materials = self.materials(omega)
         planes = [underside(materials[-1], k)]
         for kind, h, above in reversed(_cut([layer.thickness for layer in self.layers], depth)):
-            planes.append(raised(materials[kind], h, k, planes[-1], with_bottom=above))
+            planes.append(raise_plane(materials[kind], h, k, planes[-1], with_bottom=above))
         return planes[::-1]
 
     def transfer(self, ways: Sequence[int], k: Array, omega: float, depth: float) -> Array:
@@ -388,11 +389,11 @@ def _last_pole(layers: tuple[Layer, ...], materials: tuple[Material, ...], omega
     return 1.5 * max(1.5 * shear, floor)
 
 
-def _material(body: Layer | HalfSpace, omega: float, least_loss: float) -> Material:
-    shear = complex_shear_modulus(body.youngs_modulus, body.poisson_ratio, body.damping, omega)
+def _material(material: Layer | HalfSpace, omega: float, least_loss: float) -> Material:
+    shear = complex_shear_modulus(material.youngs_modulus, material.poisson_ratio, material.damping, omega)
     shear = complex(shear.real, max(shear.imag, least_loss * shear.real))
-    ks2 = body.density * omega * omega / shear if shear != 0 else 0.0
-    return Material(shear, compressibility(body.poisson_ratio), complex(ks2))
+    ks2 = material.density * omega * omega / shear if shear != 0 else 0.0
+    return Material(shear, compressibility(material.poisson_ratio), complex(ks2))
 
 
 def _cut(thicknesses: list[float], depth: float) -> list[tuple[int, float, bool]]:

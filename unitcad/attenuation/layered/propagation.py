@@ -1,7 +1,7 @@
 """Waves of one material in the Hankel domain, and a stack's state carried through a layer, at many wavenumbers.
 
 Plane strain, in 2x2 blocks: a field is u_r = U(z) J1(kr), u_z = W(z) J0(kr); its traction on a plane z = const, acting
-on the body below, is (-sigma_rz, -sigma_zz). A block is an array of shape (2, 2, n): rows (r, z), columns the two
+on the medium below, is (-sigma_rz, -sigma_zz). A block is an array of shape (2, 2, n): rows (r, z), columns the two
 waves, n wavenumbers.
 
 The two waves going down are P = (k, g_p) e^{-g_p z} and Q = (S - P) / k_s^2, where S = (g_s, k) e^{-g_s z},
@@ -24,7 +24,7 @@ T^T u = U^T t.
 
 Horizontally polarised shear (SH) in a stack: the waves of a sideways force besides those of an axial one.
 
-A field is u_theta = V(z) J'(kr) and the like; its traction on a plane z = const, acting on the body below, is -mu V'.
+A field is u_theta = V(z) J'(kr) and the like; its traction on a plane z = const, acting on the medium below, is -mu V'.
 Per wavenumber the state is the pair (V, -mu V'), carried upwards from the half-space by decaying exponentials only:
 the two terms of each sum are of one sign but at a resonance of the stack, so that nothing is lost to cancellation.
 """
@@ -240,7 +240,7 @@ def underside(material: Material, k: Array) -> Plane:
     return Plane(solve_waves(material, k, *vertical_rates(material, k)).down)
 
 
-def raised(material: Material, h: float, k: Array, below: Plane, with_bottom: bool = False) -> Plane:
+def raise_plane(material: Material, h: float, k: Array, below: Plane, with_bottom: bool = False) -> Plane:
     """Return the plane at a layer's top from the plane at its bottom, each wavenumber by the method that suits it."""
     below = Plane(below.states, below.states if with_bottom else None, below.summed)
     if h == 0.0:

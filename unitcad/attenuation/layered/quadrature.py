@@ -3,7 +3,7 @@
 A panel is a row (a, b, base, turn), complex. It runs from s = a to b, straight in s. The wavenumber is s itself, or,
 next to a branch point on the axis, base + turn s^2, in which the kernel has no root any more.
 
-If nothing is damped, or only a body that a wave hardly reaches, poles are on the axis or closer to it than any panel.
+If nothing is damped, or only a layer that a wave hardly reaches, poles are on the axis or closer to it than any panel.
 Between two wavenumbers with one such pole the path leaves the axis, over two legs on the pole's other side.
 
 A pole is where the kernel times (t - t_pole) is a polynomial of the panel's t, from -1 to 1, though the kernel is not:
@@ -130,7 +130,7 @@ def _turned(line: np.ndarray, branch_points: list[float], longest: float) -> Arr
     return np.concatenate([plain[~at], np.array(panels, dtype=np.complex128).reshape(-1, 4)])
 
 
-def halved_towards(panels: Array, at: Array, times: np.ndarray) -> tuple[Array, np.ndarray]:
+def halve_towards(panels: Array, at: Array, times: np.ndarray) -> tuple[Array, np.ndarray]:
     """Cut each panel in two equal ones, and of these the one next to `at` again, so many times in all.
 
     at: in the panel's t, from -1 to 1, or beyond. Return the pieces, and which panel each is from.
@@ -139,7 +139,7 @@ def halved_towards(panels: Array, at: Array, times: np.ndarray) -> tuple[Array, 
     pieces, origin = [panels[:0]], [of[:0]]
     while len(panels):
         right = (at.real > 0).astype(int)
-        both = pieced(panels, np.stack([panels[:, 0], panels[:, :2].mean(axis=1), panels[:, 1]], axis=1))
+        both = cut_pieces(panels, np.stack([panels[:, 0], panels[:, :2].mean(axis=1), panels[:, 1]], axis=1))
         near, other = (both[2 * np.arange(len(panels)) + side] for side in (right, 1 - right))
         again = times > 1
         pieces += [other, near[~again]]
@@ -149,7 +149,7 @@ def halved_towards(panels: Array, at: Array, times: np.ndarray) -> tuple[Array, 
     return np.concatenate(pieces), np.concatenate(origin)
 
 
-def pieced(panels: Array, corners: Array) -> Array:
+def cut_pieces(panels: Array, corners: Array) -> Array:
     """Return the pieces of each panel between its corners, shape (panels, pieces + 1)."""
     pieces = corners.shape[1] - 1
     ends = np.stack([corners[:, :-1].ravel(), corners[:, 1:].ravel()], axis=1)
@@ -227,7 +227,7 @@ def around(
     """Return which panels, all on the axis, have a detour, and the five corners of each, shape (m, 5).
 
     longest: distance from the pole to the legs' feet at most (1/m); lossier(panel, loss) finds the pole of a medium
-    with at least that loss factor in every body.
+    with at least that loss factor in every layer.
     """
     at = found.at
     inside = (np.abs(at.real) < _INNER) & (np.abs(at.imag) < _NEXT) & (found.uncertainty < _NEXT)

@@ -52,7 +52,7 @@ def plain(unit: str) -> str:
     return _WORDS.get(text.lower(), text)
 
 
-def known(unit: str) -> bool:
+def is_known_unit(unit: str) -> bool:
     """Tell whether a text is a unit that this program knows by name."""
     name = plain(unit)
     return name in _OTHER or (

@@ -15,7 +15,7 @@ import numpy as np
 
 from unitcad import files
 from unitcad.geometry.arrays import Floats
-from unitcad.lab.readers import Channel, Layout, Unreadable, known
+from unitcad.lab.readers import Channel, Layout, Unreadable, is_known_unit
 
 ENDINGS = (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tab")
 HEAD = 1_000_000
@@ -250,11 +250,11 @@ def _header(header: list[str], block: Block) -> tuple[list[str], list[str], floa
         return names, units, None
     last = rows[-1][: block.width]
     alone = [bool(_UNIT_ALONE.fullmatch(word)) for word in last]
-    units_row = any(last) and all(known(word) or a for word, a in zip(last, alone, strict=True) if word)
+    units_row = any(last) and all(is_known_unit(word) or a for word, a in zip(last, alone, strict=True) if word)
     if step is not None or units_row or all(alone):
         names = rows[0][: block.width] if len(rows) == 2 else [word.strip("[]() ") for word in last]
         names = [""] * block.width if len(rows) == 1 and all(alone) else names
-        units = [word.strip("[]() ") if known(word) or a else "" for word, a in zip(last, alone, strict=True)]
+        units = [word.strip("[]() ") if is_known_unit(word) or a else "" for word, a in zip(last, alone, strict=True)]
     elif not any(alone):  # a unit by itself among names: its spaces have split them
         for i, word in enumerate(last):
             parts = _NAMED_UNIT.fullmatch(word)

@@ -21,7 +21,7 @@ from unitcad.meshcheck.geometry.topology import (
     edges_of,
     max_side_squared,
     side_by_side,
-    surrounded,
+    surrounded_vertices,
 )
 
 _FOLD = 2.0  # float32 steps: a fold thinner than that has no thickness
@@ -198,7 +198,7 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
         crossings.contact.noted.clear()  # shells that touch there may cross elsewhere
     _leaning(crossings)
     for blocks in (crossings.crossing, crossings.covering) if len(walks) > 1 else ():  # which give some pairs twice
-        blocks[:] = [np.unique(np.sort(joined(blocks), axis=1), axis=0)]
+        blocks[:] = [np.unique(np.sort(join_pairs(blocks), axis=1), axis=0)]
     return crossings
 
 
@@ -208,7 +208,7 @@ def _prepared(topology: Topology, order: Ints) -> Faces:
     columns, corners = np.ascontiguousarray(vertices.T), columns_of(stored, order)
     normal = columns_of(topology.stored_areas, order)
     edges = topology.edges if stored is topology.mesh.faces else edges_of(stored, len(vertices))
-    smooth = height_fields(columns, corners, normal, surrounded(edges, len(vertices)))
+    smooth = height_fields(columns, corners, normal, surrounded_vertices(edges, len(vertices)))
     places = same_place(vertices).take(corners) if several and topology.mesh.indexed else corners
     return Faces(
         vertices,
@@ -363,7 +363,7 @@ def _leaning(crossings: Crossings) -> None:
     crossings.crossing.append(rows[through][:, [4, 0]].astype(np.int32))
 
 
-def joined(blocks: list[Ints]) -> Ints:
+def join_pairs(blocks: list[Ints]) -> Ints:
     """Return the pairs of all blocks, (k, 2)."""
     return np.concatenate(blocks) if blocks else np.empty((0, 2), np.int32)
 

@@ -251,7 +251,7 @@ def _compared(a: Floats, b: Floats, side_a: Ints, side_b: Ints) -> tuple[Ints, I
     return one, two
 
 
-def flattened(a: Floats, *others: Floats) -> list[Floats]:
+def flatten(a: Floats, *others: Floats) -> list[Floats]:
     """Return the corners without the axis along which the triangles `a` (n, 3, 3) face most: (n, k, 2) each."""
     x, y, z = a.transpose(2, 1, 0)
     one, two = ([axis[k] - axis[0] for axis in (x, y, z)] for k in (1, 2))
@@ -268,7 +268,7 @@ def flattened(a: Floats, *others: Floats) -> list[Floats]:
 
 def coplanar(a: Floats, b: Floats) -> tuple[Bools, Bools]:
     """Return whether coplanar triangles share area, and whether a point: no side of either separates them."""
-    flat = flattened(a, b)
+    flat = flatten(a, b)
     sides = np.concatenate([_off_sides(flat[0], flat[1]), _off_sides(flat[1], flat[0])])
     largest = sides.max(axis=1)
     return (largest > 0).all(axis=0), (largest >= 0).all(axis=0)
@@ -293,7 +293,7 @@ def _off_sides(corners: Floats, points: Floats) -> Ints:
 
 def segment_inside(u: Floats, v: Floats, b: Floats) -> Bools:
     """Return whether the open segment u v (n, 3), which lies in the plane of triangle b, passes through b's inside."""
-    flat, ends = flattened(b, np.stack([u, v], axis=1))
+    flat, ends = flatten(b, np.stack([u, v], axis=1))
     inside = (_off_sides(flat, ends).max(axis=1) > 0).all(axis=0)
     across = orient2d(
         np.tile(ends[:, 0], (3, 1)), np.tile(ends[:, 1], (3, 1)), np.concatenate([flat[:, k] for k in range(3)])

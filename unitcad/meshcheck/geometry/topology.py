@@ -121,7 +121,7 @@ def opposite(edges: Edges, n_half: int) -> Ints:
     return across
 
 
-def surrounded(edges: Edges, n_vertices: int) -> Bools:
+def surrounded_vertices(edges: Edges, n_vertices: int) -> Bools:
     """Return which vertices have two faces, wound alike, at all their edges."""
     whole = np.ones(n_vertices, bool)
     if not edges.closed:
@@ -132,7 +132,7 @@ def surrounded(edges: Edges, n_vertices: int) -> Bools:
 
 def pinched_vertices(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
     """Return vertices whose faces form more than one fan, but for those of edges that have more than two faces."""
-    whole = surrounded(edges, n_vertices)
+    whole = surrounded_vertices(edges, n_vertices)
     several = _fans(faces, opposite(edges, 3 * len(faces)), whole) > 1
     if not whole.all():
         rest, many = ~whole, edges.size > 2
@@ -291,7 +291,7 @@ def join(vertices: Floats, faces: Ints, loose: Ints) -> Seams:
     points = np.unique(place[loose])
     short = _shortest_edges(vertices, stored[whole], points)
     step = 2 * float32_steps(vertices[points])
-    part = connected(stored, n)
+    part = connected_parts(stored, n)
     boxes = extents(vertices, part, int(part.max()) + 1)
     mine = part[points]
 
@@ -318,7 +318,7 @@ def _three(faces: Ints) -> Bools:
     return (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
 
 
-def connected(faces: Ints, n: int) -> Ints:
+def connected_parts(faces: Ints, n: int) -> Ints:
     """Return for each of `n` vertices which part of the mesh it belongs to: faces connect their vertices."""
     spokes = np.concatenate([faces[:, 0], faces[:, 0]]), np.concatenate([faces[:, 1], faces[:, 2]])
     return components(n, *spokes)
@@ -596,7 +596,7 @@ def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[In
     left = np.flatnonzero(after.size == 1)
     shut, split = open_, np.zeros(len(left), bool)
     if len(left):  # only what belongs to shells without a boundary left
-        part = connected(joined, len(vertices))
+        part = connected_parts(joined, len(vertices))
         at = seams.joined[edges.order[edges.first[open_]] // 3, 0]
         shut = open_[~np.isin(part[at], part[after.low[left]])]
         split = t_junctions(vertices, after.low[left], after.high[left], seams.reach)

@@ -54,7 +54,7 @@ F005 = Rule("""
     F005 error: content and name disagree
     The bytes are a web page, a Git LFS pointer, a compressed file or another format than the suffix claims.
     Example: part.stl begins with `version https://git-lfs`, since the repository was cloned without git lfs.
-    Fix: Fetch the real file (git lfs pull, gunzip, the download link behind the page), or rename it.
+    Fix: Fetch the real file (git lfs pull, gunzip, the download link behind the page), rename it, or export a mesh.
 """)
 
 F006 = Rule(

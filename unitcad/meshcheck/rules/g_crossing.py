@@ -17,7 +17,7 @@ from unitcad.meshcheck.geometry.crossings import (
     facing,
     folded,
     folded_edges,
-    joined,
+    join_pairs,
     kinds,
     through_edges,
 )
@@ -89,7 +89,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
 def _pairs(part: Inspection, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
     """Return pairs of faces that cross or cover each other."""
     topology, places = part.topology, partial(_places, part.topology, faces)
-    crossing, covering = joined(crossings.crossing), joined(crossings.covering)
+    crossing, covering = join_pairs(crossings.crossing), join_pairs(crossings.covering)
     opposite = facing(faces, covering[:, 0], covering[:, 1]) < 0
     twice, thin = kinds(topology, faces.shell[covering], opposite)
     other, corners = ~twice & ~thin, faces.corners
@@ -134,7 +134,7 @@ def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterato
     contact = crossings.contact
     keys, touching = contact.pairs()
     first = np.flatnonzero(distinct(keys))
-    first = first[~among(keys[first], np.sort(contact.keys(*faces.shell[joined(crossings.crossing)].T)))]
+    first = first[~among(keys[first], np.sort(contact.keys(*faces.shell[join_pairs(crossings.crossing)].T)))]
     n = len(first)
     if not n:
         return

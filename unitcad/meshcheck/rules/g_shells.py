@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from manifold3d import Manifold
 
-from unitcad.geometry.arrays import Bools, Floats, Ints, among, grouped
+from unitcad.geometry.arrays import Bools, Floats, Ints, among, group_labels
 from unitcad.geometry.boxes import Interrupted, Tick, TooMany, box_pairs
 from unitcad.meshcheck.findings import Finding, Location, counted, number, point
 from unitcad.meshcheck.geometry.mesh import solid_of
@@ -175,7 +175,7 @@ def _relate(
     both = sound.take(one) & sound.take(other)
     pairs, one, other = pairs[both], one[both], other[both]
     touch = among(one * n + other, touching[:, 0].astype(np.int64) * n + touching[:, 1])
-    order, first, count = grouped(topology.shells, n)
+    order, first, count = group_labels(topology.shells, n)
     by_shell = faces[order]
     low, high = topology.low, topology.high
     room = (np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])).prod(axis=1)

@@ -98,10 +98,10 @@
   function fitErrors(data) {
     const rows = Object.entries(data.models || {}).filter(([, block]) => block.fit_error).map(([model, block]) => [model, block.fit_error]);
     if (!rows.length) return null;
-    rows.sort(([, a], [, b]) => a.left_out.geometric_mean - b.left_out.geometric_mean);
+    rows.sort(([, a], [, b]) => a.leave_one_out.geometric_mean - b.leave_one_out.geometric_mean);
     const one = (value) => (known(value) ? number(value, 3) : "–");
     const factor = (value) => (known(value) ? Number(value.toPrecision(3)) : "–");
-    const cells = rows.map(([model, error]) => [nameOf(model), factor(error.left_out.geometric_mean), `${one(error.left_out.low)} to ${one(error.left_out.high)}`, factor(error.own_left_out), factor(error.own_by_stored), error.held_80 || "–"]);
+    const cells = rows.map(([model, error]) => [nameOf(model), factor(error.leave_one_out.geometric_mean), `${one(error.leave_one_out.low)} to ${one(error.leave_one_out.high)}`, factor(error.own_leave_one_out), factor(error.own_by_stored), error.coverage || "–"]);
     const title = `Error by the fit of ${data.fit.name}`;
     return [el("h3", {}, title),
       table(["Model", "Left out", "5 to 95 %", "Own units", "Own, stored constants", "In 80 %"], [...cells, [nameOf("baseline"), factor(rows[0][1].baseline), "–", "–", "–", "–"]], { label: title }),
@@ -147,7 +147,7 @@
     for (const [drive, block] of drives) {
       for (const key of ["u_r", "u_theta", "u_z"]) if (block[key]) columns.push({ name: `${drive}: |${key}|`, y: list(block[key].value) });
     }
-    const print = layered.paper_beside;
+    const print = layered.published_curves;
     if (print) {
       if (print.j0) series.push({ name: "Paper: |J0(kr)|", x, y: list(print.j0.map(Math.abs)), dash: true, colour: 1 });
       for (const [reading, values] of Object.entries(print.exponential || {})) series.push({ name: `Paper: exp, eta as ${reading.replace("_", " ")}`, x, y: list(values), dash: true, colour: reading === "loss_modulus" ? 3 : 4 });
@@ -157,7 +157,7 @@
     const rows = x.map((r, i) => [r, ...columns.map((curve) => curve.y[i])]).filter((row, i) => i % every === 0);
     return [
       curvePlot(series, { xLabel: "distance from the edge (mm)", yLabel: "% of |u| at the edge", log: true, label: "Decay from the unit's edge outwards" }),
-      el("p", { className: "note" }, `At ${number(layered.frequency_hz)} Hz on ${layered.tissue}. ${layered.u_is ? `Each curve over its own value at the edge; ${layered.u_is}. ` : ""}The band is the spread: ${layered.spread}. No ratio to a control: ${layered.hierarchical_over_control_reason}.`),
+      el("p", { className: "note" }, `At ${number(layered.frequency_hz)} Hz on ${layered.tissue}. ${layered.u_definition ? `Each curve over its own value at the edge; ${layered.u_definition}. ` : ""}The band is the spread: ${layered.spread}. No ratio to a control: ${layered.hierarchical_over_control_reason}.`),
       el("details", {}, el("summary", {}, "The curve as numbers, % of |u| at the edge"), table(["r (mm)", ...columns.map((curve) => curve.name)], rows, { label: "The curve as numbers" })),
     ];
   }
@@ -185,21 +185,21 @@
     const ends = (range) => (range ? `${number(range.low, 3)} to ${number(range.high, 3)}` : "–");
     const test = ({ against_best: against }) => (against && known(against.p) ? number(against.p, 2) : "–");
     const factor = (entry) => (entry ? entry.geometric_mean : "–");
-    const out = (entry, key) => factor((entry.leave_one_unit_out || {})[key]);
+    const out = (entry, key) => factor((entry.leave_one_out || {})[key]);
     return [el("h3", {}, "Error against the measured table"),
       table(["Model", "Nine levels", "Left out", "5 to 95 %", "p to the best", "Worst", "Twelve ratios", "Left out", "Directions"], compared.map(([model, entry]) => [
-        nameOf(model), factor(entry.levels), out(entry, "levels"), ends(((entry.leave_one_unit_out || {}).levels || {}).range), test(entry), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
+        nameOf(model), factor(entry.levels), out(entry, "levels"), ends(((entry.leave_one_out || {}).levels || {}).range), test(entry), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
         entry.directions ? `${entry.directions.right} of ${entry.directions.of}` : "–"]), { label: "Error against the measured table" }),
-      el("p", { className: "note" }, `Factors; 1 is exact. ${all.what || ""}`),
-      all.range && el("p", { className: "note" }, `Range: ${all.range}. p: ${all.sign_flip.what}.`),
+      el("p", { className: "note" }, `Factors; 1 is exact. ${all.note || ""}`),
+      all.range && el("p", { className: "note" }, `Range: ${all.range}. p: ${all.sign_flip.note}.`),
       chosen && el("p", { className: "note" }, `Rule, its form chosen among ${chosen.forms.length} without the unit too: ${number(chosen.geometric_mean, 3)} (${ends(chosen.range)}).`), classes(all)];
   }
 
   // What leaving out a whole class of units costs.
-  function classes({ classes_out: out, order }) {
+  function classes({ leave_one_class_out: out, order }) {
     if (!out) return null;
     return [table(["Class left out", ...order.map(nameOf)], Object.entries(out.by_class).map(([name, errors]) => [name, ...order.map((model) => errors[model])]), { label: "Error on a class that the fit did not have" }),
-      el("p", { className: "note" }, `${out.what}.`)];
+      el("p", { className: "note" }, `${out.note}.`)];
   }
 
   // A slope with its range, and how many measured pairs agree.
@@ -215,7 +215,7 @@
     const solved = ((data.fem || {}).sensitivities || []).map((one) => [`Finite elements, ${one.reading}`, one]);
     const reading = [...closed, ...solved].filter(([, seen]) => seen.by);
     if (!reading.length) return null;
-    const names = [...Object.keys(reading[0][1].by), ...reading[0][1].not_seen];
+    const names = [...Object.keys(reading[0][1].by), ...reading[0][1].no_effect];
     const most = (name) => Math.max(...reading.map(([, seen]) => Math.abs(seen.by[name] || 0)));
     const [read, unread] = [names.filter((name) => most(name) > 0), names.filter((name) => most(name) === 0)];
     read.sort((a, b) => most(b) - most(a));
