@@ -10,7 +10,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from unitcad.catalogue import Material, Value
-from unitcad.designs.dimensions import Outline
+from unitcad.designs.dimensions import Outline, growth
 from unitcad.designs.limits import filament_groove, leaf_mm
 from unitcad.moulds.base import plate_bottom, pry_floor
 from unitcad.moulds.cup import Rib, ribs, window_section
@@ -495,7 +495,10 @@ OVER_ALL = "height over all"
 
 
 def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
-    """Return the cavity's depth and every layer's height over its ground, if the printer's layers change them."""
+    """Return the cavity's depth and every layer's height over its ground, if the printer's layers change them.
+
+    They are those of the cured unit: silicone shrinks from the tools' lengths.
+    """
     dims, concentric, layer = moulds.plan.dimensions, moulds.plan.concentric, moulds.spec.moulds.layer_mm
     seat = -moulds.plate[0]
     below = dims.core_height, _whole(seat + dims.core_height, layer) - _whole(seat, layer)
@@ -506,7 +509,8 @@ def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
         heights.append((f"layer {i}'s {'cap' if capped else 'height'}", asked - low, printed - drawn_low))
         below = asked, printed
     heights.append((OVER_ALL, *below))
-    off = ((what, round(asked, 4), round(printed, 4)) for what, asked, printed in heights)
+    shrunk = growth(moulds.spec)
+    off = ((what, round(asked / shrunk, 4), round(printed / shrunk, 4)) for what, asked, printed in heights)
     return [UnitHeight(*each) for each in off if abs(each[1] - each[2]) > NEAR * layer]
 
 

@@ -641,7 +641,7 @@ def measurements(
     `masses_g`: of each layer of one unit, trimmed; `skin_g`: of its skin. `slot_height`: of the slot as the slicer
     makes the tongue (mm), None if it is the drawn one.
     """
-    spec, dims, off, exit = moulds.spec, moulds.plan.dimensions, eccentricity(moulds), moulds.plan.dimensions.exit
+    spec, dims, off, exit = moulds.spec, moulds.dimensions, eccentricity(moulds), moulds.dimensions.exit
     layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
     drawn = dims.heights[-1]
     high = next((each.printed_mm for each in unit_heights(moulds) if each.what == OVER_ALL), drawn)

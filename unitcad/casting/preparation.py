@@ -124,10 +124,16 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
         sliced = f"{low} to {high} times that by unitcad build {moulds.source} --slice -o sliced"
         how.append(f"{takes} filament ({sliced}).")
         how.append(f"{layers}, {PERIMETERS} perimeters, {INFILL_PERCENT} % infill{foot} (in the 3MF for PrusaSlicer).")
-    if lengths.shrinkage_percent or lengths.bore_compensation_mm:
-        larger = f"the tools are larger by {number(lengths.shrinkage_percent, 2)} %, for the silicone's shrinkage"
-        wider = f"bores are wider by {number(lengths.bore_compensation_mm, 2)} mm a side, which the printer takes away"
-        how.append(f"In the files {larger}, and {wider}.")
+    altered = []
+    if lengths.shrinkage_percent:
+        altered.append(
+            f"the tools are larger by {number(lengths.shrinkage_percent, 2)} %, for the silicone's shrinkage"
+        )
+    if lengths.bore_compensation_mm:
+        wider = number(lengths.bore_compensation_mm, 2)
+        altered.append(f"bores are wider by {wider} mm a side, which the printer takes away")
+    if altered:
+        how.append(f"In the files {', and '.join(altered)}.")
     if plan.of_kind("cup"):
         how.append(f"First time on this printer: print the fit coupon (unitcad coupon {lengths.printer}).")
     return Printing(

@@ -37,6 +37,7 @@ from unitcad.casting.preparation import Printing, preparation, printing, tunnels
 from unitcad.casting.steps import BenchStep, Phase, phases
 from unitcad.casting.troubles import Trouble, troubles
 from unitcad.casting.views import views
+from unitcad.designs.dimensions import growth
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import warnings
 
@@ -154,7 +155,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
     after = after_pours(moulds, silicones)
     edges = tuple(off_grid(moulds))
     printed = any(tool.made == "printed" for tool in plan.of_kind("tongue"))
-    slot = next((edge.nearest_mm for edge in edges if edge.piece == "tongue" and printed), None)
+    slot = next((edge.nearest_mm / growth(spec) for edge in edges if edge.piece == "tongue" and printed), None)
     every = [*prepared, *(step for pour in pours for step in pour.steps), *out, *motor]
     return Procedure(
         name=spec.name,

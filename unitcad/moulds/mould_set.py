@@ -192,7 +192,7 @@ class MouldSet:
     @property
     def assembly(self) -> tuple[Fitting, ...]:
         """How motor and circuit go into the body, or into the mould, in the design's words; () if it has none."""
-        said = self.design.assembly(self.spec, self.plan.dimensions)
+        said = self.design.assembly(self.spec, self.dimensions)
         return tuple(each if isinstance(each, Fitting) else Fitting(each) for each in said)
 
     @property

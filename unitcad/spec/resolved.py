@@ -298,10 +298,14 @@ def _override(printer: catalogue.Printer, moulds: Moulds) -> catalogue.Printer:
 
 def motor_of(spec: Spec) -> catalogue.Motor | None:
     """Return the catalogue's motor, or None if the spec names none or overrides a size beyond the entry's range."""
-    motor = catalogue.motors(spec.motors)[spec.motor.part] if spec.motor.part else None
+    motor = _named_motor(spec)
     if motor and all(_within(getattr(spec.motor, size), getattr(motor, size)) for size in MOTOR_SIZES):
         return motor
     return None
+
+
+def _named_motor(spec: Spec) -> catalogue.Motor | None:
+    return catalogue.motors(spec.motors)[spec.motor.part] if spec.motor.part else None
 
 
 def assumed_lengths(spec: Spec, given: Container[str] = (), path: str = "") -> dict[str, str]:
@@ -309,7 +313,7 @@ def assumed_lengths(spec: Spec, given: Container[str] = (), path: str = "") -> d
 
     `given`: lengths of the user's own, by their path in a file; `path`: the path of this spec in that file.
     """
-    motor = motor_of(spec)
+    motor = _named_motor(spec)  # even of another diameter it gives the thickness that the spec leaves out
     sizes = [(size, getattr(motor, size)) for size in MOTOR_SIZES] if motor else []
     found = {
         f"motor.{size}": f"{number(value.low, 3)} to {number(value.high, 3)}"

@@ -18,7 +18,7 @@ from unitcad.files import read_text
 from unitcad.rooms import FileKind, expect_none_but, file_kinds, of_other_kind
 from unitcad.rooms import load as load_reference
 from unitcad.spec import Spec, check_plain, convert, read_toml, to_data
-from unitcad.spec.custom_code import is_body_file, with_source
+from unitcad.spec.custom_code import is_body_file, is_custom, with_source
 from unitcad.spec.raw import RawSpec
 from unitcad.spec.toml import line_of
 from unitcad.validation.defaults import resolve
@@ -296,9 +296,13 @@ def judge(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settled data of the template of a spec's design, or of the default one."""
+    """Return the settled data of the template of a spec's design, or of the default one.
+
+    Nothing stands in for a design in a file: by another one sound values would count as faults.
+    """
     design = data.get("design")
-    return _template_data(design if isinstance(design, str) and design in templates() else default_template())
+    sound = _template_data(design if isinstance(design, str) and design in templates() else default_template())
+    return {key: value for key, value in sound.items() if key != "design" or not is_custom(design)}
 
 
 @cache
