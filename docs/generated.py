@@ -18,7 +18,7 @@ from mkdocs.structure.files import File, Files
 from msgspec import Struct
 
 from unitcad.arrays import layouts
-from unitcad.checks import mould_checks
+from unitcad.checks import explain, mould_checks
 from unitcad.cli.command_line import app
 from unitcad.lab.record import RULES
 from unitcad.meshcheck.rules.registry import FAMILIES, Rule, rules
@@ -79,11 +79,7 @@ def recording_findings() -> str:
 def mould_check_page() -> str:
     """Return a section for each check of `unitcad build`."""
     lines = ["# Mould checks", "", "`unitcad build` runs these checks and exits with 1 if one fails.", ""]
-    for check in mould_checks().values():
-        title, _, demand = check.demands.partition(": ")
-        module = inspect.getmodule(check.findings)
-        _, _, method = inspect.cleandoc(module.__doc__ or "").partition("\n\n") if module else ("", "", "")
-        lines += [f"## {check.code} {title}", "", f"{_sentence(demand)}", "", method, ""]
+    lines += [f"## {explain(code)}\n" for code in mould_checks()]
     return "\n".join(lines)
 
 

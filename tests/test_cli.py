@@ -232,3 +232,13 @@ def test_a_library_without_memory_is_no_bug(error: Exception, said: str, monkeyp
         cli.main()
     assert left.value.code == 1
     assert capsys.readouterr().err == f"{said}\n"
+
+
+def test_a_mould_check_is_explained_next_to_a_mesh_rule() -> None:
+    done = CliRunner().invoke(app, ["check", "--explain", "c210,T001"])
+    assert done.exit_code == 0
+    assert done.stdout.startswith("C210 gap\n\nFaces that slide have the printer's clearance.\n")
+    assert "\n\nT001 " in done.stdout
+    unknown = run("check", "--explain", "C211")
+    assert unknown.returncode == 2
+    assert unknown.stderr.startswith("error: --explain = 'C211': unknown name; known: C000, ")

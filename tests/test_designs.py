@@ -13,7 +13,7 @@ from unitcad.pipeline.variant import Variant
 from unitcad.validation import templates
 
 NAMES = sorted(templates())
-ROUND = [name for name in NAMES if Variant.of(name).design.tooling == "concentric"]
+ROUND = [name for name in NAMES if Variant.of(name).spec.design in ("embedded", "encapsulating")]
 
 
 def _solids(variant: Variant) -> dict[str, Manifold]:

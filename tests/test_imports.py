@@ -169,7 +169,10 @@ def test_no_design_is_named_outside_its_own_file() -> None:
     assert len(own) == len(shipped()) > 0
     named = {file.name: found for file in PACKAGE.rglob("*.py") if (found := _names_of_designs(file.read_text()))}
     assert named.keys() >= {file.name for file in own}
-    assert {name: found for name, found in named.items() if name not in {file.name for file in own}} == {}
+    others = {name: found for name, found in named.items() if name not in {file.name for file in own}}
+    assert others == {}, (
+        "a design's name is a word of its own: rename the design, or have the other file read its Design"
+    )
 
 
 def test_every_design_has_a_template_and_one_is_the_default() -> None:

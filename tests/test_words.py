@@ -40,36 +40,48 @@ def _prose(markdown: str) -> str:
     return re.sub(r"(?m)^\|.*$", "", re.sub(r"(?s)```.*?```", "", markdown))
 
 
-def _folders() -> dict[str, str]:
-    texts: dict[str, list[str]] = defaultdict(list)
+def _folders() -> dict[str, dict[str, str]]:
+    """Return the text of each file by folder and name."""
+    texts: dict[str, dict[str, str]] = defaultdict(dict)
     for path in sorted((ROOT / "unitcad").rglob("*.py")):
         parts = path.relative_to(ROOT / "unitcad").parts
-        texts[f"unitcad/{parts[0]}" if len(parts) > 1 else "unitcad"].append(_strings(path.read_text("utf-8")))
+        texts[f"unitcad/{parts[0]}" if len(parts) > 1 else "unitcad"]["/".join(parts)] = _strings(
+            path.read_text("utf-8")
+        )
     for path in sorted((ROOT / "docs").rglob("*.md")):
         if path.parent.name != "accuracy":  # written by the studies
-            texts["docs"].append(_prose(path.read_text("utf-8")))
-    return {name: "\n\n".join(found) for name, found in texts.items()}
+            texts["docs"][str(path.relative_to(ROOT / "docs"))] = _prose(path.read_text("utf-8"))
+    return texts
+
+
+def _found() -> dict[str, dict[str, list[str]]]:
+    """Return the sentences of each pattern, and the long ones, after their file's name, by folder."""
+    table: dict[str, dict[str, list[str]]] = {}
+    for folder, texts in _folders().items():
+        row = table[folder] = {pattern: [] for pattern in (*PATTERNS, "long sentences")}
+        for name, text in texts.items():
+            for sentence in re.split(r"(?<=[.!?])\s+|\n\n", text):
+                place = f"{name}: {' '.join(sentence.split())}"
+                for pattern, regex in PATTERNS.items():
+                    row[pattern] += [place] * len(re.findall(regex, sentence))
+                row["long sentences"] += [place] * (len(sentence.split()) > LONG)
+    return table
 
 
 def counts() -> dict[str, dict[str, int]]:
     """Return the count of each pattern, and of long sentences, by folder."""
-    table = {}
-    for name, text in _folders().items():
-        row = {pattern: len(re.findall(regex, text)) for pattern, regex in PATTERNS.items()}
-        sentences = re.split(r"(?<=[.!?])\s+|\n\n", text)
-        table[name] = {**row, "long sentences": sum(len(sentence.split()) > LONG for sentence in sentences)}
-    return table
+    return {folder: {pattern: len(places) for pattern, places in row.items()} for folder, row in _found().items()}
 
 
 def test_bad_words_do_not_increase() -> None:
     limits = tomllib.loads(TABLE.read_text("utf-8"))
-    more = [
-        f"{folder}: {pattern}: {count}, at most {limits.get(folder, {}).get(pattern, 0)}"
-        for folder, row in counts().items()
-        for pattern, count in row.items()
-        if count > limits.get(folder, {}).get(pattern, 0)
-    ]
-    assert more == []
+    more = {
+        f"{folder}: {pattern}: {len(places)}, at most {limits.get(folder, {}).get(pattern, 0)}": places
+        for folder, row in _found().items()
+        for pattern, places in row.items()
+        if len(places) > limits.get(folder, {}).get(pattern, 0)
+    }
+    assert more == {}
 
 
 def test_the_docs_stay_short() -> None:

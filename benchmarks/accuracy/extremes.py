@@ -133,7 +133,7 @@ def _sweeps(values: int | None) -> Iterator[Job]:
         return f"diameter_mm={2 * (4.5 + sum(walls)):.3f}"
 
     # fmt: off
-    for base, design in shipped().items():
+    for base, design in ((name, design) for name, design in shipped().items() if design.passes):
         cap = design.caps
         yield from each(f"{base}: walls 0.4 to 12 mm", base,
                         lambda w, cap=cap: [layers(2, w, cap), room(w, w)], 0.4, 0.5, 0.7, 1, 3, 6, 10, 12)

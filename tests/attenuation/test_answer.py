@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from unitcad.attenuation.edge.estimates import percent
 from unitcad.attenuation.edge.models import assessments, stored
 from unitcad.cli import app
+from unitcad.designs import design_of
 from unitcad.estimate_inputs import estimate_spec
 from unitcad.validation import load, templates
 
@@ -125,6 +126,8 @@ def test_what_is_next_to_nothing_is_not_called_nothing() -> None:
 
 @pytest.mark.parametrize("name", templates())
 def test_no_sentence_has_a_fraction_for_a_level_or_a_long_number(name: str) -> None:
+    if design_of(load(name)).passes is None:
+        pytest.skip("no model of this design")
     found = lead(name)
     for line in [*found["lines"], *found["details"]]:
         assert not re.search(r"\d\.\d{3}|\d\d\.\d\d|e-\d", line), line

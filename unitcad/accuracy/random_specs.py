@@ -127,7 +127,7 @@ def random_spec(choose: Choose, ranges: Ranges = DOCUMENTED, formats: Sequence[s
         share = choose.whole(0, 1000) / 1000
         return round(math.exp(math.log(of[0]) + share * math.log(of[1] / of[0])), digits)
 
-    design = choose.pick(tuple(shipped()))
+    design = choose.pick(tuple(name for name, design in shipped().items() if design.passes))
     motor: dict[str, Any] = {
         "diameter_mm": length(ranges.motor_diameter_mm),
         "thickness_mm": length(ranges.motor_thickness_mm),

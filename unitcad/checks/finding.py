@@ -24,7 +24,7 @@ class FindingRecord(TypedDict):
 
 @dataclass(frozen=True)
 class MouldFinding:
-    """One check at one place: `value` against `limit` in `unit`, whether it passes, and a remedy or a note."""
+    """A check at a place: `value` against `limit` in `unit` ("" for a ratio), whether it passes, a remedy or a note."""
 
     code: str
     where: str

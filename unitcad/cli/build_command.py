@@ -279,7 +279,7 @@ def _print_faults(manifest: Manifest) -> None:
         if check["ok"] and check["advice"]:
             warn(f"note: {check['code']} {check['where']}: {check['advice']}")
         if not check["ok"]:
-            measured = f"{check['value']:.3g} {check['unit']}, limit {check['limit']:.3g}"
+            measured = f"{check['value']:.3g} {check['unit']}".rstrip() + f", limit {check['limit']:.3g}"
             advice = f"; {check['advice']}" if check["advice"] else ""
             typer.echo(f"{check['code']} {check['where']}: {measured}{advice}", err=True)
     for finding in manifest["check"]["findings"]:

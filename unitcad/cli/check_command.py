@@ -32,7 +32,7 @@ from unitcad.meshcheck.output import FORMATS, render
 from unitcad.meshcheck.rules.registry import check_prefixes, rules
 from unitcad.meshcheck.rules.registry import explain as explanation
 from unitcad.meshcheck.rules.s_scale import unit_named
-from unitcad.rooms import expect_none_but
+from unitcad.rooms import expect_none_but, load
 from unitcad.spec.toml import parse_toml, read_toml
 
 
@@ -287,7 +287,7 @@ def check(
     ] = False,
     explain: Annotated[
         list[str] | None,
-        typer.Option(metavar="CODES", help="Explain rules: meaning, cause and fix. No file is checked."),
+        typer.Option(metavar="CODES", help="Explain mesh rules and mould checks (C...). No file is checked."),
     ] = None,
     list_rules: Annotated[bool, typer.Option("--list-rules", help="List all rules.")] = False,
 ) -> None:
@@ -300,7 +300,7 @@ def check(
         sys.stdout.write("".join(f"{rule.code} {rule.severity}: {rule.title}\n" for rule in rules().values()))
         return
     if explain is not None:
-        sys.stdout.write(explanation(",".join(explain)) + "\n")
+        sys.stdout.write(_explained([part.strip() for part in ",".join(explain).split(",")]) + "\n")
         return
     if as_json and output_format not in ("text", "json"):
         why = "--json asks for another one: leave one of them out, or have both with --report json=FILE"
@@ -445,3 +445,11 @@ def _limits(max_faces: int | None, field: str, seconds: float | None) -> Limits:
 
 def _split(values: list[str] | None) -> list[str] | None:
     return values and [part for value in values for part in value.split(",") if part.strip()]
+
+
+def _explained(codes: list[str]) -> str:
+    """Explain codes; those of mould checks begin with C. Raises Refusal for an unknown one."""
+    moulds = [code.upper() for code in codes if code[:1].upper() == "C"]
+    meshes = [code for code in codes if code.upper() not in moulds]
+    texts = [load("unitcad.checks:explain")(code) for code in moulds]
+    return "\n\n".join([*texts, *([explanation(",".join(meshes))] if meshes else [])])

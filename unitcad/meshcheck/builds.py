@@ -116,7 +116,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True, strict:
     area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
     facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)
     with keeping(findings, facts, lambda kept: in_file(kept, mesh)):
-        for module in registry.modules(registry.OF_MESHES):
+        for module in registry.modules():
             if hasattr(module, "check_mesh"):
                 findings.extend(module.check_mesh(part))
     if part.solid:

@@ -288,7 +288,7 @@ def _leads(spec: Spec) -> list[str]:
     if spec.fpcb or spec.wires or spec.motor.absent or not (design_of(spec).caps or drawn):
         return []
     offer = "draw a notch for them" if drawn else "add a table [wires] with diameter_mm, or [fpcb]"
-    return [f"no way out for the motor's leads: they lie between unit and skin; {offer}"]
+    return [f"no way out for the motor's leads: they run between unit and skin; {offer}"]
 
 
 def _not_estimated(spec: Spec) -> list[str]:

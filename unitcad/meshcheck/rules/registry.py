@@ -57,19 +57,13 @@ FAMILIES = {
     "D": "Printability",
     "M": "Manifest",
 }
-OF_MESHES = "VTG"
-"""Families whose files have a `check_mesh`, which needs a mesh alone."""
 _FAMILY_FILE = re.compile(f"[{''.join(FAMILIES).lower()}]_")
 
 
 @cache
-def modules(families: str = "".join(FAMILIES)) -> tuple[ModuleType, ...]:
-    """Return the files of rules of some families, one after the other; a file's name begins with its family's letter.
-
-    Others are not loaded.
-    """
+def modules() -> tuple[ModuleType, ...]:
+    """Return the files of rules, family by family; a file's name begins with its family's letter."""
     names = sorted(name for _, name, _ in iter_modules(folder.__path__) if _FAMILY_FILE.match(name))
-    names = [name for name in names if name[0].upper() in families]
     names.sort(key=lambda name: list(FAMILIES).index(name[0].upper()))
     return tuple(import_module(f"{folder.__name__}.{name}") for name in names)
 
