@@ -131,9 +131,7 @@ def _shown(procedure: Procedure) -> Iterator[str]:
 
 def _levelled(procedure: Procedure) -> Iterator[str]:
     """Level the mould before the first pour, and say how to see it."""
-    if not any(
-        "level" in step.text and "corners" in step.text and "paper" in step.text for step in procedure.preparation
-    ):
+    if not any("level" in step.text and "with paper" in step.text for step in procedure.preparation):
         yield "nothing says how the mould is levelled"
 
 
@@ -171,7 +169,7 @@ def _enough(procedure: Procedure) -> Iterator[str]:
 def _gripped(procedure: Procedure) -> Iterator[str]:
     """Give a cut tongue a grip."""
     for step in procedure.preparation:
-        if step.title == "Cut the tongues" and "what you pull by" not in step.text:
+        if step.title == "Cut the tongues" and "you pull by" not in step.text:
             yield "a cut tongue has nothing to pull it by"
 
 

@@ -81,8 +81,8 @@ def test_pictures_of_a_curved_set_show_what_is_there() -> None:
     drawn = {picture_path(name): bench.picture(name) for name in names}
     for name in names:
         colours = {extra.colour for extra in shown[name].extras}
-        assert (hues(drawn[picture_path(name)], ARROW) > 30) == (ARROW in colours), name
-        assert (hues(drawn[picture_path(name)], GREASE) > 30) == (GREASE in colours), name
+        for colour in (ARROW, GREASE):
+            assert (hues(drawn[picture_path(name)], colour) > 30) == (colour in colours), name
     layer1 = {name for name in names if hues(drawn[picture_path(name)], layer_colour(0)) > 300}
     assert layer1 == {"pour2-laid-in", "pour2-lid-on"}
     layer2 = {name for name in names if hues(drawn[picture_path(name)], layer_colour(1)) > 300}

@@ -81,9 +81,7 @@ def syringe_forgotten(made: Procedure) -> Procedure:
 
 
 def no_grip(made: Procedure) -> Procedure:
-    return replace(
-        made, preparation=tuple(replace(s, text=s.text.replace("what you pull by", "")) for s in made.preparation)
-    )
+    return replace(made, preparation=tuple(replace(s, text="") for s in made.preparation))
 
 
 def reworded(made: Procedure, old: str, new: str) -> Procedure:

@@ -33,7 +33,6 @@ from unitcad.casting.pouring import (
     lid_held,
     mixing_steps,
     motor_in,
-    never_pushed,
     pour_steps,
     shown,
     struck,
@@ -107,7 +106,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         _lid_off(moulds, step),
     )
     pours, prepared = (*flat_pours, pour_of(batch, steps)), (_sort_curved(moulds), *made.preparation[1:])
-    out, together = tuple(_out_of_curved(moulds, silicones[0])), motors_in(tuple(motor_in(moulds, silicones)))
+    out, together = tuple(_out_of_curved(moulds)), motors_in(tuple(motor_in(moulds, silicones)))
     every = [*prepared, *(each for one in pours for each in one.steps), *out, *together]
     grams = [v * float(s.density_g_cm3) / 1000 for v, s in zip(layer_volumes_mm3, silicones, strict=True)]
     return replace(
@@ -148,12 +147,11 @@ def _base(moulds: PatchMoulds) -> str:
 def _sort_curved(moulds: PatchMoulds) -> BenchStep:
     plan, label = moulds.plan, seen(moulds.plan.label)
     last = plan.steps[-1]
-    cups = join_words(f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps[:-1])
+    cups = ", ".join(f"{spaced(step.cup)} (C{step.index:X})" for step in plan.steps[:-1])
     return BenchStep(
         "Sort the pieces",
-        f"All are engraved {label}. The flat ones are "
-        f"for Layer 1: the base has a b before it, and of the cups {cups}. The curved ones are for the last pour: "
-        f"{_base(moulds)} has B{last.index:X} before it, {spaced(last.lid or '')} L{last.index:X}.",
+        f"All are engraved {label}. Flat, for Layer 1: the base (b), {cups}. Curved, for the last pour: "
+        f"{_base(moulds)} (B{last.index:X}), {spaced(last.lid or '')} (L{last.index:X}).",
         picture_path("pieces"),
         minutes=5.0,
     )
@@ -168,28 +166,25 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
     yield replace(pulled, title="Filament out of the flat base", picture=picture_path("flat-filament-out"))
     yield BenchStep(
         f"{cast} out",
-        f"Peel {cast} of each unit straight up off the flat base, its edge loosened with a blunt spatula. They differ "
-        "in the notches of the circuit: lay each down on paper at its own place, the same way round as in the mould. "
-        "Trim the flash with small scissors.",
+        f"Loosen the edge of each {cast} with a blunt spatula and peel it straight up. Their notches differ: lay each "
+        "on paper at its own place, turned as in the mould. Trim the flash with small scissors.",
         picture_path("flat-peel"),
         minutes=PEEL_MIN * units,
         required_tools=("small scissors", "blunt spatula", "paper"),
     )
     yield BenchStep(
         f"Filament into {base}",
-        f"Cut {units} straight pieces of filament, {_lengths(moulds)} mm long. Hold {base} in the hand and push one "
-        "up through each core from below, until its lower end is flush with the underside. Then put it down on a "
-        "flat board: it bears the filaments, so none can sink. Trim the upper end flush with the core's top with a "
-        "knife.",
+        f"Cut {units} straight filaments, {_lengths(moulds)} mm long. Push one up through each core of {base} from "
+        f"below until it is flush with the underside. Put {base} on a flat board, so that none sinks. Trim the upper "
+        "ends flush with the cores' tops.",
         _picture(step, "filament"),
         minutes=3.0 * units,
         required_tools=("sharp knife",),
     )
     yield BenchStep(
         f"Level {base}",
-        f"Put {base} in its final place and {lid} on it, dry. Lay a level on {lid}, along it and across, and shim "
-        f"the corners of {base} with paper until it reads level. Within 5 degrees is good enough for the vents. "
-        f"Lift {lid} off; leave {base} there until it is cured.",
+        f"Put {base} in its final place, {lid} on it, dry. Lay a level on {lid}, along and across, and shim the "
+        f"corners with paper. Within 5 degrees is good enough: so much the vents clear. Lift {lid} off.",
         _picture(step, "level"),
         minutes=5.0,
         required_tools=("level", "paper"),
@@ -203,9 +198,9 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
     )
     yield BenchStep(
         f"Lay {cast} in",
-        f"Lay each one over its core of {base}, at the place of its casting: A1 on A1, its notches over the fins. "
-        "Press its edge down all round until it is on the moat's floor and its top flat on the core: silicone that "
-        "creeps under it fills the cavity's mouth. No release agent and no grease on core or moat.",
+        f"Lay each over its core of {base}, A1 on A1, its notches over the fins. Press its edge down all round onto "
+        "the moat's floor, its top flat on the core: silicone that creeps under it fills the cavity's mouth. No "
+        "release agent, no grease on core or moat.",
         _picture(step, "laid-in"),
         minutes=LAY_IN_MIN * units / 2,
     )
@@ -229,10 +224,9 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
     slit = number(moulds.spec.moulds.seat_relief_mm, 3)
     yield BenchStep(
         f"Lid {step.index} on",
-        f"Draw a thin line of petroleum jelly on the curved land of {base} round the sheet's bed, near its outer edge. "
-        f"Put {lid} on over the pins: one of them is off the rectangle of the others, so it goes on one way only. "
-        f"Press it down until it bears on the land all round; at both ends, near the pins, a slit of {slit} mm stays "
-        "open.",
+        f"Draw a thin line of petroleum jelly on the curved land of {base}, near its outer edge. Put {lid} on over the "
+        "pins, which let it on one way only. Press it down until it bears on the land all round; at both ends a slit "
+        f"of {slit} mm stays open.",
         _picture(step, "lid-on"),
         minutes=LIFT_MIN,
         required_tools=("petroleum jelly",),
@@ -243,31 +237,30 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
 def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
     return BenchStep(
         f"Lid {step.index} off",
-        "Take off the tape or clamps of the lid. Lay a screwdriver into the slit at either end and turn "
-        f"both a little at a time, until {spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents "
-        "tear off at the sheet. Trim them flush with a knife.",
+        "Take off bands or clamp. Turn a screwdriver in the slit at either end, little by little, until "
+        f"{spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents tear off. Trim them flush with a "
+        "knife.",
         _picture(step, "lid-off"),
         minutes=LIFT_MIN,
         required_tools=("sharp knife",),
     )
 
 
-def _out_of_curved(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
+def _out_of_curved(moulds: PatchMoulds) -> Iterator[BenchStep]:
     """Describe the way from the cured sheet to a sleeve in the hand."""
     units, base = len(moulds.arranged.places), _base(moulds)
     yield BenchStep(
         "Filament out",
-        f"Lift the mould off the bench and lay {base} on its side. Take each filament with pliers in its pocket and "
-        f"pull it out along itself: {never_pushed(moulds.spec, inner)}",
+        f"Lift the mould off the bench, lay {base} on its side. Take each filament with pliers in its pocket and pull "
+        "it out along itself. Never push it through.",
         picture_path("filament-out"),
         minutes=PULL_MIN * units,
         required_tools=("narrow pliers",),
     )
     yield BenchStep(
         "Peel off",
-        "Loosen the sheet's edge all round with a blunt spatula. Begin at one end: lift it, and draw each unit off its "
-        "core square to the base at its place, row after row. Straight up only the middle ones come. The "
-        "picture shows the way of each part; the sheet stays in one piece. Trim the flash with small scissors.",
+        "Loosen the sheet's edge all round with a blunt spatula. From one end, row after row, draw each unit off its "
+        "core square to the base at its place, as the picture shows. Trim the flash with small scissors.",
         picture_path("peel"),
         minutes=PEEL_MIN * units,
         required_tools=("small scissors", "blunt spatula"),

@@ -159,6 +159,9 @@ def list_consumables(
         note = f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide"
         yield Item("flat screwdrivers", 2, "piece", "tool", note)
     named = {"caliper", *(tool for step in steps for tool in step.required_tools)}
+    injected = moulds.spec.moulds.pour == "injected"
+    if cups and not injected:
+        named.discard("adhesive tape")  # its strips are on the list
     for tool in sorted(named, key=[*REQUIRED_TOOLS].index):
         yield Item(tool, 1, *REQUIRED_TOOLS[tool])
     if prop := tongue_prop(moulds):
@@ -169,7 +172,7 @@ def list_consumables(
         chamber = f"a chamber that reaches {number(VACUUM_INHG, 3)} inHg"
         note = f"at least {number(least, 2)} ml; {chamber}"
         yield Item("degassing container", 1, "piece", "tool", note, least)
-    if moulds.spec.moulds.pour == "injected":
+    if injected:
         yield from injecting(batches)
     elif cups:
         strips = 2 * (len(tape_places(moulds)) + len(side_places(moulds))) * pours

@@ -40,11 +40,9 @@ from unitcad.moulds.plan import Step
 from unitcad.spec import Spec
 from unitcad.text import join_words, number, spaced
 
-TACK = (
-    "done if a gloved finger comes off without a pull and a fingernail's dent springs back. If not, wait half an hour"
-)
+TACK = "It is done if a gloved finger comes off clean and a fingernail's dent springs back. If not, wait half an hour"
 """How to tell cured silicone from tacky silicone."""
-LEVEL_AGAIN = "Look at the level again and correct it with paper."
+LEVEL_AGAIN = "Correct the level with paper."
 """How the step that holds a cup or a lid ends: nothing is moved between it and the cure."""
 
 
@@ -97,7 +95,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     plan, spec, tongues = moulds.plan, moulds.spec, moulds.plan.standing(step, "tongue")
     cells, the_tongue = len(plan.layout.cells), "the tongue" if len(tongues) == 1 else "each tongue"
     # Each cavity has a groove, which stops next to a window.
-    groove = "the groove" if len(step.layer) == 1 else "the grooves round the cavities"
+    groove = "the groove" if len(step.layer) == 1 else "the grooves"
 
     def picture(name: str) -> str:
         path = f"pour{n}-{name}"
@@ -133,8 +131,8 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     if flanks := moulds.greased(step):
         yield BenchStep(
             "Grease the flanks",
-            f"Before cup {n} goes on, smear petroleum jelly on {flanks}: a film that shines, no beads. It keeps "
-            "silicone out of the slits next to the cup's slots. Wipe it off everywhere else.",
+            f"Smear petroleum jelly on {flanks}: a film that shines, no beads. It keeps silicone out of the slits "
+            "next to the cup's slots.",
             picture("grease"),
             minutes=1.0 * cells,
             required_tools=("petroleum jelly",),
@@ -144,8 +142,8 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     if faces and plan.pins:
         earlier = f" and Layer {n - 1}" if n > 1 else ""
         agent = (
-            f"Release agent, if any, thinly and only on the sheet's bed and the bores of cup {n}, away from the base: "
-            f"a printed cup holds a thin sheet fast. None in the slots for the fins, on the base{earlier}."
+            f"Release agent thinly and only on the sheet's bed and the bores of cup {n}, away from the base: a printed "
+            f"cup holds a thin sheet fast. None in the fins' slots, on the base{earlier}."
         )
     elif faces:
         where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)
@@ -155,8 +153,8 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         on = "on and press it down evenly until it sits; its ribs centre it."
     elif plan.pins:
         on = (
-            f"on over the pins, cut corner over cut corner, and press it flat. The pins leave "
-            f"{number(plan.pins.clearance, 2)} mm of play each way: leave it in the middle of that."
+            "on over the pins, cut corner over cut corner, and press it flat, in the middle of the pins' play of "
+            f"{number(plan.pins.clearance, 2)} mm each way."
         )
     else:
         on = "on and push it towards the cut corner, "
@@ -206,8 +204,8 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
             poured = f"Pour in a thin thread at one place until {where} over its rim{each}."
         else:
             poured = (
-                "Pour in a thin thread, first at each unit's earlier layer until that is covered, then outwards "
-                "until the whole cavity stands over its rim."
+                "Pour in a thin thread, first next to each unit's earlier layer until that is covered, then outwards "
+                "until the cavity stands over its rim."
             )
         strip = not plan.concentric and plan.dimensions.core_height > step.rim
         tool = "the blade, upright, its narrow edge down,"
@@ -218,7 +216,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         yield from struck(
             batch,
             f"{poured} Prick bubbles with a pin.",
-            f"Draw {tool} along the rim in one slow stroke; the rest goes "
+            f"Draw {tool} along the rim in one slow stroke. The rest goes "
             f"{f'into {groove}' if step.groove else 'onto a scrap: this cup has no groove'}.",
             " The film on the rim lifts off with the cup.",
             cells,
@@ -253,9 +251,8 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     split = len(plan.pieces_of(step.cup)) > 1
     if split:
         pried = (
-            "Lay a screwdriver in every pry slot, its tip under the cup, and press the handles down in turn, a little "
-            "at a time; at a piece over no slot turn a blunt spatula under its outer edge. Dovetails slide up and "
-            "down: go on until every piece is free."
+            "Lay a screwdriver in every pry slot, its tip under the cup. Press the handles down in turn, little by "
+            "little, until every piece is free; at a piece over no slot turn a blunt spatula under its outer edge."
         )
     else:
         pried = (
@@ -288,7 +285,7 @@ def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:
         where += f", {'one' if len(between) == 1 else 'the others'} {join_words(between)} mm from the left one"
     pieces = ""
     if split:
-        pieces = " Each piece of cup and base that reaches these sides has one; one over a seam holds both pieces."
+        pieces = " A strip over a seam holds both pieces."
         if sides := len(side_places(moulds)):
             count = "a strip" if sides == 1 else f"{sides} strips"
             pieces += f" The two other sides have {count} each, as the picture shows."
@@ -356,19 +353,13 @@ def mixing_steps(batch: Batch) -> Iterator[BenchStep]:
     )
     yield BenchStep(
         "Mix",
-        f"{_mixing(batch.pot_min)} Keep the mixing cup.",
+        f"Mix for {number(MIXING_MIN, 3)} min, scraping walls and bottom, until no streak is left. The pot life of "
+        f"{number(batch.pot_min, 2)} min runs from now. Keep the mixing cup.",
         kind="mix",
         minutes=MIXING_MIN,
     )
     if batch.vacuum:
         yield BenchStep("Degas", batch.verdict, minutes=DEGASSING_MIN)
-
-
-def _mixing(pot_min: float) -> str:
-    return (
-        f"Mix for {number(MIXING_MIN, 3)} min, scraping walls and bottom, until no streak is left. The pot life of "
-        f"{number(pot_min, 2)} min runs from now."
-    )
 
 
 def injection_steps(batch: Batch, picture: str) -> Iterator[BenchStep]:
@@ -378,8 +369,7 @@ def injection_steps(batch: Batch, picture: str) -> Iterator[BenchStep]:
     yield BenchStep(
         "Draw up",
         f"Draw all of the {number(mix.millilitres, 3)} ml into a syringe of {number(mix.syringe_size_ml, 3)} ml; "
-        f"{number(mix.syringe_ml, 3)} ml fill cavities, tip and plunger.{refilled} Point it up and push until "
-        "silicone, no air, stands at the tip.",
+        f"{number(mix.syringe_ml, 3)} ml fill cavities, tip and plunger.{refilled} Point it up and push out the air.",
         minutes=STRIKE_MIN,
     )
     if not batch.vacuum:
@@ -428,7 +418,7 @@ def cure(batch: Batch, touched: str, cast: str, picture: str) -> BenchStep:
     """Say how long a pour cures, and how to tell that it is done."""
     return BenchStep(
         "Cure",
-        f"Cure for {number(batch.cure_h, 2)} h, level. Then touch {touched}, not the {cast}: {TACK}.",
+        f"Cure for {number(batch.cure_h, 2)} h, level. Then touch {touched}, not the {cast}. {TACK}.",
         picture,
         kind="cure",
         wait_min=60 * batch.cure_h,
@@ -463,9 +453,9 @@ def release(moulds: MouldSet, first: Material) -> Iterator[BenchStep]:
         if split:
             levered = (
                 f"Leave the tape on the underside: it ties the pieces together. Hold the mould off the bench by {cup}. "
-                "Lever the base off downwards with a screwdriver in every pry slot; at a piece that has none, turn a "
-                "blunt spatula between it and the cup, at its outer edge. Go round and round, a little at each place, "
-                "so that no piece runs ahead of the next. The base must come straight."
+                "Lever the base off downwards and straight: a screwdriver in every pry slot, or a blunt spatula at the "
+                "outer edge of a piece that has none. Go round and round, a little at each place, so that no piece "
+                "runs ahead of the next."
             )
         if split and inner(split):
             levered += (
@@ -573,14 +563,13 @@ def _mixed_later(mix: AfterPours, spec: Spec) -> Iterator[BenchStep]:
     ratio = float(mix.silicone.mix_ratio)
     part_b = mix.grams / (1 + ratio)
     pot_min = at_room(float(mix.silicone.pot_life_min), spec.casting.room_c)
+    mixed = "Mix and degas" if spec.casting.vacuum else "Mix"
     yield BenchStep(
-        f"Weigh for the {mix.use}",
-        f"Weigh {shown(mix.grams - part_b)} g of {mix.silicone.name} part A and {shown(part_b)} g of part B.",
-        minutes=WEIGH_MIN,
+        f"Mix for the {mix.use}",
+        f"Weigh {shown(mix.grams - part_b)} g of {mix.silicone.name} part A and {shown(part_b)} g of part B. "
+        f"{mixed} as for a pour; pot life {number(pot_min, 2)} min.",
+        minutes=WEIGH_MIN + MIXING_MIN + (DEGASSING_MIN if spec.casting.vacuum else 0.0),
     )
-    yield BenchStep("Mix", _mixing(pot_min), minutes=MIXING_MIN)
-    if spec.casting.vacuum:
-        yield BenchStep("Degas", "Degas as for a pour.", minutes=DEGASSING_MIN)
 
 
 def after_pours(moulds: MouldSet, silicones: Sequence[Material]) -> list[AfterPours]:

@@ -174,7 +174,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     own = [f"C{step.index:X} on {spaced(step.cup)}" for step in plan.steps]
     own += [f"L{step.index:X} on {spaced(step.lid)}" for step in plan.steps if step.lid]
     own += [f"F on the {plan.called(tray.name)}" for tray in plan.of_kind("tray")]
-    pieces = " Beside it each piece of a tool that is printed in several has its number." if plan.splits else ""
+    pieces = " Pieces of one tool have a number too." if plan.splits else ""
     marks = f"{label[:2]} and {label[2:]} on {'cups and lids' if plan.of_kind('lid') else 'cups'}, {join_words(own)}"
     if any(len(plan.pieces_of(cup.name)) > 1 for cup in plan.of_kind("cup")):
         marks = f"{join_words(own)}, and after it {label} where the piece has room"
@@ -189,13 +189,13 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
         length = plan.layout.cup[0] - min(abs(c.x) for c in plan.layout.cells) + GRIP_GAP + GRIP_LENGTH
         yield BenchStep(
             "Cut the tongues",
-            f"Cut {'one tongue' if len(cut) == 1 else f'{len(cut)} tongues'} from film or steel, "
-            f"{number(dims.exit.height, 3)} mm thick, {number(dims.exit.width, 3)} mm wide and {number(length, 2)} mm "
-            f"long, without burr. Cut one end hollow to the ledge's radius of {number(dims.ledge_radius, 3)} mm. Fold "
-            f"tape over the last {number(GRIP_LENGTH, 2)} mm of the other end: this tab is what you pull by.",
+            f"Cut {'one tongue' if len(cut) == 1 else f'{len(cut)} tongues'} of {number(length, 2)} x "
+            f"{number(dims.exit.width, 3)} mm from film or steel {number(dims.exit.height, 3)} mm thick, without burr, "
+            f"one end hollow to the ledge's radius of {number(dims.ledge_radius, 3)} mm. Fold tape over the other "
+            f"end's last {number(GRIP_LENGTH, 2)} mm: you pull by this tab.",
             picture_path("cut-tongue"),
             minutes=5.0 * len(cut),
-            required_tools=("flat pliers",),
+            required_tools=("flat pliers", "adhesive tape"),
         )
     yield from cleaning(moulds, silicones)
     yield from joining(moulds)
@@ -205,14 +205,13 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     if plan.pins:
         fits = (
             "Put each cup over the pins once, dry; one pin stands off the square of the others, so it goes on one way "
-            "only. It must lie flat until no paper goes in under it. A cup that rocks: cut off the first layer's bulge "
-            "round pins and holes, scrape both faces clean, try again."
+            "only. It must lie flat: no paper goes under it. If it rocks, cut off the first layer's bulge round pins "
+            "and holes and scrape both faces clean."
         )
     elif standing and leaf:
         fits = (
-            "Press each cup onto the plinth once by hand; its cut corner lets it on one way only. Its "
-            f"{len(standing)} ribs stand on leaves {number(leaf, 2)} mm thick, which bend and centre it. "
-            "A leaf broken off: print it again."
+            f"Press each cup onto the plinth once by hand, cut corner over cut corner. Its {len(standing)} ribs stand "
+            f"on leaves {number(leaf, 2)} mm thick, which bend and centre it; print a cup with a broken leaf again."
         )
     elif standing:
         fits = (
@@ -234,9 +233,9 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
         between = " If its groove ends under the plate, cut the bent end to length." if several_rows else ""
         yield BenchStep(
             "Filament in",
-            "Bend each piece of filament by a right angle, warm from hot water, one leg "
+            "Bend each filament by a right angle, warm from hot water, one leg "
             f"{number(dims.core_height - moulds.plate[0] + SPARE, 2)} mm long.{between} Push that leg up through the "
-            "core until the bent end lies in the groove under the plate. Trim it flush with the core's top.",
+            "core until the other lies in the plate's groove. Trim it flush with the core's top.",
             picture_path("filament"),
             minutes=3.0 * cells,
             required_tools=("sharp knife",),
@@ -246,8 +245,8 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
     if lengths.pour == "injected":
         enough = f"Within {number(TILT_DEG, 2)} degrees is good enough for the vents."
     yield level(
-        f"Put the base where it stays until the last cure, {cup} on it. Lay a level on the rim, along and across, and "
-        f"shim the corners of the base with paper until it reads level. {enough} Take {cup} off."
+        f"Put the base in its final place, {cup} on it. Lay a level on the rim, along and across, and shim the base's "
+        f"corners with paper. {enough} Take {cup} off."
     )
 
 
@@ -268,8 +267,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         return
     yield BenchStep(
         "Wash",
-        "Wash the pieces in isopropanol, holes too, until nothing feels slippery to a gloved finger. Let "
-        "them dry until no spot is dark.",
+        "Wash the pieces in isopropanol, holes too, until nothing feels slippery. Dry them until no spot is dark.",
         kind="rest",
         minutes=15.0,
         wait_min=30.0,
@@ -282,9 +280,8 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         height = number(min(high - low for _, low, high in windows), 2)
         yield BenchStep(
             "Clear the windows",
-            f"Clear the windows of {join_words(spaced(step.cup) for step in steps)} before the post-cure: resin stays "
-            f"in slots of {height} mm. Rinse each with a syringe of isopropanol. Push the tongue's film through until "
-            "it slides freely.",
+            f"Clear the windows of {join_words(spaced(step.cup) for step in steps)}, {height} mm high, of resin: rinse "
+            "each with a syringe of isopropanol and push the tongue through until it slides freely.",
             picture_path("clear-windows"),
             minutes=5.0 * len(steps),
             required_tools=("isopropanol and lint-free wipes", "rinsing syringe"),
@@ -303,7 +300,7 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         "Test the cure",
         "Cure a drop of each silicone on the base, off the cavity, for its whole cure "
         f"({', '.join(f'{name} {number(hours, 2)} h' for name, hours in drops.items())}). If its underside is tacky, "
-        "coat the pieces with acrylic varnish (assumed) or change the resin, and test again.",
+        "coat the pieces with acrylic varnish (assumed) or change the resin; test again.",
         kind="cure",
         minutes=WEIGH_MIN + MIXING_MIN,
         wait_min=60 * max(drops.values()),
@@ -344,16 +341,16 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
     upper = [name for tool, name in called.items() if plan.tool(tool).kind == "cup"]
     play = number(base.seams[0].play, 2)
     grid = any(seam.across == "y" for split in plan.splits for seam in split.seams)
-    numbered = "each engraved with its number from the left" + ", row by row from the back" * grid
+    numbered = "numbered from the left" + ", row by row from the back" * grid
     if any(map(inner, plan.splits)):
         numbered += "; a piece without an outer edge has none"
     rows = ", one row after the other" * grid
     around = ", cut out round the filaments' grooves" * bool(grid and plan.of_kind("filament"))
     text = (
-        f"Printed in pieces: {parts}, {numbered}. Cut off the first layer's bulge along the dovetails. Lay a piece "
-        f"flat and push the next one straight down onto it, dovetail into dovetail{rows}, until a fingernail feels no "
-        f"step. They have {play} mm of play; scrape dovetails that jam. Then seal each seam from outside, never on a "
-        f"face that silicone touches: tape over the underside of the {below}{around} and over the ends of the seam"
+        f"Printed in pieces: {parts}, {numbered}. Cut off the first layer's bulge along the dovetails. Push each piece "
+        f"straight down onto its neighbour, dovetail into dovetail{rows}, until a fingernail feels no step; scrape "
+        f"dovetails that jam. Seal each seam from outside, never on a face that silicone touches: tape over the "
+        f"underside of the {below}{around} and over the seam's ends"
     )
     if upper:
         # The pins join the pieces of each cup, except if no unit is between a seam of the base and one of a cup.
@@ -373,12 +370,12 @@ def joining(moulds: MouldSet) -> Iterator[BenchStep]:
                 "the rim: no light may show under it"
             )
         text += (
-            f"; petroleum jelly rubbed into the underside of {join_words(upper)} and wiped off flush. The tape stays "
-            f"on until the {below} is off. {in_line}"
+            f"; petroleum jelly rubbed into the underside of {join_words(upper)}, flush. The tape stays on until the "
+            f"{below} is off. {in_line}"
         )
     yield BenchStep(
         "Join the pieces",
-        f"{text}. Silicone in a seam cures to a fin {play} mm thick: pull it off with the flash.",
+        f"{text}. Trim the fin of {play} mm that silicone makes in a seam with the flash.",
         picture_path("join"),
         minutes=3.0 * sum(len(split.pieces) - 1 for split in plan.splits),
         required_tools=("wide adhesive tape", *["petroleum jelly"] * bool(upper)),

@@ -167,7 +167,9 @@ def _stretches(line: Sequence[Phase]) -> Iterator[str]:
     names, begins, bench = list[str](), 0.0, 0.0
     for i, phase in enumerate(line, 1):
         begins = begins if names else phase.start_min
-        names, bench = [*names, phase.name], bench + phase.bench_min
+        # The end of a stage that began before a cure needs no name if another stage follows.
+        names = [*(name for name in names if ": " not in name), phase.name]
+        bench += phase.bench_min
         if phase.wait_min or i == len(line):
             wait = f", then wait {duration(phase.wait_min)}" if phase.wait_min and i == len(line) else ""
             yield f"- {duration(begins)} after the start: {', '.join(names)}; {duration(bench)} of work{wait}"

@@ -79,6 +79,7 @@ REQUIRED_TOOLS = {
     "soldering iron and solder": ("set", "tool", ""),
     "silicone adhesive": ("tube", "bought", "neutral-curing; or a primer and a smear of silicone"),
     "release agent": ("dab", "bought", "optional"),
+    "adhesive tape": ("roll", "bought", ""),
     "wide adhesive tape": ("roll", "bought", "under the seams of split tools"),
     "petroleum jelly": ("dab", "bought", ""),
     "isopropanol and lint-free wipes": ("set", "bought", ""),

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-from unitcad.kernels.mesh import corners_and_faces
+from unitcad.kernels.mesh import arrays, corners_and_faces
+from unitcad.kernels.mesh import realise as meshed
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import Profile, arc_middle, sides
 from unitcad.shape.tree import Turn
@@ -48,7 +49,25 @@ def _solid(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
     return known[shape]
 
 
+def _is_faceted(shape: Shape) -> bool:
+    """Tell whether a shape is made of polyhedra only: its mesh is exact then."""
+    match shape:
+        case Revolve() | Extrude():
+            return False
+        case Polyhedron():
+            return True
+        case Union(parts) | Common(parts):
+            return all(map(_is_faceted, parts))
+        case Cut(body, tools):
+            return all(map(_is_faceted, (body, *tools)))
+    return _is_faceted(shape.shape)
+
+
 def _built(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
+    if not isinstance(shape, Polyhedron) and _is_faceted(shape):
+        # OCCT takes minutes for booleans of thousands of faces.
+        corners, faces = arrays(meshed(shape, 3))
+        return library.polyhedron(corners.tolist(), faces.tolist())
     match shape:
         case Revolve(profile):
             return library.revolve(library.face(_wire(profile, lambda r, z: (r, 0.0, z), library), []))

@@ -286,7 +286,9 @@ def unit_section(moulds: MouldSet) -> str:
 
 
 def side_by_side(bodies: Sequence[Body]) -> list[Body]:
-    """Return pieces of tooling in a row along x, first the first: the pieces of a cut tool, or all tongues, together.
+    """Return pieces of tooling in a row along x, in their order.
+
+    The pieces of a cut tool are together, as are a pour's tongues and its filaments.
 
     As assembled, the cups of two pours would be in one place, and ribs press into the base.
     """

@@ -298,7 +298,7 @@ def judge(data: dict[str, Any]) -> dict[str, Any]:
 def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settled data of the template of a spec's design, or of the default one.
 
-    Nothing stands in for a design in a file: by another one sound values would count as faults.
+    No other design replaces one in a file: it would refuse values that the file's accepts.
     """
     design = data.get("design")
     sound = _template_data(design if isinstance(design, str) and design in templates() else default_template())

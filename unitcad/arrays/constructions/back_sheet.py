@@ -701,11 +701,10 @@ def seal_places(array: Array, pour: int) -> str:
     if not ridges:
         return ""
     length = max(fin.reach for fin in ridges) - dimensions(array.unit).radii[pour - 1]
-    layer = "" if pour == 1 else f", none on Layer {pour - 1}"
+    layer = "" if pour == 1 else f" or on Layer {pour - 1}"
     return (
-        "every fin, the ridge that runs out from a core: both upright sides, the top and the end face, on its "
-        f"outermost {number(length, 3)} mm only. None nearer the core, since silicone is cast against the fin"
-        f"{layer}"
+        "every fin, the ridge that runs out from a core: the faces of its outermost "
+        f"{number(length, 3)} mm, none nearer the core{layer}"
     )
 
 

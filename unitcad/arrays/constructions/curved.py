@@ -541,8 +541,7 @@ def assembly(array: Array) -> tuple[Fitting, ...]:
     """Write how the flat circuit is laid into the sleeve."""
     solder, lay_in = back_sheet.assembly(array)
     flat = (
-        "Open the sleeve until it is flat and tape its ends down: the circuit is flat, as long as the sheet laid "
-        "flat, and bends with the sleeve when it is worn. It stays flat until the adhesive is cured."
+        "Tape the sleeve's ends down flat until the adhesive is cured: the circuit is as long as the sheet laid flat."
     )
     return replace(solder, text=f"{solder.text} {flat}"), lay_in
 
