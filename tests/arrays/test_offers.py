@@ -43,6 +43,11 @@ OFFERED: list[tuple[str, dict[str, Any], str]] = [
     ("hex-19", {"moulds.bed_y_mm": 20}, "moulds.bed_y_mm"),
     ("forearm-pockets", {"moulds.bed_y_mm": 60}, "moulds.bed_y_mm"),  # a strap slot as long as two rows
     ("forearm-pockets", TWELVE, "moulds.bed_x_mm"),
+    ("forearm-patch", {"layout.rows": 4, "layout.columns": 6, "moulds.bed_y_mm": 20}, "moulds.bed_y_mm"),
+    # A sheet longer than its way round the limb.
+    ("wrist-band", {"sheet.margin_mm": 8}, "layout.count"),
+    ("wrist-band", {"limb.radius_mm": 30}, "layout.count"),
+    ("forearm-patch", {"layout.columns": 4, "limb.radius_mm": 10}, "limb.radius_mm"),
 ]
 
 
@@ -58,6 +63,11 @@ def test_what_can_not_be_cast_is_refused_with_what_would(name: str, changes: dic
 REFUSED: list[tuple[str, dict[str, Any], str, object]] = [
     ("forearm-patch", {"unit": "embedded"}, "unit.design", "encapsulating"),
     ("forearm-patch", {"unit": "no-fpcb"}, "unit.fpcb", None),
+    ("forearm-patch", {"sheet.hold_mm": 0.2}, "sheet.hold_mm", None),
+    # What moulds of arrays do not draw.
+    ("forearm-patch", {"unit.moulds.shrinkage_percent": 0.1}, "unit.moulds.shrinkage_percent", 0.0),
+    ("forearm-patch", {"unit.moulds.bore_compensation_mm": 0.1}, "unit.moulds.bore_compensation_mm", 0.0),
+    ("forearm-pockets", {"unit.skin_mm": 0.5}, "unit.skin_mm", 0.0),
     ("sleeve-curved", {"unit": "embedded"}, "unit.design", "encapsulating"),
     ("forearm-pockets", {"sheet.strap_slot_mm": [0.1, 5]}, "sheet.strap_slot_mm.0", 0.8),
     ("forearm-patch", {"sheet.strap_slot_mm": [5, 0.1]}, "sheet.strap_slot_mm.1", 0.8),

@@ -10,6 +10,8 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
 from unitcad.cli import main
+from unitcad.sweeps import BatchOptions, load_sweep, run
+from unitcad.sweeps.executors import SerialExecutor
 
 SPEC = """
 name = "ring"
@@ -78,6 +80,11 @@ def ring_sweep(folder, function="unit", heights=None, materials=1, more=""):
         f'"layers.0.material" = {silicones[:materials]}\n'
     )
     return file
+
+
+def made(sweep, out, executor=None, **options):
+    """Make the units of a sweep in this process; return the summary."""
+    return run(load_sweep(sweep), out, BatchOptions(("unit",), **options), executor or SerialExecutor(), workers=1)
 
 
 def calls(folder):
