@@ -50,8 +50,8 @@ def test_pours_between_which_layers_are_laid_in_elsewhere_have_surroundings_of_t
 ROWS = "forearm-patch", "layout.rows=2", "sheet.strap_slot_mm=[3,8]"
 # Units stand at -20, 0 and 20 along x, at -10 and 10 along y: bores of 5.75, cores of 4.6, 2.11 high.
 FAULTS: dict[str, tuple[str, str, Change]] = {
-    "a lump in the bore of the middle": ("C100", "cup1", more(box(-0.4, 0.4, 15.5, 16, 1, 2))),
-    "a core of the middle 0.2 too high": ("C200", "base", more(moved(cylinder(3, 0, 2.31), 0, 10))),
+    "a lump in the bore of the middle": ("C100", "cup1", more(box(-0.4, 0.4, -4.5, -4, 1, 2))),
+    "a core of the middle 0.2 too high": ("C200", "base", more(moved(cylinder(3, 0, 2.31), 0, -10))),
     "a leak between two cells": ("C100", "cup1", less(box(4, 16, 12.5, 13.1, 1, 2))),
     "a hole under a cell": ("C100", "base", less(moved(cylinder(0.2, -9, 1), 25, 10))),
     "a knob on a core": ("C300", "base", more(moved(cylinder(4.7, 1.0, 1.4), 20, 10))),

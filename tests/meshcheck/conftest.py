@@ -13,9 +13,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from malformed import options
 
-from unitcad.meshcheck import FileReport, check_file
+from unitcad.meshcheck import FileReport, Finding, check_file
 
 Judge = Callable[..., FileReport]
+
+
+def finding(report: FileReport, code: str) -> Finding:
+    """The finding of a code; a report has one at most."""
+    return next(found for found in report.findings if found.code == code)
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import finding
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from malformed import with_sliver
@@ -133,7 +134,7 @@ def test_small_shells_are_judged_by_their_own_size(part: np.ndarray, code: str, 
     report = judge(stl(np.concatenate([part, BEAM - [0, 0, 50]])))
     assert code in alone
     assert codes(report) == alone
-    assert next(found.count for found in report.findings if found.code == code) == 1
+    assert finding(report, code).count == 1
 
 
 PARTS = {

@@ -7,6 +7,7 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
+from conftest import finding
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -165,7 +166,7 @@ def test_four_faces_at_an_edge_that_do_not_all_agree_are_wound_wrongly(judge) ->
     turned = np.argmax(upright)
     cubes[turned] = cubes[turned, ::-1]
     report = judge(stl(cubes))
-    assert next(found.count for found in report.findings if found.code == "T007") == 3
+    assert finding(report, "T007").count == 3
 
 
 _BESIDE = box(at=(10, 0, 0))
