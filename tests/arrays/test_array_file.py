@@ -167,12 +167,6 @@ def test_no_table_lets_the_decoder_read_beyond_its_memory() -> None:
         gc.collect()
 
 
-def test_a_back_sheet_has_no_pockets_to_hold_by() -> None:
-    with pytest.raises(Refusal, match="leave it out") as refused:
-        load_array("forearm-patch", ["sheet.hold_mm=0.2"])
-    assert refused.value.field == "sheet.hold_mm"
-
-
 def test_python_takes_changes_as_a_dict_and_load_refuses_arrays() -> None:
     array = load_array("forearm-pockets", {"layout.pitch_mm": 25.0})
     assert array.places[1].x - array.places[0].x == 25

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -67,23 +66,6 @@ def test_a_unit_that_is_not_found_is_refused_with_its_field(change: str, field: 
         load_array("hex-19", [change])
     assert refused.value.field == field
     assert words in refused.value.limit
-
-
-@pytest.mark.parametrize(
-    ("name", "unit", "field"),
-    [
-        ("forearm-patch", {"moulds": {"shrinkage_percent": 0.1}}, "unit.moulds.shrinkage_percent"),
-        ("forearm-patch", {"moulds": {"bore_compensation_mm": 0.1}}, "unit.moulds.bore_compensation_mm"),
-        ("forearm-pockets", {"skin_mm": 0.5}, "unit.skin_mm"),
-    ],
-)
-def test_what_moulds_of_arrays_do_not_draw_is_refused(name: str, unit: dict[str, Any], field: str) -> None:
-    asked = load_array(name).asked
-    if "moulds" in unit:
-        unit = {"moulds": {**asked["unit"].get("moulds", {}), **unit["moulds"]}}
-    with pytest.raises(Refusal) as refused:
-        load_array({**asked, "unit": {**asked["unit"], **unit}})
-    assert refused.value.field == field
 
 
 def test_an_array_refuses_a_unit_without_a_motor(tmp_path: Path) -> None:

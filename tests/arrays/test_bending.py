@@ -14,7 +14,6 @@ from unitcad.arrays.array_page import bent as bent_mesh
 from unitcad.arrays.crosstalk import pairs
 from unitcad.arrays.patch import patch_moulds
 from unitcad.arrays.sheet import bending
-from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
 from unitcad.shape import box
 
@@ -59,24 +58,6 @@ def test_strains_and_sagitta_are_those_of_the_geometry() -> None:
     assert bent.strain_between == pytest.approx(1.25 / 2 / radius, rel=1e-3)
     assert math.hypot(40 - bent.sagitta, 7) == pytest.approx(40)
     assert bending(load_array("forearm-patch")) is None
-
-
-@pytest.mark.parametrize(
-    ("template", "overrides", "field"),
-    [
-        ("wrist-band", ["sheet.margin_mm=8"], "layout.count"),
-        ("wrist-band", ["limb.radius_mm=30"], "layout.count"),
-        ("forearm-patch", ["layout.columns=4", "limb.radius_mm=10"], "limb.radius_mm"),
-    ],
-)
-def test_a_sheet_longer_than_its_way_round_is_refused(template: str, overrides: list[str], field: str) -> None:
-    with pytest.raises(Refusal) as refused:
-        load_array(template, overrides)
-    assert refused.value.field == field
-    kept = [each for each in overrides if not each.startswith(field)]
-    bent = bending(load_array(template, [*kept, f"{field}={refused.value.nearest}"]))
-    assert bent is not None
-    assert bent.ends > -1e-2
 
 
 def test_the_bent_sheet_has_the_flat_ones_volume() -> None:

@@ -47,14 +47,15 @@ def test_pours_between_which_layers_are_laid_in_elsewhere_have_surroundings_of_t
     assert one is other
 
 
-# Units stand at -20, 0 and 20 both ways: bores of 5.75, cores of 4.6, 2.11 high.
+ROWS = "forearm-patch", "layout.rows=2", "sheet.strap_slot_mm=[3,8]"
+# Units stand at -20, 0 and 20 along x, at -10 and 10 along y: bores of 5.75, cores of 4.6, 2.11 high.
 FAULTS: dict[str, tuple[str, str, Change]] = {
-    "a lump in the bore of the middle": ("C100", "cup1", more(box(-0.4, 0.4, 5.5, 6, 1, 2))),
-    "a core of the middle 0.2 too high": ("C200", "base", more(cylinder(3, 0, 2.31))),
-    "a leak between two cells": ("C100", "cup1", less(box(4, 16, 2.5, 3.1, 1, 2))),
-    "a hole under a cell": ("C100", "base", less(moved(cylinder(0.2, -9, 1), 25, 20))),
-    "a knob on a core": ("C300", "base", more(moved(cylinder(4.7, 1.0, 1.4), 20, 20))),
-    "a lip in the last cup's bore": ("C200", "cup2", more(box(-7.2, -6.9, 19, 21, 2.5, 2.8))),
+    "a lump in the bore of the middle": ("C100", "cup1", more(box(-0.4, 0.4, -4.5, -4, 1, 2))),
+    "a core of the middle 0.2 too high": ("C200", "base", more(moved(cylinder(3, 0, 2.31), 0, -10))),
+    "a leak between two cells": ("C100", "cup1", less(box(4, 16, 12.5, 13.1, 1, 2))),
+    "a hole under a cell": ("C100", "base", less(moved(cylinder(0.2, -9, 1), 25, 10))),
+    "a knob on a core": ("C300", "base", more(moved(cylinder(4.7, 1.0, 1.4), 20, 10))),
+    "a lip in the last cup's bore": ("C200", "cup2", more(box(-7.2, -6.9, 9, 11, 2.5, 2.8))),
 }
 
 
@@ -63,7 +64,7 @@ FAULTS: dict[str, tuple[str, str, Change]] = {
 )
 def test_a_fault_at_one_cell_is_found_as_if_each_were_judged(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     code, tool, change = FAULTS[fault]
-    moulds = with_tool(made("forearm-patch"), tool, change)
+    moulds = with_tool(made(*ROWS), tool, change)
     found = [shown(finding) for finding in check_moulds(moulds)]
     assert code in {each[0] for each in found if not each[2]}
     assert found == findings_of_each_cell(moulds, monkeypatch)

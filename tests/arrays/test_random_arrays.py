@@ -16,7 +16,7 @@ from unitcad.checks import check_moulds
 from unitcad.errors import Refusal
 from unitcad.validation import default_template, put, templates
 
-QUICK, ALL = 24, 200
+QUICK, ALL = 12, 200
 
 
 def drawn(seed: int) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from unitcad.meshcheck import FileReport
+from unitcad.meshcheck import FileReport, Finding
 
 Judge = Callable[..., FileReport]
 
@@ -208,3 +208,8 @@ def package(
         for name, content in (*entries, *more):
             archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, compression)
     return out.getvalue()
+
+
+def finding(report: FileReport, code: str) -> Finding:
+    """The finding of a code; a report has one at most."""
+    return next(found for found in report.findings if found.code == code)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
 from shapes import box, stl
-from test_check_command import Result, run
+from test_check_command import run
 
 CROSSED = np.concatenate([box(), box((4, 4, 4), (8, 3, 3))])
 TOUCHING = np.concatenate([box(), box((4, 4, 4), (10, 3, 3))])
@@ -28,7 +29,7 @@ def shuffled(triangles: np.ndarray, seed: int) -> np.ndarray:
     return turned[rng.permutation(len(turned))]
 
 
-def verdicts(result: Result) -> dict[str, bool]:
+def verdicts(result: CompletedProcess) -> dict[str, bool]:
     (entry,) = json.loads(result.stdout)["files"]
     return {found["code"]: found["known"] for found in entry["findings"]}
 

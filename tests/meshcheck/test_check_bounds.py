@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shapes import Judge, box, stl
+from shapes import Judge, box, finding, stl
 
 from unitcad.geometry import boxes
 from unitcad.geometry.boxes import TooMany
@@ -85,7 +85,7 @@ def test_too_many_pairs_end_a_check_which_says_what_it_found(
     monkeypatch.setattr(crossings, "_LOOKS", 0)
     body = np.concatenate([box(at=(i, i, i)) for i in range(20)])
     report = judge(stl(np.concatenate([body, box()[2:] + 100])))
-    limit = next(found for found in report.findings if found.code == "F011")
+    limit = finding(report, "F011")
     assert limit.message == f"more than 20 pairs of {name} lie at each other; not all are compared"
     assert report.has("T001")
     assert report.facts.shells == 21

@@ -2,53 +2,28 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import io
 import json
 import os
 import re
 import subprocess
 import sys
 import traceback
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from shapes import box, stl
 
-import unitcad
-from unitcad.cli import main
+from tests.in_process import unitcad
 from unitcad.meshcheck.rules import t_topology
 from unitcad.meshcheck.rules.inspection import Inspection
 
 GOOD, HOLE, WARN = stl(box()), stl(box()[2:]), stl(box(), header=b"solid")
 
 
-@dataclass(frozen=True)
-class Result:
-    """What a run of the command left behind."""
-
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-def run(*arguments: str | Path, cwd: Path | None = None) -> Result:
-    """`unitcad check` in this process."""
-    out, err = io.StringIO(), io.StringIO()
-    here, argv = Path.cwd(), sys.argv
-    sys.argv = ["unitcad", "check", *map(str, arguments)]
-    try:
-        os.chdir(cwd or here)
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as stop:
-            main()
-    finally:
-        os.chdir(here)
-        sys.argv = argv
-    code = stop.value.code
-    return Result(code if isinstance(code, int) else 0, out.getvalue(), err.getvalue())
+run = partial(unitcad, "check")
 
 
 @pytest.fixture
@@ -261,7 +236,7 @@ def test_options_that_can_not_be_are_refused_before_the_work(words: list[str], s
 
 
 def test_few_files_and_frames_lie_between_the_command_and_a_rule(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    package, stacks, rule = str(Path(unitcad.__file__).parent), [], t_topology.check_mesh
+    package, stacks, rule = str(Path(t_topology.__file__).parents[2]), [], t_topology.check_mesh
 
     def spy(part: Inspection) -> object:
         stacks.append([frame for frame in traceback.extract_stack() if frame.filename.startswith(package)])

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from exact_pairs import counts, reference
-from shapes import CUBE_CORNERS, CUBE_FACES
+from shapes import CUBE_CORNERS, CUBE_FACES, finding
 
 from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, meeting_pairs
 from unitcad.meshcheck import check_mesh
@@ -142,7 +142,7 @@ def test_crossing_count_equals_brute_force(mesh: str) -> None:
     elif mesh == "with faces turned over":
         faces[some] = faces[some][:, ::-1]
     report = check_mesh(points, faces)
-    crossing = next(found for found in report.findings if found.code == "G001")
+    crossing = finding(report, "G001")
     assert crossing.count == counts(points, faces)[0] > 0
 
 
@@ -206,7 +206,7 @@ def test_places_are_where_the_shells_meet_and_differ(
 ) -> None:
     points, faces = _two(scale, at)
     report = check_mesh(points + shift, faces)
-    places = next(found.locations for found in report.findings if found.code == code)
+    places = finding(report, code).locations
     where = np.array([place.xyz for place in places]) - shift
     assert (where >= np.array(low) - 1e-6).all()
     assert (where <= np.array(high) + 1e-6).all()
@@ -217,7 +217,7 @@ def test_places_are_where_the_shells_meet_and_differ(
 def test_touching_shells_are_placed_pair_by_pair() -> None:
     boxes = [CUBE_CORNERS * 10 + [10 * k, 0, 0] for k in range(4)]
     report = check_mesh(np.concatenate(boxes), np.concatenate([CUBE_FACES + 8 * k for k in range(4)]))
-    places = next(found.locations for found in report.findings if found.code == "G003")
+    places = finding(report, "G003").locations
     assert sorted(place.xyz[0] for place in places if place.xyz) == pytest.approx([10, 20, 30])
 
 

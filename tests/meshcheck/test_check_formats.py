@@ -12,7 +12,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from shapes import box, stl, text_stl
+from shapes import box, finding, stl, text_stl
 
 from unitcad.errors import Refusal
 from unitcad.meshcheck import FileReport, Options, check_file, check_mesh, output
@@ -224,7 +224,7 @@ def test_a_location_names_every_face_the_object_and_the_line() -> None:
 def test_both_faces_of_a_crossing_are_named_in_every_format() -> None:
     first = box()
     report = check_mesh(np.concatenate([first, box((4, 4, 4), (8, 3, 3))]).reshape(-1, 3), np.arange(72).reshape(-1, 3))
-    (crossing,) = [found for found in report.findings if found.code == "G001"]
+    crossing = finding(report, "G001")
     for place in crossing.locations:
         one, other = sorted(place.faces)
         assert one < 12 <= other  # one of each box

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 from glb_files import packed, scene
-from shapes import CUBE_CORNERS, CUBE_FACES, Judge
+from shapes import CUBE_CORNERS, CUBE_FACES, Judge, finding
 
 from unitcad.export import glb
 from unitcad.meshcheck.findings import Finding
@@ -88,7 +88,7 @@ def test_nodes_place_their_meshes_as_trimesh_has_them(judge: Judge) -> None:
 
 def test_faces_are_named_by_their_node(judge: Judge) -> None:
     content = packed(*scene(CUBE, FACES[:-1], NODES))
-    (hole,) = (found for found in judge(content, "a.glb").findings if found.code == "T001")
+    hole = finding(judge(content, "a.glb"), "T001")
     assert {place.object for place in hole.locations} <= {"turned", "mirrored", "node 3"}
     assert all(place.object == ("turned", "mirrored", "node 3")[(place.face or 0) // 11] for place in hole.locations)
 

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from shapes import CUBE_CORNERS, CUBE_FACES, Judge, mesh_xml, model_xml, package
+from shapes import CUBE_CORNERS, CUBE_FACES, Judge, finding, mesh_xml, model_xml, package
 
 from unitcad.meshcheck import Limits, Options, check_bytes
 
@@ -35,10 +35,10 @@ def test_facts_are_those_of_the_meshes_placed_one_by_one(judge: Judge) -> None:
 def test_every_instance_that_is_too_far_or_mirrors_is_said(judge: Judge) -> None:
     shift = [np.vstack([np.eye(3), [x, 0, 0]]) for x in (0, 1e6, 20, 2e6)]
     report = judge(package(model_xml(build=build(shift))), "a.3mf")
-    assert next(found.count for found in report.findings if found.code == "V002") == 2
+    assert finding(report, "V002").count == 2
     mirrored = [np.vstack([np.diag([-1.0, 1, 1]), [30.0 * i, 0, 0]]) for i in range(3)]
     report = judge(package(model_xml(build=build(mirrored))), "a.3mf")
-    assert next(found.count for found in report.findings if found.code == "P015") == 3
+    assert finding(report, "P015").count == 3
 
 
 def test_many_instances_of_one_object_are_cheap(judge: Judge) -> None:
@@ -58,7 +58,7 @@ def test_instances_beyond_the_limit_end_the_check(items: int) -> None:
     build = "<build>" + '<item objectid="1"/>' * items + "</build>"
     content = package(model_xml(f'<object id="2">{mesh_xml()}</object>{whole}', build))
     report = check_bytes(content, "a.3mf", Options(limits=Limits(max_instances=1000)))
-    (said,) = [found.message for found in report.findings if found.code == "F011"]
+    said = finding(report, "F011").message
     assert "1000" in said
     assert "instances" in said
     assert Limits().max_instances == 100_000
@@ -70,7 +70,7 @@ def test_a_huge_expansion_is_said_in_few_digits(judge: Judge) -> None:
         for i in range(2, 60)
     )
     content = package(model_xml(f'<object id="1">{mesh_xml()}</object>{rows}', '<build><item objectid="59"/></build>'))
-    (said,) = [found.message for found in judge(content, "a.3mf").findings if found.code == "P009"]
+    said = finding(judge(content, "a.3mf"), "P009").message
     assert said == "more than 1e117 faces in more than 1e116 instances, more than --max-faces 10000000"
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from malformed import with_sliver
-from shapes import CUBE_CORNERS, CUBE_FACES, box, stl, turned
+from shapes import CUBE_CORNERS, CUBE_FACES, box, finding, stl, turned
 
 from unitcad.meshcheck import check_bytes, check_mesh
 from unitcad.meshcheck.geometry.mesh import weld_exact
@@ -133,7 +133,7 @@ def test_small_shells_are_judged_by_their_own_size(part: np.ndarray, code: str, 
     report = judge(stl(np.concatenate([part, BEAM - [0, 0, 50]])))
     assert code in alone
     assert codes(report) == alone
-    assert next(found.count for found in report.findings if found.code == code) == 1
+    assert finding(report, code).count == 1
 
 
 PARTS = {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from malformed import Case, cases, options
 from malformed_files import good_text_meshes
-from shapes import box, model_xml, package, prism, stl, text_stl
+from shapes import box, finding, model_xml, package, prism, stl, text_stl
 
 from unitcad.meshcheck import check_bytes
 from unitcad.meshcheck.output import FORMATS, render
@@ -24,7 +24,7 @@ ONE_OF_MANY = re.compile(r"(?<!object )(?<![\d.])1 (?:\w+ )?(?:\w+[^s\W]s|vertic
 def test_malformed_file_gives_its_code(case: Case, judge) -> None:
     report = judge(case.data(), case.name, strict_3mf=True, **case.options)
     assert report.has(case.code), [found.code for found in report.findings]
-    severity = next(found.severity for found in report.findings if found.code == case.code)
+    severity = finding(report, case.code).severity
     expected = rules()[case.code].severity
     encoding_of_a_part = case.code == "F009" and case.name.endswith(".3mf")
     filled = case.code in ("G001", "G002") and case.name.endswith(".3mf")
@@ -119,7 +119,7 @@ def test_no_geometry_is_judged_of_numbers_that_are_none(judge) -> None:
 
 def test_counts_and_first_places(judge) -> None:
     report = judge(stl(box()[2:]))
-    hole = next(found for found in report.findings if found.code == "T001")
+    hole = finding(report, "T001")
     assert hole.count == 4
     assert len(hole.locations) == 4
     assert all(place.face is not None and place.xyz is not None for place in hole.locations)

@@ -11,7 +11,7 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from polygon_files import every_way, obj, off, ply
-from shapes import CUBE_CORNERS, Judge, turned
+from shapes import CUBE_CORNERS, Judge, finding, turned
 
 from unitcad.meshcheck.findings import Finding
 from unitcad.meshcheck.geometry.mesh import Mesh
@@ -92,7 +92,7 @@ def test_places_are_those_of_the_polygons(judge: Judge) -> None:
     content.insert(first + 3, "g left out\no  the lid # 1")
     content.insert(first, "o body")
     report = judge("\n".join(content), "a.obj")
-    (hole,) = (found for found in report.findings if found.code == "T001")
+    hole = finding(report, "T001")
     lines = "\n".join(content).split("\n")
     for place in hole.locations:
         assert place.face is not None
@@ -102,16 +102,16 @@ def test_places_are_those_of_the_polygons(judge: Judge) -> None:
         assert place.object == ("body" if place.face < 3 else "the lid # 1")
     wrapped = obj(CUBE_CORNERS * 10, QUADS[:-1], wrapped=True).decode()
     rows = wrapped.split("\n")
-    (hole,) = (found for found in judge(wrapped, "a.obj").findings if found.code == "T001")
+    hole = finding(judge(wrapped, "a.obj"), "T001")
     assert {rows[(place.line or 0) - 1][:1] for place in hole.locations} == {"f"}
     text = ply(CUBE_CORNERS * 10, QUADS[:-1], "").decode()
-    (hole,) = (found for found in judge(text, "a.ply").findings if found.code == "T001")
+    hole = finding(judge(text, "a.ply"), "T001")
     assert all(text.split("\n")[(place.line or 0) - 1][:2] == "4 " for place in hole.locations)
 
 
 def test_groups_name_faces_where_there_is_no_object(judge: Judge) -> None:
     content = obj(CUBE_CORNERS * 10, QUADS[:-1]).replace(b"f ", b"g side\nf ", 1)
-    (hole,) = (found for found in judge(content, "a.obj").findings if found.code == "T001")
+    hole = finding(judge(content, "a.obj"), "T001")
     assert {place.object for place in hole.locations} == {"side"}
 
 
@@ -137,7 +137,7 @@ def test_groups_name_faces_where_there_is_no_object(judge: Judge) -> None:
 def test_what_breaks_a_text_is_named_with_its_line(
     name: str, content: str, code: str, said: str, line: int | None, judge: Judge
 ) -> None:
-    found = next(found for found in judge(content, name).findings if found.code == code)
+    found = finding(judge(content, name), code)
     assert said in found.message
     assert [place.line for place in found.locations] == ([line] if line else [])
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from manifold3d import CrossSection, Manifold
-from shapes import box, prism, stl
+from shapes import box, finding, prism, stl
 
 FDM = {"printer": "fdm-0.4"}
 
@@ -31,7 +31,7 @@ def codes(judge, solid: Manifold) -> set[str]:
 
 
 def thinnest(report) -> float:
-    message = next(found.message for found in report.findings if found.code == "D001")
+    message = finding(report, "D001").message
     return float(message.split()[-2])
 
 
@@ -89,7 +89,7 @@ def test_a_thin_wall_in_one_part_of_a_large_solid_is_found(judge) -> None:
     solid = block(40, 40, 10) - block(10, 10, 10, (0.6, 10, 2))
     report = judge(stl(triangles(solid)), **FDM)
     assert thinnest(report) == pytest.approx(0.6, rel=1e-3)
-    place = next(found for found in report.findings if found.code == "D001").locations[0].xyz
+    place = finding(report, "D001").locations[0].xyz
     assert place is not None
     assert -0.1 < place[0] < 0.7
     assert 9 < place[1] < 21
@@ -184,7 +184,7 @@ def test_a_gap_narrower_than_the_printers_play(printer: str, width: float, found
     report = judge(stl(triangles(solid)), printer=printer)
     assert report.has("D006") == found
     if found:
-        said = next(item for item in report.findings if item.code == "D006")
+        said = finding(report, "D006")
         assert said.count == 1
         assert float(said.message.split()[-2]) == pytest.approx(width, rel=0.02)
 
@@ -214,9 +214,9 @@ def test_bed(judge) -> None:
     edge = triangles(Manifold.cube([8, 8, 8]).rotate([45, 0, 0]).translate([30, 0, 0]))
     for height in (0, 7):
         both = judge(stl(np.concatenate([box(at=(-30, 0, 0)), ball, edge]) + np.array([0, 0, height])), **FDM)
-        (finding,) = [item for item in both.findings if item.code == "D005"]
-        assert finding.message == "2 parts on an edge or a point: 0 mm2 of flat on the bed"
-        assert [place.xyz and place.xyz[2] for place in finding.locations] == [height, height]
+        unsteady = finding(both, "D005")
+        assert unsteady.message == "2 parts on an edge or a point: 0 mm2 of flat on the bed"
+        assert [place.xyz and place.xyz[2] for place in unsteady.locations] == [height, height]
 
 
 def test_hollow(judge) -> None:
@@ -240,6 +240,6 @@ def test_without_a_printer_none_of_these_rules_runs(judge) -> None:
     ids=["one", "two side by side", "two at right angles", "a tube", "a flat one"],
 )
 def test_a_wall_with_two_sides_is_one_wall(solid: Manifold, walls: int, judge) -> None:
-    found = next(found for found in judge(stl(triangles(solid)), **FDM).findings if found.code == "D001")
+    found = finding(judge(stl(triangles(solid)), **FDM), "D001")
     assert (found.count, len(found.locations)) == (walls, walls)
     assert found.message.startswith(f"{walls} wall{'s' * (walls > 1)} below")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import CUBE_CORNERS, FORMATS, Judge, box, in_format, mesh_xml, model_xml, package, stl
+from shapes import CUBE_CORNERS, FORMATS, Judge, box, finding, in_format, mesh_xml, model_xml, package, stl
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def test_a_speck_beside_a_part(side: float, found: bool, name: str, judge) -> No
     report = judge(in_format(parts, name), name)
     assert report.has("G010") == found
     if found:
-        said = next(item for item in report.findings if item.code == "G010")
+        said = finding(report, "G010")
         assert (said.count, said.severity) == (1, "warning")
         assert said.locations[0].xyz == pytest.approx((12, 3, 3), abs=side)
 

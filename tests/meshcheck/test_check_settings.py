@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
 from shapes import box, package, stl
-from test_check_command import Result, run
+from test_check_command import run
 
 HOLE, WARN, FILM = stl(box()[2:]), stl(box(), header=b"solid"), stl(box((20, 20, 0.35)))
 
@@ -24,7 +25,7 @@ def folder(tmp_path: Path) -> Path:
 TOOL = "[tool.unitcad.check]"
 
 
-def codes(result: Result) -> dict[str, list[str]]:
+def codes(result: CompletedProcess) -> dict[str, list[str]]:
     files = json.loads(result.stdout)["files"]
     return {Path(entry["path"]).name: [found["code"] for found in entry["findings"]] for entry in files}
 
@@ -71,7 +72,7 @@ def test_unitcad_toml_comes_before_pyproject(folder: Path) -> None:
 
 
 def test_every_key_does_what_its_option_does_and_the_command_line_beats_it(folder: Path) -> None:
-    def both(setting: str, file: str, *beaten: str) -> tuple[Result, Result]:
+    def both(setting: str, file: str, *beaten: str) -> tuple[CompletedProcess, CompletedProcess]:
         (folder / "unitcad.toml").write_text(f"[check]\n{setting}\n")
         return run(file, "--json", cwd=folder), run(file, "--json", *beaten, cwd=folder)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import CUBE_CORNERS, CUBE_FACES, mesh_xml, model_xml, package, stl
+from shapes import CUBE_CORNERS, CUBE_FACES, finding, mesh_xml, model_xml, package, stl
 
 from unitcad.catalogue import printers
 from unitcad.geometry import boxes
@@ -108,7 +108,7 @@ def test_no_memory_ends_as_a_limit_with_the_rest(monkeypatch: pytest.MonkeyPatch
     report = check_bytes(_stl(), "a.stl")
     assert report.has("F011")
     assert report.has("T001")
-    assert "out of memory" in next(item.message for item in report.findings if item.code == "F011")
+    assert "out of memory" in finding(report, "F011").message
 
 
 def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
@@ -127,6 +127,6 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
     path.write_bytes(_stl())
     report = file_checks.check_guarded(str(path), Options(limits=Limits(seconds=1.0)))
     assert {"F011", "T001", "G001"} <= {item.code for item in report.findings}
-    assert next(item.message for item in report.findings if item.code == "F011") == "not finished within --timeout 1 s"
+    assert finding(report, "F011").message == "not finished within --timeout 1 s"
     with pytest.raises(Unreadable), file_checks._alarm(0.01):
         time.sleep(60)

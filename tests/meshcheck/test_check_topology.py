@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import defaultdict
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from shapes import CUBE_CORNERS, CUBE_FACES, box, stl, surface
+from shapes import CUBE_CORNERS, CUBE_FACES, box, finding, stl, surface
 
 from unitcad.geometry.components import components
 from unitcad.meshcheck import check_mesh
@@ -54,6 +55,22 @@ def test_components_as_a_search_finds_them(n: int) -> None:
     label = components(n, left, right)
     pairs = coo_array((np.ones(len(left)), (left, right)), (n, n))
     assert (label == connected_components(pairs, directed=False)[1]).all()
+
+
+@pytest.mark.parametrize("n", [200, 600])
+def test_near_points_are_those_of_all_pairs_and_a_crowd_has_none(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few points need no scipy, which takes longer to load than they take."""
+    rng = np.random.default_rng(n)
+    points = np.concatenate([some := rng.random((n, 3)) * 100, some + rng.normal(size=some.shape) * 1e-4])
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    reaches = [2e-4, 1e-3]
+    if n == 200:
+        monkeypatch.setitem(sys.modules, "scipy.spatial", None)  # importing it fails
+        reaches.append(distance[0, n])  # that of a pair itself
+    for reach in reaches:
+        expected = np.argwhere(np.triu(distance <= reach, 1)).tolist()
+        assert sorted(np.sort(topology._within(points, reach)).tolist()) == expected != []
+    assert len(topology._within(points * 1e-5, 1e-2)) == 0
 
 
 @pytest.mark.parametrize("collisions", [False, True])
@@ -148,7 +165,7 @@ def test_four_faces_at_an_edge_that_do_not_all_agree_are_wound_wrongly(judge) ->
     turned = np.argmax(upright)
     cubes[turned] = cubes[turned, ::-1]
     report = judge(stl(cubes))
-    assert next(found.count for found in report.findings if found.code == "T007") == 3
+    assert finding(report, "T007").count == 3
 
 
 _BESIDE = box(at=(10, 0, 0))

@@ -1,15 +1,15 @@
 """What the batch tests share: small sweeps, and a design whose function crashes, hangs or fails on request."""
 
 import hashlib
-import io
 import json
 import os
 import subprocess
 import sys
-from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
-from unitcad.cli import main
+from tests import in_process
+from unitcad.sweeps import BatchOptions, load_sweep, run
+from unitcad.sweeps.executors import SerialExecutor
 
 SPEC = """
 name = "ring"
@@ -80,28 +80,25 @@ def ring_sweep(folder, function="unit", heights=None, materials=1, more=""):
     return file
 
 
+def made(sweep, out, executor=None, **options):
+    """Make the units of a sweep in this process; return the summary."""
+    return run(load_sweep(sweep), out, BatchOptions(("unit",), **options), executor or SerialExecutor(), workers=1)
+
+
 def calls(folder):
     """The heights that the design was drawn for, a line each time."""
     file = folder / "calls"
     return [line.split()[0] for line in file.read_text().splitlines()] if file.exists() else []
 
 
-def unitcad(*words, cwd=".", env=None):
+def unitcad(*words, cwd=None, env=None):
     """Run the command line in this process; in one of its own with an environment, or with a scheduler's client."""
     line = command(*words)
-    if env or "--scheduler" in words:
-        return subprocess.run(
-            line, capture_output=True, text=True, check=False, timeout=300, env=env or environment(), cwd=cwd
-        )
-    out, err, argv = io.StringIO(), io.StringIO(), sys.argv
-    sys.argv = ["unitcad", *line[3:]]
-    try:
-        with redirect_stdout(out), redirect_stderr(err), chdir(cwd):
-            main()
-    except SystemExit as stop:
-        return subprocess.CompletedProcess(line, stop.code or 0, out.getvalue(), err.getvalue())
-    finally:
-        sys.argv = argv
+    if not env and "--scheduler" not in words:
+        return in_process.unitcad(*line[3:], cwd=cwd)
+    return subprocess.run(
+        line, capture_output=True, text=True, check=False, timeout=300, env=env or environment(), cwd=cwd
+    )
 
 
 def command(*words):

@@ -6,13 +6,11 @@ import json
 import os
 
 import pytest
-from batching import bytes_of, ring_sweep, rows, unitcad
+from batching import bytes_of, made, ring_sweep, rows, unitcad
 from msgspec.structs import replace
 
 from unitcad.cache import digest
 from unitcad.errors import UnitcadError
-from unitcad.sweeps import BatchOptions, load_sweep, run
-from unitcad.sweeps.executors import SerialExecutor
 from unitcad.sweeps.journal import BatchHead, Journal, JournalEntry
 
 
@@ -23,21 +21,17 @@ def _flipped(file):
     file.write_bytes(content)
 
 
-def _run(sweep, out, **more):
-    return run(load_sweep(sweep), out, BatchOptions(("unit",), **more), SerialExecutor(), workers=1)
-
-
 @pytest.fixture
-def made(tmp_path):
+def two(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0]), tmp_path / "out"
-    assert _run(sweep, out).ok == 2
+    assert made(sweep, out).ok == 2
     return sweep, out
 
 
 @pytest.mark.parametrize("verify", [False, True])
-def test_a_finished_variant_whose_file_changed_is_made_again(verify, made):
+def test_a_finished_variant_whose_file_changed_is_made_again(verify, two):
     """By its size always, by its hash with verify; test_damaged_batches.py has every other damage."""
-    sweep, out = made
+    sweep, out = two
     before = bytes_of(out)
     file = out / rows(out)[0]["folder"] / "unit" / "layer1.stl"
     if verify:
@@ -51,18 +45,18 @@ def test_a_finished_variant_whose_file_changed_is_made_again(verify, made):
         assert bytes_of(out) == before
 
 
-def test_a_lost_journal_loses_nothing(made):
-    sweep, out = made
+def test_a_lost_journal_loses_nothing(two):
+    sweep, out = two
     before = bytes_of(out)
     folders = {folder.name: folder.stat().st_ino for folder in out.glob("ring-*")}
     (out / "journal.jsonl").unlink()
-    assert _run(sweep, out).ok == 2
+    assert made(sweep, out).ok == 2
     assert bytes_of(out) == before
     assert {folder.name: folder.stat().st_ino for folder in out.glob("ring-*")} == folders
 
 
-def test_the_manifest_lists_every_file(made):
-    _, out = made
+def test_the_manifest_lists_every_file(two):
+    _, out = two
     folder = out / rows(out)[0]["folder"]
     listed = json.loads((folder / "manifest.json").read_text())["files"]
     there = {
@@ -92,7 +86,7 @@ def test_contents_are_on_the_disk_before_the_journal_says_so(tmp_path, monkeypat
 
     monkeypatch.setattr(os, "fsync", recorded)
     monkeypatch.setattr(Journal, "add", checked)
-    assert _run(sweep, out).ok == 4
+    assert made(sweep, out).ok == 4
     assert sorted(noted) == [0, 1, 2, 3]
 
 

@@ -31,12 +31,6 @@ def export_variant(batch, wanted, out, cache):
     return folder
 
 
-@pytest.fixture(autouse=True)
-def no_store_is_kept():
-    yield
-    record_packs.store_at.cache_clear()
-
-
 @pytest.mark.parametrize("count", [0, 1, 15, 16, 17, 1000])
 def test_shards_are_the_whole_sweep_in_order(count):
     for of in (1, 3, 16):
@@ -188,8 +182,7 @@ def test_a_store_in_which_nobody_may_write_is_refused_at_once(tmp_path, monkeypa
 
 
 @pytest.mark.parametrize("lost", ["packs", "content", "unitcad-store"])
-def test_a_merge_of_what_the_store_has_lost_leaves_nothing(lost, tmp_path, monkeypatch):
-    monkeypatch.setattr(shared_store, "PAUSE_S", 0.0)
+def test_a_merge_of_what_the_store_has_lost_leaves_nothing(lost, tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
     for number in (1, 2):
         made(sweep, out, shard=Shard(number, 2))
@@ -261,8 +254,7 @@ def test_folders_asked_for_later_are_made_of_what_is_kept(tmp_path):
     assert (summary.ok, summary.resumed) == (4, 3)
 
 
-def test_what_makes_lost_content_again_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(shared_store, "PAUSE_S", 0.0)
+def test_what_makes_lost_content_again_is_named(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=1), tmp_path / "out"
     for number in (1, 2):
         made(sweep, out, shard=Shard(number, 2))

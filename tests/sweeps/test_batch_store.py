@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from batching import bytes_of, calls, ring_sweep, rows
+from batching import bytes_of, calls, made, ring_sweep, rows
 from batching import unitcad as run_unitcad
 from object_store import BUCKET, Faulty, s3_server
 
@@ -39,19 +39,6 @@ def address(request, tmp_path):
     if request.param == "folder":
         return str(tmp_path / "store")
     return f"{request.getfixturevalue('s3')}/{tmp_path.name}"
-
-
-@pytest.fixture(autouse=True)
-def no_pauses(monkeypatch):
-    monkeypatch.setattr(shared_store, "PAUSE_S", 0.0)
-    record_packs.store_at.cache_clear()
-    yield
-    record_packs.store_at.cache_clear()
-
-
-def made(sweep, out, executor=None, **options):
-    chosen = BatchOptions(("unit",), **options)
-    return run(load_sweep(sweep), out, chosen, executor or SerialExecutor(), workers=1)
 
 
 class Recording(SerialExecutor):

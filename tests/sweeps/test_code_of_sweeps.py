@@ -24,7 +24,6 @@ def planted(tmp_path):
         "batch sweep-named.toml --dry-run",
         "batch sweep-embedded.toml --dry-run",
         "batch sweep-swept.toml --dry-run",
-        "batch sweep-embedded.toml -j 0",
         "batch sweep-embedded.toml -j 1",
         "batch sweep-swept.toml -j 0",
         "batch sweep-embedded.toml --only estimate",
@@ -37,7 +36,6 @@ def test_code_that_nobody_named_does_not_run(arguments, planted):
 @pytest.mark.parametrize(
     "arguments",
     [
-        "batch sweep-named.toml --only unit -j 0",
         "batch sweep-named.toml --only unit -j 1",
         "batch sweep-embedded.toml --only unit -j 1 --allow-code",
         "batch sweep-named.toml --dry-run --allow-code",

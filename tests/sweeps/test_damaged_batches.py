@@ -11,10 +11,9 @@ from pathlib import Path
 
 import pytest
 from batching import bytes_of, leftovers, ring_sweep
+from batching import made as make
 
 from unitcad.errors import UnitcadError
-from unitcad.sweeps import BatchOptions, load_sweep, run
-from unitcad.sweeps.executors import SerialExecutor
 from unitcad.sweeps.journal import JOURNAL
 
 FAR = 4_000_000_000
@@ -28,8 +27,7 @@ class Batch:
         self.folder, self.out, self.cache = folder, folder / "out", folder / "cache"
 
     def run(self, sweep):
-        options = BatchOptions(("unit",), verify=True, cache=self.cache)
-        return run(load_sweep(sweep), self.out, options, SerialExecutor(), workers=1)
+        return make(sweep, self.out, verify=True, cache=self.cache)
 
 
 @pytest.fixture(scope="module")
