@@ -164,7 +164,7 @@ def test_what_was_swept_and_the_levels_come_first(sweep):
 
 
 def test_what_is_no_result_is_refused(tmp_path):
-    with pytest.raises(UnitcadError, match="not a folder"):
+    with pytest.raises(UnitcadError, match="no such folder"):
         write_report(tmp_path / "nothing")
     with pytest.raises(UnitcadError, match="no result"):
         write_report(tmp_path)

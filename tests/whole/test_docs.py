@@ -108,7 +108,7 @@ def test_console_examples_run(page: Path, tmp_path: Path) -> None:
 
 
 def test_the_readme_shows_the_output_of_its_first_command(tmp_path: Path) -> None:
-    """The text block, and nothing before or between its lines; estimate and folder follow."""
+    """The text block, and nothing before or between its lines; the folder follows."""
     command = [sys.executable, "-m", "unitcad", "build", "encapsulating", "-o", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     [shown] = blocks(ROOT / "README.md", "text")
