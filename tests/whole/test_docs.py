@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import doctest
 import os
 import re
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -83,6 +85,15 @@ def test_toml_examples_are_specs(text: str) -> None:
 def test_python_examples_run(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     exec(compile(text, "example", "exec"), {"__name__": "__main__"})
+
+
+@pytest.mark.parametrize("room", ["shape", "meshcheck", "sweeps", "arrays"])
+def test_examples_of_docstrings_run(room: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    module, finder = import_module(f"unitcad.{room}"), doctest.DocTestFinder(recurse=False)
+    found = [test for name in module.__all__ for test in finder.find(getattr(module, name), name) if test.examples]
+    assert found
+    assert not any(doctest.DocTestRunner().run(test).failed for test in found)
 
 
 @pytest.mark.parametrize(

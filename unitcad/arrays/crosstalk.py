@@ -389,7 +389,6 @@ IN_BRACKETS = (
 ALIKE = 1e-3
 """Sums that differ by less, as a share, are called alike."""
 Crosstalk = Mapping[str, Any]
-"""The result of `crosstalk`."""
 
 
 def crosstalk_lines(data: Crosstalk) -> list[str]:

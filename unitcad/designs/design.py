@@ -13,7 +13,6 @@ from unitcad.spec import Spec
 from unitcad.spec.raw import RawSpec
 
 Reason = tuple[str, str]
-"""A skipped output and the reason."""
 
 
 def _no_limits(spec: Spec, dims: Dimensions) -> None:
