@@ -64,6 +64,7 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
     --------
     >>> from unitcad.meshcheck import check_mesh
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+
     >>> check_mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]).verdict
     'pass'
     """
