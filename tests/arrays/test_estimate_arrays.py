@@ -26,7 +26,8 @@ def test_the_answer_comes_first_and_the_tables_behind_details() -> None:
     assert first.startswith("forearm-pockets: 9 units (encapsulating 14 mm), 125 Hz, flat drive, forearm")
     data = crosstalk(load_array(NINE))
     assert answer.strip() == crosstalk_lines(data)[0]
-    assert "35 % (11 to 39) reaches the middle of its nearest neighbour (A1 to A2, 20 mm apart)" in answer
+    assert "35 % (11 to 39) of a unit's motion at its edge reaches" in answer
+    assert "its nearest neighbour (A1 to A2, 20 mm apart), and 59 %" in answer
     assert "B2 gets the most" in out
     assert "%" not in out.splitlines()[-1]
     _, more, _ = run(NINE, "--details", "--frequency", "100:200:50", "--masses")
@@ -112,7 +113,7 @@ def test_units_without_an_estimate_have_no_crosstalk_and_the_reason_is_told() ->
     place = [{"at": "A1", "unit": {"like": "encapsulating", "estimate": {"tissue": "gel-50kpa"}}}]
     files, lacking = extras(load_array({**load_array(NINE).asked, "place": place}), ["estimate"])
     assert files == {}
-    assert "one body" in lacking["crosstalk.json"]
+    assert "one tissue" in lacking["crosstalk.json"]
 
 
 def test_the_circuit_as_step_has_the_same_bytes_again() -> None:

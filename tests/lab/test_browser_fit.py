@@ -50,7 +50,7 @@ def test_the_fit_s_own_error_stands_beside_the_stored_constants_one(visit, fitte
 
 def test_range_measurement_and_name_of_the_fit_are_there(visit, fitted):
     text = visit.page.inner_text("body")
-    assert "Where a new unit is expected in the lab synthetic-bench" in text
+    assert "80 % range of a new unit in the lab synthetic-bench" in text
     assert "Measured here (soft-inside): 9.8" in text
     assert "3 units of the lab's own" in text
     assert "by the stored constants" in text

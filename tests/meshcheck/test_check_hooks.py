@@ -104,7 +104,7 @@ def test_the_action_reports_and_fails_on_findings(files: str, code: int, sarif: 
 @needs_bash
 @pytest.mark.parametrize(
     ("given", "said"),
-    [({"FAIL_ON": "never"}, "--fail-on"), ({"FILES": " "}, "is required: mesh files"), ({"PRINTER": "none-such"}, "--printer"),
+    [({"FAIL_ON": "never"}, "--fail-on"), ({"FILES": " "}, "is required"), ({"PRINTER": "none-such"}, "--printer"),
      ({"ARGUMENTS": "--no-such-option"}, "--no-such-option")],
 )  # fmt: skip
 def test_the_action_fails_on_wrong_inputs_and_says_so(given: dict[str, str], said: str, tmp_path: Path) -> None:

@@ -128,7 +128,7 @@ def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit, estimate):
 
 
 def test_the_inputs_that_a_model_sees(visit, estimate):
-    head, *rows = cells(visit, "Inputs that a model sees")
+    head, *rows = cells(visit, "Inputs with an effect on the level")
     blocks = [estimate["models"][name]["sensitivities"] for name in ("rule", "divider", "published")]
     blocks += estimate["fem"]["sensitivities"]
     assert len(head) == 1 + len(blocks)

@@ -60,11 +60,13 @@ def test_a_frequency_that_nobody_measured_at_is_said() -> None:
 
 def test_what_the_evidence_ranks_and_what_not_is_said(quiet: Inversion) -> None:
     said = head_lines(quiet.data)
-    assert said[1].startswith("probabilities by rule, fitted to the paper's nine levels; they rank design, which side")
-    unranked = "walls, caps, diameter, frequency, and silicones with the same side soft"
-    assert said[2] == f"they do not rank {unranked}, but by an assumed line below a ratio of 16.7"
+    assert said[1].startswith(
+        "probabilities by rule, fitted to the paper's nine levels; ranked by design and which side"
+    )
+    unranked = "walls, caps, diameter, frequency, or silicones with the same side soft"
+    assert said[2] == f"not ranked by {unranked}, except by an assumed line below a ratio of 16.7"
     second = lines(quiet.data["proposals"][1])
-    assert second[0] == "as likely as number 1: the order among equals is how easily they are made"
+    assert second[0] == "as likely as number 1; among equals the unit that is easier to make comes first"
     page = contents(quiet, "x")
     assert all(said[2] in page[name].decode() for name in ("design.md", "design.html"))
 

@@ -222,13 +222,13 @@ def test_a_refused_spec_that_is_saved_is_said_to_be_refused(running, tmp_path):
         visit.page.click("text=Save spec")
         visit.until(lambda: "Saved" in visit.page.inner_text("#do"))
         assert "wall_mm = 0.2" in (tmp_path / "encapsulating.toml").read_text()
-        assert "refused as it stands" in visit.page.inner_text("#do")
+        assert "nothing can be built from it yet" in visit.page.inner_text("#do")
         assert "must be at least 0.5" in visit.page.inner_text("#do")
         visit.choose(WALL, "0.7")
         visit.page.fill("#file-name", "good")
         visit.page.click("text=Save spec")
         visit.until(lambda: "good.toml" in visit.page.inner_text("#do"))
-        assert "refused as it stands" not in visit.page.inner_text("#do")
+        assert "nothing can be built from it yet" not in visit.page.inner_text("#do")
         visit.close()
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import doctest
 import os
 import re
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -85,6 +87,15 @@ def test_python_examples_run(text: str, tmp_path: Path, monkeypatch: pytest.Monk
     exec(compile(text, "example", "exec"), {"__name__": "__main__"})
 
 
+@pytest.mark.parametrize("room", ["shape", "meshcheck", "sweeps", "arrays"])
+def test_examples_of_docstrings_run(room: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    module, finder = import_module(f"unitcad.{room}"), doctest.DocTestFinder(recurse=False)
+    found = [test for name in module.__all__ for test in finder.find(getattr(module, name), name) if test.examples]
+    assert found
+    assert not any(doctest.DocTestRunner().run(test).failed for test in found)
+
+
 @pytest.mark.parametrize(
     "page", [page for page in pages() if blocks(page, "python notebook")], ids=lambda page: page.stem
 )
@@ -108,7 +119,7 @@ def test_console_examples_run(page: Path, tmp_path: Path) -> None:
 
 
 def test_the_readme_shows_the_output_of_its_first_command(tmp_path: Path) -> None:
-    """The text block, and nothing before or between its lines; estimate and folder follow."""
+    """The text block, and nothing before or between its lines; the folder follows."""
     command = [sys.executable, "-m", "unitcad", "build", "encapsulating", "-o", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     [shown] = blocks(ROOT / "README.md", "text")

@@ -184,12 +184,31 @@ ArraySource = str | os.PathLike[str] | Mapping[str, object] | Array
 
 
 def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True) -> Array:
-    """Return the array of a template's name, a file, plain data, or another array.
+    """Load an array.
 
-    `set` changes values as for `unitcad.load`: texts "path=value", or a dict by dotted path such as "layout.pitch_mm".
-    Without `lay_tails` no way is looked for between the units, as for an estimate, which reads none.
+    Parameters
+    ----------
+    source : str, path, mapping or Array
+        A template's name, a file, plain data, or another array.
+    set : dict or sequence of str, optional
+        Changes as for `unitcad.load`: texts "path=value", or values by dotted path such as "layout.pitch_mm".
+    lay_tails : bool, default True
+        Whether to find ways for the tails between the units; an estimate needs none.
 
-    Raises Refusal or UnitcadError, naming the field, for the first value that is not valid.
+    Returns
+    -------
+    Array
+
+    Raises
+    ------
+    Refusal, UnitcadError
+        For the first invalid value; names its field.
+
+    Examples
+    --------
+    >>> from unitcad.arrays import load_array
+    >>> len(load_array("forearm-pockets", {"layout.pitch_mm": 22}).places)
+    9
     """
     path = None
     if isinstance(source, Array):

@@ -289,7 +289,7 @@ def _measure_curved(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str
 
 
 def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchStep]) -> Iterator[Item]:
-    """Yield the bill of the whole set, its filaments told apart: bent ones, and straight ones."""
+    """Yield the bill of the whole set, with bent and straight filaments as separate items."""
     places = len(moulds.arranged.places)
     for item in bill(moulds, batches, steps, after_pours(moulds, [batch.silicone for batch in batches])):
         if item.item == "filament":

@@ -383,13 +383,12 @@ def crosstalk_csv(array: Array, band: Sequence[float] = BAND_HZ) -> bytes:
 
 
 IN_BRACKETS = (
-    "In brackets is the range: tissue moduli, damping, thicknesses and frequency at both ends of their ranges, "
-    "and a unit that sticks to the skin or rests on it."
+    "Brackets have the range: moduli, damping, thicknesses and frequency at both ends of their ranges, and a unit "
+    "that sticks to the skin or rests on it."
 )
 ALIKE = 1e-3
 """Sums that differ by less, as a share, are called alike."""
 Crosstalk = Mapping[str, Any]
-"""The result of `crosstalk`."""
 
 
 def crosstalk_lines(data: Crosstalk) -> list[str]:
@@ -398,11 +397,11 @@ def crosstalk_lines(data: Crosstalk) -> list[str]:
     if nearest is None:
         return ["A single unit has no neighbour: there is no crosstalk."]
     lines = [
-        f"Of a unit's motion at its edge {_percent(nearest['centre'])} reaches the middle of its nearest neighbour "
+        f"{_percent(nearest['centre'])} of a unit's motion at its edge reaches the middle of its nearest neighbour "
         f"({nearest['from']} to {nearest['to']}, {number(nearest['distance_mm'], 4)} mm apart), "
-        f"{_percent(nearest['nearest_edge'])} that neighbour's edge.",
+        f"and {_percent(nearest['nearest_edge'])} the neighbour's edge.",
         f"With all other units on, {_most(data)}: {_times(worst['root_sum_of_squares'])} times one "
-        f"unit's edge level by the root of the sum of squares, as motors that are not synchronous add up; "
+        f"unit's edge level if the motors are not synchronous (root of the sum of squares), and "
         f"{_times(worst['sum'])} times if all are in phase.",
         _absolute_line(data["absolute"]),
     ]
@@ -481,8 +480,8 @@ def _absolute_line(block: Mapping[str, Any]) -> str:
         return f"No absolute level: {block['reason']}."
     said = [f"{number(100 * one['low'], 2)} to {number(100 * one['high'], 2)} %" for one in (root, phase)]
     return (
-        f"At {block['place']} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase: so "
-        "wide are the ranges of the level at a unit's edge and of the decay."
+        f"At {block['place']} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase. "
+        "The ranges combine those of the edge level and of the decay."
     )
 
 

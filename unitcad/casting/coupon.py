@@ -161,7 +161,7 @@ class Coupon:
             once = "the leaves under the ribs spring back" if self.leaf else "a rib is crushed only once"
             lines += [
                 "",
-                f"Ribs: press the plug into each station until its handle lies on the boss; {once}.",
+                f"Ribs: press the plug into each station until its handle touches the boss; {once}.",
                 "Then measure across handle and boss together, along x and along y. The excess over the handle is the",
                 f"plug's offset from the middle; without ribs it is up to {number(self.clearance, 3)} mm.",
             ]

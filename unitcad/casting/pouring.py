@@ -158,7 +158,7 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
         )
     else:
         on = "on and push it towards the cut corner, "
-        on += "as the cup before" if n > 1 else "so that the play lies on one side"
+        on += "as the cup before" if n > 1 else "so that all play is on one side"
         on += f": Layer {n} lies between two cup positions." if n > 1 and plan.concentric else "."
     yield BenchStep(
         f"Cup {n} on",

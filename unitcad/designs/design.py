@@ -23,7 +23,6 @@ from unitcad.spec.resolved import Circuit, Wires
 from unitcad.text import number
 
 Reason = tuple[str, str]
-"""A skipped output and the reason."""
 
 
 @dataclass(frozen=True)

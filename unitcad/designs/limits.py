@@ -116,7 +116,7 @@ def _check_lip(spec: Spec, dims: Dimensions) -> None:
     under = dims.exit.low if dims.exit else dims.motor_height
     if dims.core_outline[-2][1] > under:
         ring = f"a ring of air of {dims.air_ring:g} mm"
-        limit = f"the core's cone over the lip is too wide for {ring}; motor.fill = true would do"
+        limit = f"the core's cone over the lip is too wide for {ring}; motor.fill = true is accepted"
         raise Refusal("motor.lip_mm", lip, limit, 0.0)
 
 

@@ -14,7 +14,6 @@ from html import escape
 import numpy as np
 
 COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d1478c", "#17868c")
-"""Colours of series, in turn."""
 WIDTH, HEIGHT = 760, 460
 LEFT, RIGHT, TOP, BOTTOM = 72, 210, 40, 52
 LEGEND_LETTERS = 28

@@ -29,7 +29,6 @@ HAIR_MM = 1 / 3000
 """The cut is this far off its plane, and so in no plane of the length grid: a face in the plane itself, shared by two
 bodies, could be drawn for both or for neither."""
 TAIL_MM = 2.5
-"""The length of a tail that is drawn."""
 WIDTH_PX = 520.0
 ROW_PX, COLUMN_PX = 26.0, 54.0
 LABEL_GAP_PX, EDGE_PX = 14.0, 6.0

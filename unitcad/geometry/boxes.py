@@ -32,7 +32,6 @@ class TooMany(Interrupted):
 
 
 MOST_PAIRS = 10_000_000
-"""Pairs of boxes that `box_pairs` returns."""
 
 _FAN = 4
 _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at

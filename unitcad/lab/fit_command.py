@@ -127,7 +127,7 @@ def warnings(result: Fitted) -> list[str]:
     """Say which models have a constant that the units do not determine."""
     return [
         f"{name}: the units do not determine {one.at_bound} ({one.constants[one.at_bound]:.3g}); its range says "
-        "nothing, and the model comes last"
+        "nothing, so the model is listed last"
         for name, one in result.fit.model.items()
         if one.at_bound
     ]
@@ -151,9 +151,9 @@ def leads_text(result: Fitted) -> str:
         if other != lead
     ]
     return (
-        f"{lead} leads: x {judged[lead].own_score:.2f} on the lab's own units ({'; '.join(tests)}). Another "
-        f"model than {RULE} leads only if, its leave-one-out error on the lab's "
-        f"own units is less than {RULE}'s and the {BASELINE}'s and p is at most {OVERTURNED:g} against both."
+        f"{lead} leads: x {judged[lead].own_score:.2f} on the lab's own units ({'; '.join(tests)}). A model "
+        f"other than {RULE} leads only if its leave-one-out error on the lab's own units is below that of {RULE} and "
+        f"{BASELINE}, with p at most {OVERTURNED:g} against both."
     )
 
 

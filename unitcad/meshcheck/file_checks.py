@@ -44,7 +44,30 @@ _KINDS = {
 
 
 def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) -> FileReport:
-    """Check a mesh in memory: vertices (n, 3) mm, faces (m, 3) indices. The report's path is empty."""
+    """Check a mesh in memory.
+
+    Parameters
+    ----------
+    vertices : array_like of float, shape (n, 3)
+        Corners, mm.
+    faces : array_like of int, shape (m, 3)
+        Indices of the corners of each triangle, counter-clockwise from outside.
+    options : Options, optional
+        Rules and limits. Default: all rules that need no printer.
+
+    Returns
+    -------
+    FileReport
+        Findings and facts; `path` is empty.
+
+    Examples
+    --------
+    >>> from unitcad.meshcheck import check_mesh
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+
+    >>> check_mesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]).verdict
+    'pass'
+    """
     options = options or Options()
     points = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
     triangles = np.asarray(faces).reshape(-1, 3)
@@ -58,13 +81,39 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
 
 
 def check_file(path: str | Path, options: Options | None = None) -> FileReport:
-    """Check one file. Missing, unreadable and hostile files are findings of the report."""
+    """Check one file.
+
+    Parameters
+    ----------
+    path : str or Path
+        Mesh file. A missing, unreadable or hostile file is a finding of the report.
+    options : Options, optional
+        Rules and limits. Default: all rules that need no printer.
+
+    Returns
+    -------
+    FileReport
+        Findings and facts; lengths in mm.
+
+    Examples
+    --------
+    >>> from unitcad.meshcheck import check_file
+    >>> [finding.code for finding in check_file("missing.stl").findings]
+    ['F012']
+    """
     options = options or Options()
     return _check_with(str(path), options, partial(_check, None, Path(path), options))
 
 
 def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileReport:
-    """Check a file's content without the file; `name` gives the format by its suffix. Not for STEP."""
+    """Check the content of a file as `check_file` does; the suffix of `name` gives the format. STEP needs a file.
+
+    Examples
+    --------
+    >>> from unitcad.meshcheck import check_bytes
+    >>> check_bytes(b"", "empty.stl").verdict
+    'error'
+    """
     options = options or Options()
     return _check_with(name, options, partial(_check, data, Path(name), options))
 

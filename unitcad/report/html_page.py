@@ -165,7 +165,6 @@ _STYLES = ("app/page.css", "app/print.css")
 
 _PROGRAMS = ("vendor/three.min.js", *(f"app/{name}.js" for name in ("dom", "glb", "viewer", "controls", "array")))
 VIEW = '<div class="stage-host"><p class="absent">A script draws the 3D view.</p></div>'
-"""The place of the 3D view in a page's markup."""
 
 
 def plain_page(title: str, body: str, model: dict[str, Any] | None = None) -> str:

@@ -66,10 +66,10 @@ def write_report(
     warn: Callable[[str], None] = lambda line: None,
     modelled: Modelled = model,
 ) -> Path:
-    """Write `folder`/report.html for the variant or the batch in `folder`; returns its path.
+    """Write report.html for the variant or the batch in a folder.
 
-    `warn` gets lines that say which results are damaged, and why; `modelled` gives the models of a unit's geometry.
-    Raises UnitcadError if the folder has none.
+    `warn` takes a line for each damaged result; `modelled` returns the 3D models of a unit. Returns the page's path.
+    Raises UnitcadError if the folder has no result.
     """
     if kind := read_results.compound_in(folder):
         for unit in sorted((folder / "units").glob("*")):

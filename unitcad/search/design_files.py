@@ -25,7 +25,7 @@ from unitcad.search.proposals import Inversion, name_of, order_rows
 from unitcad.spec import to_toml
 from unitcad.text import cell, join_words, markdown, number
 
-OTHERS = "Nearest others: measured outside the target, or below the probability that is asked for"
+OTHERS = "Next candidates: measured outside the target, or below the required probability"
 """The heading over the candidates that are no proposals."""
 _GOALS = {
     "edge_min": "at least {} of the motor's amplitude at the edge",
@@ -61,8 +61,8 @@ def head_lines(data: Mapping[str, Any]) -> list[str]:
     return [
         f"{tried['candidates']} candidates ({tried['geometries']} sets of lengths), {tried['within_limits']} within "
         f"the limits{not_made}",
-        f"probabilities by {leads['model']}, fitted to {leads['by']}; they rank {leads['ranks']}",
-        f"they do not rank {leads['does_not_rank']}",
+        f"probabilities by {leads['model']}, fitted to {leads['by']}; ranked by {leads['ranks']}",
+        f"not ranked by {leads['does_not_rank']}",
     ]
 
 
@@ -111,7 +111,9 @@ def lines(one: Mapping[str, Any]) -> list[str]:
     )
     made = [size]
     if one["equal_to"]:
-        made.insert(0, f"as likely as number {one['equal_to']}: the order among equals is how easily they are made")
+        made.insert(
+            0, f"as likely as number {one['equal_to']}; among equals the unit that is easier to make comes first"
+        )
     if crosstalk := one.get("crosstalk"):
         value, low, high = (number(crosstalk[key], 2) for key in ("value", "low", "high"))
         made.append(

@@ -79,7 +79,7 @@ def explain(made: Inversion, named: str) -> dict[str, Any]:
     reasons = [] if among else _not_tried(found, spec, alike if alike in rows else None)
     unknown = [layer for layer in variant.layers if layer.youngs_modulus.value is None]
     if own and own["nearest_other"]:
-        why = "was measured outside the target" if own["measured"] else "is below the probability that is asked for"
+        why = "was measured outside the target" if own["measured"] else "is below the required probability"
         reasons.append(f"it is no proposal: it {why}, and is among the nearest others as number {own['rank']}")
     elif unknown:
         names = join_words(dict.fromkeys(layer.material for layer in unknown))
@@ -244,10 +244,10 @@ _LEAST_SHOWN = 0.005
 """A kind with a smaller probability, 0.00 with two digits, is no proposal."""
 _TRIES = 3
 """Candidates of a kind that are judged until one can be cast."""
-RANKS = "design, which side is soft, silicones with another side soft"
+RANKS = "design and which side is soft"
 NOT_RANKED = (
-    "walls, caps, diameter, frequency, and silicones with the same side soft, but by an assumed line below a ratio of "
-    "16.7"
+    "walls, caps, diameter, frequency, or silicones with the same side soft, except by an assumed line below a ratio "
+    "of 16.7"
 )
 """The measured units do not tell these apart: another value only widens the range."""
 

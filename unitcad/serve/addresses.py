@@ -1,4 +1,4 @@
-"""The addresses under which the live page's server may be asked, and the one that is told."""
+"""The addresses under which the live page's server answers, and the one to open."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ class Live:
         return response
 
     async def _campaign(self, path: Path, module: str) -> Response:
-        """Answer with the page of a campaign, measured anew; a change of its file is seen by loading it again."""
+        """Answer with the page of a campaign, measured again at each load."""
         status = 422
         async with self.questions.turns["estimate"]:
             try:

@@ -69,7 +69,6 @@ _USE = {
 }
 """Ranges of use, which sliders have in place of the possible range; a value beyond widens its own."""
 _UNITS = ("mm", "hz", "um", "g", "c", "kpa")
-"""Units that a key ends in."""
 _TEXTS_OF_FILES = ("estimate.fit_source",)
 
 

@@ -19,13 +19,11 @@ from unitcad.serve.messages import JobState
 from unitcad.workers import STAGES, Call, Pool, run_here
 
 MOST_KEPT = 20
-"""Jobs that are remembered."""
 STAGE = "stage: "
 """Prefix of a job's line that names its stage."""
 GRACE_S = 10.0
 """Seconds that a cancelled job may take to write its results."""
 MOST_LINES = 200
-"""Lines of a job that are kept."""
 RESULTS = "results"
 """Folder of a sweep's results in its folder."""
 

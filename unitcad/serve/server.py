@@ -116,7 +116,7 @@ def serve(
     code: bool = False,
     ready: Callable[[str], None] = lambda address: None,
 ) -> None:
-    """Serve the live page of a spec until it is interrupted; `ready` is told its address, the token in it.
+    """Serve the live page of a spec until it is interrupted; `ready` takes its address, with the token.
 
     `source` is a file of a spec, an array or a campaign, a template's name, a result's folder, or a batch's, whose rows
     open live; None: the default template. `port` 0: any that is free.

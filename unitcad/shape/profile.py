@@ -96,7 +96,14 @@ class Profile:
 
 
 def polygon(*corners: tuple[float, float]) -> Profile:
-    """Return a profile of straight sides through `corners` (mm), counter-clockwise."""
+    """Return a profile of straight sides through `corners` (mm), counter-clockwise.
+
+    Examples
+    --------
+    >>> from unitcad.shape import polygon
+    >>> polygon((0, 0), (4, 0), (0, 2)).area
+    4.0
+    """
     return Profile(tuple((x, y, 0.0) for x, y in corners))
 
 

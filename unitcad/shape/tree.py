@@ -134,17 +134,31 @@ Shape = Revolve | Extrude | Polyhedron | Union | Cut | Common | Component | Belo
 
 
 def cylinder(radius: float, z0: float, z1: float) -> Revolve:
-    """Return a cylinder about the z axis (mm)."""
+    """Return a cylinder of `radius` about the z axis, from `z0` to `z1`, mm.
+
+    Examples
+    --------
+    >>> from unitcad.shape import cylinder, exact_volume
+    >>> round(exact_volume(cylinder(1, 0, 2)), 3)
+    6.283
+    """
     return Revolve(rectangle(0, z0, radius, z1))
 
 
 def ring(inner: float, outer: float, z0: float, z1: float) -> Revolve:
-    """Return a tube about the z axis between two radii (mm)."""
+    """Return a tube about the z axis between two radii, from `z0` to `z1`, mm."""
     return Revolve(rectangle(inner, z0, outer, z1))
 
 
 def box(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> Extrude:
-    """Return an upright box (mm)."""
+    """Return a box between two ends along each axis, mm.
+
+    Examples
+    --------
+    >>> from unitcad.shape import box, exact_volume
+    >>> exact_volume(box(0, 2, 0, 3, 0, 4))
+    24.0
+    """
     return Extrude(rectangle(x0, y0, x1, y1), z0, z1)
 
 
@@ -155,23 +169,37 @@ def union(parts: Iterable[Shape]) -> Shape:
 
 
 def cut(body: Shape, tools: Iterable[Shape]) -> Shape:
-    """`body` less `tools`; without tools it is returned as it is."""
+    """Return `body` less `tools`; without tools the body unchanged.
+
+    Examples
+    --------
+    >>> from unitcad.shape import cut, cylinder
+    >>> cut(cylinder(2, 0, 1), [cylinder(1, -1, 2)]).tools == (cylinder(1, -1, 2),)
+    True
+    """
     tools = tuple(tools)
     return Cut(body, tools) if tools else body
 
 
 def moved(shape: Shape, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape:
-    """`shape` moved by (x, y, z) mm; not wrapped if that is no move."""
+    """Return `shape` moved by (x, y, z) mm; unchanged if all are 0.
+
+    Examples
+    --------
+    >>> from unitcad.shape import box, moved
+    >>> moved(box(0, 1, 0, 1, 0, 1), z=2).move
+    (0.0, 0.0, 2.0)
+    """
     return Place(shape, move=(x, y, z)) if (x, y, z) != (0.0, 0.0, 0.0) else shape
 
 
 def turned(shape: Shape, axis: str, quarters: int) -> Shape:
-    """`shape` turned about an axis through the origin by a number of quarter turns, counter-clockwise."""
+    """Return `shape` turned about an axis through the origin by quarter turns, counter-clockwise."""
     return rotated(shape, axis, 90.0 * quarters)
 
 
 def rotated(shape: Shape, axis: str, degrees: float) -> Shape:
-    """`shape` turned about an axis through the origin by any angle, counter-clockwise; not wrapped for a full turn."""
+    """Return `shape` turned about an axis through the origin by an angle, counter-clockwise; as is for a full turn."""
     quarters = round(degrees / 90)
     rest = math.radians(degrees - 90.0 * quarters)
     c, s = (math.cos(rest), math.sin(rest)) if rest else (1, 0)
@@ -207,7 +235,7 @@ def content_hash(shape: Shape, *more: object) -> str:
 
 
 def exact_volume(shape: Shape) -> float:
-    """Volume in mm3 of a revolved or extruded body, placed or not, in closed form.
+    """Return the volume in mm3 of a revolved or extruded body, placed or not, in closed form.
 
     Revolve: Pappus. Extrude: area times height, or for a taper Simpson's rule, exact for a ruled solid whose section
     is quadratic in z. Raises TypeError for a boolean: it has no closed form here.

@@ -207,16 +207,50 @@ def batch(
     tables: Sequence[str] | str | None = None,
     shard: str | None = None,
 ) -> BatchResult:
-    """Make every variant of a sweep in the folder `out` (out/<name> by default), each distinct part once.
+    """Make every variant of a sweep, each distinct part once. The same call again resumes an interrupted one.
 
-    `sweep` is a file, the name of a shipped sweep, or a `unitcad.sweeps.Sweep`. `set` changes values of every variant,
-    `formats` and `only` choose the outputs, as for `unitcad.build`. `jobs` is the number of worker processes, one a
-    core by default, with 0 this process. `limit` makes the first variants only; `timeout` is in seconds a variant.
-    `store` is a folder or an address (s3://bucket/path) that workers put content into; `folders` says whether each
-    variant has a folder, by default below 1,000 variants. `tables` are any of csv, json, parquet; by default the
-    first two, from 10,000 variants on the last one. `shard`, such as "3/16", makes one part of the sweep. The same call
-    again resumes an interrupted one. The result has the outcome of each variant. Raises Refusal or UnitcadError if
-    nothing can be run.
+    Parameters
+    ----------
+    sweep : str, path or Sweep
+        A file, or the name of a shipped sweep.
+    out : path, optional
+        Folder of the batch. Default: out/<name>.
+    set, formats, only, check
+        As for `unitcad.build`; they apply to every variant.
+    jobs : int, optional
+        Worker processes; 0: this process. Default: one a core.
+    limit : int, optional
+        Make only the first variants.
+    timeout : float, optional
+        Time limit for a variant, s.
+    keep_going : bool, default False
+        Continue after a variant that fails.
+    cache, store : path or str, optional
+        Folder of the cache; folder or address (s3://bucket/path) for content.
+    report : bool, default False
+        Write report.html.
+    folders : bool, optional
+        Write a folder for each variant. Default: below 1,000 variants.
+    tables : str or sequence of str, optional
+        Any of csv, json, parquet. Default: csv and json; parquet from 10,000 variants.
+    shard : str, optional
+        One part of the sweep, such as "3/16".
+
+    Returns
+    -------
+    BatchResult
+        Folder, and the outcome of each variant.
+
+    Raises
+    ------
+    Refusal, UnitcadError
+        If nothing can be run.
+
+    Examples
+    --------
+    >>> from unitcad.sweeps import batch
+    >>> batch("published", "estimates", only="estimate", limit=2, jobs=0).ok
+    True
     """
     check_number("jobs", jobs, 0, 1024, whole=True)
     check_number("timeout", timeout, 0.001, 1e9)

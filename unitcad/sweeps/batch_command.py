@@ -316,7 +316,7 @@ def _print_summary(summary: Summary, folder: Path, *, joined: bool = False) -> N
 
 def _parts(summary: Summary) -> str:
 
-    known = f"{counted(summary.reused, 'variant')} of known parts alone"
+    known = f"{counted(summary.reused, 'variant')} made only of known parts"
     return f"{counted(summary.geometries, 'geometry', 'geometries')}, {known}"
 
 

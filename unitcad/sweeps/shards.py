@@ -163,7 +163,7 @@ def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
         if (record.head.batch, record.of, record.variants) != (first.head.batch, first.of, first.variants):
             raise UnitcadError(
                 f"{folder}: is a shard of another batch than {first_folder} (sweep, options or number of shards); "
-                "name the folders of the shards to merge, or remove the wrong one and run that shard anew"
+                "name the folders of the shards to merge, or remove the wrong one and run that shard again"
             )
         if record.code != first.code:
             raise UnitcadError(f"{folder}: was made by unitcad {record.code}, {first_folder} by {first.code}")

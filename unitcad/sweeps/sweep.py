@@ -337,9 +337,27 @@ def _without_offer(refusal: Refusal) -> Refusal:
 
 
 def load_sweep(source: str | os.PathLike[str]) -> Sweep:
-    """Load the sweep of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
+    """Load a sweep.
 
-    Raises Refusal or UnitcadError for an unknown base or path, lists of unequal lengths in a zip, an empty sweep.
+    Parameters
+    ----------
+    source : str or path
+        A file (a path separator or .toml in it), or the name of a shipped sweep.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    Refusal, UnitcadError
+        For an unknown base or path, lists of unequal lengths in a zip, an empty sweep.
+
+    Examples
+    --------
+    >>> from unitcad.sweeps import load_sweep
+    >>> load_sweep("published").name
+    'published'
     """
     return load_file(source, "sweep", lambda data, path: from_file(data, path.parent, path.stem))
 

@@ -67,7 +67,6 @@ def needs(distance: float, pair: tuple[Point, Point]) -> str:
 __all__ = ["LayoutKind", "Point", "layouts"]
 
 MOST_PLACES = 1024
-"""Places of an array, at most."""
 
 
 @cache

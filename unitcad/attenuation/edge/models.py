@@ -25,7 +25,6 @@ from unitcad.attenuation.edge.measured import CLASSES, MeasuredTable, Moduli, Pr
 Fit = Callable[[MeasuredTable, np.ndarray], np.ndarray]
 """From a table and masks (M, units) of the units to fit to, the levels of all units by each fit, (M, units)."""
 RANGE_PERCENT = (5.0, 95.0)
-"""Ends of a bootstrap range."""
 _DRAWS, SEED = 10_000, 1954
 _MOST_EXACT = 12
 """Up to this many units every pattern of signs is tried."""
@@ -158,7 +157,6 @@ def _score(predicted: np.ndarray, measured: np.ndarray, names: tuple[str, ...] |
 
 
 MODELS = ("rule", "published", "corrected", "divider")
-"""The models that give an estimate."""
 RULE, BASELINE = "rule", "baseline"
 OVERTURNED = 0.05
 """Largest p of the sign-flip test at which another model takes the rule's place."""
@@ -294,7 +292,6 @@ COMPARED: dict[str, Model] = {
     "crossings": one_constant(cf.crossings),
     BASELINE: log_linear(CLASSES, lambda units: np.eye(len(CLASSES))[unit_class(units).astype(int)]),
 }
-"""Every model that is scored."""
 
 
 def leader(errors: Mapping[str, np.ndarray]) -> str:

@@ -149,7 +149,6 @@ def harmonic_mesh(blocks: Sequence[Block], fineness: float, radius: float, corne
 
 
 FIELDS = {0: ("u_r", "u_z"), 1: ("q", "p", "u_z")}
-"""The unknown fields of each harmonic."""
 
 
 @dataclass(frozen=True)

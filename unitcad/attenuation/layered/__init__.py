@@ -275,7 +275,6 @@ class LayeredMedium(Stack):
 
 
 MOST_SOLVED = 400
-"""Distinct radii that are solved one by one."""
 _PART, _LEAST, _NEAR, _FAR, _NEAR_TO = 1 / 6, 2e-5, 0.5e-3, 1e-3, 0.03
 
 

@@ -10,6 +10,6 @@
   }
 
   start()
-    .catch((error) => U.clear(host, U.el("p", { className: "absent" }, `This browser draws no 3D (${error.message}); the pictures below stand in.`)))
+    .catch((error) => U.clear(host, U.el("p", { className: "absent" }, `This browser draws no 3D (${error.message}); the pictures below replace it.`)))
     .finally(() => { document.documentElement.dataset.ready = "yes"; });
 })();

@@ -79,7 +79,7 @@
       const points = rows.map((row) => ({ x: row[at(x)], y: row[at(y)], range: table.range(y, row[at(y)]), group: group ? row[at(group)] : "", title: named(row), why: (column) => why(row[0], column) || row[at("reason")], open: row[0] && (() => { location.hash = encodeURIComponent(row[0]); }) }));
       clear(plotHost, U.scatterPlot(points, { xLabel: table.head(x), yLabel: table.head(y), columns: [x, y], label: `${y} against ${x}, ${points.length} variants` }),
         points.some((point) => point.range) && el("p", { className: "note" }, `Bars: the level over and times ${number(errors[U.modelOf(y)], 3)}, the model's typical error with a measured unit left out, not an estimate's 80 % range.`),
-        U.modelOf(y) && x in alone && el("p", { className: "note unmeasured" }, `Every measured unit had ${number(alone[x])} mm for ${x}: no measurement supports how the level changes with it, and the error there is not known.`));
+        U.modelOf(y) && x in alone && el("p", { className: "note unmeasured" }, `Every measured unit had ${number(alone[x])} mm for ${x}: no measurement shows how the level changes with it, so the error is not known.`));
     };
     let ready = false;
     const pins = U.createPins(table, { nameOf: named, variant, shown: table.shown, head: table.head });

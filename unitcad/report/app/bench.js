@@ -177,7 +177,7 @@
       clear(out, Number.isFinite(start) && el("p", { className: late ? "verdict bad" : "verdict good" }, late
         ? `Too late by ${duration((Date.now() - start) / MINUTE)}: begun now, it is ready ${clock(Date.now() + finish * MINUTE)}.`
         : `Begin by ${clock(start)}, the pieces printed.`),
-      table(["What", "Begin", "At the bench", "Then wait"], rows, { label: "Schedule" }));
+      table(["Item", "Begin", "At the bench", "Then wait"], rows, { label: "Schedule" }));
     };
     for (const input of [ready, motor]) input.addEventListener("change", () => { state.ready = ready.value; state.motor = motor.checked; keep(); draw(); });
     draw();
@@ -284,7 +284,7 @@
         const node = document.querySelector(`[name="${wrong[0]}"]`);
         node.setAttribute("aria-invalid", "true");
         node.focus();
-        said.textContent = `Not saved: ${wrong.length} field${wrong.length === 1 ? " holds" : "s hold"} no number within the limits; the first one is selected.`;
+        said.textContent = `Not saved: ${wrong.length} field${wrong.length === 1 ? " has" : "s have"} no number within the limits; the first one is selected.`;
         return;
       }
       const slug = made.spec_name.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-+|-+$/g, "").slice(0, 50) || "unit";
@@ -298,7 +298,7 @@
       said.textContent = `${name} is saved. Put it into this result's folder and run unitcad report: the page shows it.`;
     };
     const anew = () => {
-      if (!window.confirm("Forget all that is entered here and begin a new casting?")) return;
+      if (!window.confirm("Delete all entries and begin a new casting?")) return;
       state = fresh();
       keep();
       draw();
@@ -306,7 +306,7 @@
     return section("save", "Cast record",
       el("p", {}, "Grams, times, walls and masses in one JSON file, for unitcad report, fit and measure."), words("notes", "Notes on this casting"),
       el("div", { className: "tools" }, el("button", { type: "button", className: "main", onclick: save }, "Save the cast record"), el("button", { type: "button", onclick: anew }, "New casting")),
-      said, !keeps && el("p", { className: "verdict bad" }, "This browser keeps nothing: save before the page is closed."));
+      said, !keeps && el("p", { className: "verdict bad" }, "This browser stores nothing: save before you close the page."));
   }
 
   // What only paper has: lines to write on.

@@ -34,7 +34,7 @@
     if (!data.time_line) return null;
     const rows = data.time_line.map((phase) => [phase.name, duration(phase.start_min), duration(phase.bench_min), duration(phase.wait_min)]);
     return [el("p", {}, el("strong", {}, duration(data.earliest_finish_min)), ` from the printed pieces to the ${data.makes || "unit"} out of the mould, of which ${duration(data.bench_min)} at the bench.`),
-      table(["What", "Begins after", "At the bench", "Then wait"], rows, { label: "Time line" })];
+      table(["Item", "Begins after", "At the bench", "Then wait"], rows, { label: "Time line" })];
   }
 
   // What was weighed, timed and measured when this unit was cast; another spec's record is named as such.
@@ -77,7 +77,7 @@
 
   function procedure(variant) {
     const data = variant.casting;
-    if (!data) return section("procedure", "Procedure", el("p", { className: "absent" }, "No procedure here. Ask for it with ", el("code", {}, "unitcad build SPEC --only casting")));
+    if (!data) return section("procedure", "Procedure", el("p", { className: "absent" }, "No procedure here. Make it with ", el("code", {}, "unitcad build SPEC --only casting")));
     let next = 1;
     const steps = (list) => {
       if (!list || !list.length) return null;
@@ -110,7 +110,7 @@
       (data.pours || []).map(pour),
       titled("Out of the mould", steps(data.release)),
       titled(data.last, steps(data.assembly)),
-      titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "What the cups' play does to the walls", 2)),
+      titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "Effect of the cups' play on the walls", 2)),
       titled("Printing", printing(variant.slicer)),
       titled("Needed", data.bill && table(["Item", "Quantity", "Made", "Note"], data.bill.map((row) => [partName(row.item), `${number(row.quantity, 3)} ${row.unit}`, row.made, row.note]), { label: "Bill of materials" })));
   }

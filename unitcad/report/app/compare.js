@@ -75,7 +75,7 @@
         : columns.filter(([name, cells]) => table.swept.has(name) && differing(cells)).map(([name, cells]) => [name, cells.map((cell) => number(cell, 6))]);
       return sideBySide(heads, [
         ["Section and estimate", [["Section", sections], ["Estimate", answers]].filter(([, cells]) => cells.some((cell) => cell !== "–"))],
-        ["What differs in the specs", chosen], ["What differs in the results", figures]]);
+        ["Differences of the specs", chosen], ["Differences of the results", figures]]);
     }
 
     function pin(row) {

@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const { el, number, section, table, facts, theme, curvePlot } = window.unitcad;
-  const NAMES = { rule: "Fitted rule", published: "Paper, as published", corrected: "Paper's path, corrected", divider: "Fitted divider", crossings: "Interfaces alone", baseline: "Four class means" };
+  const NAMES = { rule: "Fitted rule", published: "Paper, as published", corrected: "Paper's path, corrected", divider: "Fitted divider", crossings: "Only interfaces", baseline: "Baseline, four class means" };
   const nameOf = (model) => (NAMES[model] ? `${NAMES[model]} (${model})` : model);
   const known = (value) => typeof value === "number" && Number.isFinite(value);
 
@@ -89,7 +89,7 @@
   // What a lab's own fit expects of a new unit: 80 % ranges, and which fit it is.
   function predicted(data, fit) {
     const rows = Object.entries(data.models || {}).filter(([, block]) => block.predictive).map(([model, block]) => ({ name: nameOf(model), entry: percents({ value: block.edge_level.value, low: block.predictive.p10, high: block.predictive.p90 }), colour: COLOURS[model] || "series-4" }));
-    return [rangeChart(rows, ownMarks(data), `Where a new unit is expected in the lab ${fit.name}, % of the motor's amplitude: 8 of 10 units.`),
+    return [rangeChart(rows, ownMarks(data), `80 % range of a new unit in the lab ${fit.name}, % of the motor's amplitude.`),
       el("p", { className: "note" }, `Constants: ${fit.file}, SHA-256 ${fit.sha256.slice(0, 12)}, ${fit.own_units} units of the lab's own.`),
       fitErrors(data)];
   }
@@ -104,7 +104,7 @@
     const cells = rows.map(([model, error]) => [nameOf(model), factor(error.leave_one_out.geometric_mean), `${one(error.leave_one_out.low)} to ${one(error.leave_one_out.high)}`, factor(error.own_leave_one_out), factor(error.own_by_stored), error.coverage || "–"]);
     const title = `Error by the fit of ${data.fit.name}`;
     return [el("h3", {}, title),
-      table(["Model", "Left out", "5 to 95 %", "Own units", "Own, stored constants", "In 80 %"], [...cells, [nameOf("baseline"), factor(rows[0][1].baseline), "–", "–", "–", "–"]], { label: title }),
+      table(["Model", "Leave-one-out", "5 to 95 %", "Own units", "Own, stored constants", "Coverage"], [...cells, [nameOf("baseline"), factor(rows[0][1].baseline), "–", "–", "–", "–"]], { label: title }),
       el("p", { className: "note" }, "Factors; 1 is exact. Each unit is predicted by constants fitted without it. The error against the measured table, below, is by the stored constants.")];
   }
 
@@ -119,7 +119,7 @@
     });
     const numbers = (block.levels || []).map((one) => [one.drive, place[one.reading] || one.reading, three(percent(one.median)), one.median_error === null ? "–" : three(one.median_error), three(percent(one.drawn_as))]);
     return [el("h3", {}, "By finite elements (fem)"),
-      rangeChart(rows, [], `Amplitude along the drive, % of the motor's: median and ${(block.percent || [])[0]} to ${(block.percent || [])[2]} % of ${block.draws} draws, then those with bonded and with resting skin apart.`),
+      rangeChart(rows, [], `Amplitude along the drive, % of the motor's: median and ${(block.percent || [])[0]} to ${(block.percent || [])[2]} % of ${block.draws} draws, then separately with bonded and with resting skin.`),
       numbers.length > 0 && table(["Drive", "Read on", "Median, %", "Its error, times or divided by", "Unit as drawn, %"], numbers, { label: "Medians by finite elements" }),
       el("p", { className: "note" }, block.reason || `Not known, and drawn: ${block.not_known}. The level on the skin over that of the unit's own edge, as drawn: ${Object.entries(block.skin_over_edge || {}).map(([drive, ratio]) => `${three(percent(ratio))} % (${drive})`).join(", ")}.`)];
   }
@@ -169,7 +169,7 @@
     const waves = Object.keys(found);
     const passed = interfaces.map((name, i) => [name, ...waves.flatMap((wave) => ["k_t", "k_r"].map((key) => at(found[wave], key, i)))]);
     return [el("h3", {}, "The paper's equations 4 to 6"),
-      table(["From a layer to the next", ...waves.flatMap((wave) => ["k_t", "k_r"].map((key) => `${key}, ${wave.toUpperCase()} wave`))], passed, { label: "Transmission and reflection" }), table(["Equation", "Says", "Control", "Left", "", "Right", "Margin", "Unit", "Holds"], rows.map((row) => ({
+      table(["From a layer to the next", ...waves.flatMap((wave) => ["k_t", "k_r"].map((key) => `${key}, ${wave.toUpperCase()} wave`))], passed, { label: "Transmission and reflection" }), table(["Equation", "Inequality", "Control", "Left", "", "Right", "Margin", "Unit", "Holds"], rows.map((row) => ({
       className: row.holds === false ? "bad" : undefined,
       cells: [row.equation, row.text, row.control || "", row.left, row.relation, row.right, row.margin, row.unit || "", row.holds === true ? "holds" : row.holds === false ? "fails" : row.reason || "not known"],
     })), { label: "The paper's inequalities 5 and 6" })];
@@ -187,18 +187,18 @@
     const factor = (entry) => (entry ? entry.geometric_mean : "–");
     const out = (entry, key) => factor((entry.leave_one_out || {})[key]);
     return [el("h3", {}, "Error against the measured table"),
-      table(["Model", "Nine levels", "Left out", "5 to 95 %", "p to the best", "Worst", "Twelve ratios", "Left out", "Directions"], compared.map(([model, entry]) => [
+      table(["Model", "Nine levels", "Leave-one-out", "5 to 95 %", "p to the best", "Worst", "Twelve ratios", "Leave-one-out", "Directions"], compared.map(([model, entry]) => [
         nameOf(model), factor(entry.levels), out(entry, "levels"), ends(((entry.leave_one_out || {}).levels || {}).range), test(entry), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
         entry.directions ? `${entry.directions.right} of ${entry.directions.of}` : "–"]), { label: "Error against the measured table" }),
       el("p", { className: "note" }, `Factors; 1 is exact. ${all.note || ""}`),
       all.range && el("p", { className: "note" }, `Range: ${all.range}. p: ${all.sign_flip.note}.`),
-      chosen && el("p", { className: "note" }, `Rule, its form chosen among ${chosen.forms.length} without the unit too: ${number(chosen.geometric_mean, 3)} (${ends(chosen.range)}).`), classes(all)];
+      chosen && el("p", { className: "note" }, `Rule with its form chosen among ${chosen.forms.length} without the unit too: ${number(chosen.geometric_mean, 3)} (${ends(chosen.range)}).`), classes(all)];
   }
 
   // What leaving out a whole class of units costs.
   function classes({ leave_one_class_out: out, order }) {
     if (!out) return null;
-    return [table(["Class left out", ...order.map(nameOf)], Object.entries(out.by_class).map(([name, errors]) => [name, ...order.map((model) => errors[model])]), { label: "Error on a class that the fit did not have" }),
+    return [table(["Class left out", ...order.map(nameOf)], Object.entries(out.by_class).map(([name, errors]) => [name, ...order.map((model) => errors[model])]), { label: "Leave-one-class-out error" }),
       el("p", { className: "note" }, `${out.note}.`)];
   }
 
@@ -219,15 +219,15 @@
     const most = (name) => Math.max(...reading.map(([, seen]) => Math.abs(seen.by[name] || 0)));
     const [read, unread] = [names.filter((name) => most(name) > 0), names.filter((name) => most(name) === 0)];
     read.sort((a, b) => most(b) - most(a));
-    return [el("h3", {}, "Inputs that a model sees"),
-      table(["1 % more of", ...reading.map(([model]) => model)], read.map((name) => [name, ...reading.map(([, seen]) => slope(seen, name))]), { label: "Inputs that a model sees" }),
-      el("p", { className: "note" }, `Change of the level at the edge in percent, at the middle of the inputs' ranges; in brackets its range, and how many measured pairs of units agree.${unread.length ? ` Seen by none: ${unread.join(", ")}.` : ""}`)];
+    return [el("h3", {}, "Inputs with an effect on the level"),
+      table(["Input + 1 %", ...reading.map(([model]) => model)], read.map((name) => [name, ...reading.map(([, seen]) => slope(seen, name))]), { label: "Inputs with an effect on the level" }),
+      el("p", { className: "note" }, `Change of the level at the edge in percent, at the middle of the inputs' ranges; in brackets its range, and how many measured pairs of units agree.${unread.length ? ` No effect: ${unread.join(", ")}.` : ""}`)];
   }
 
   function assumptions(data) {
     const own = Object.entries(data.models || {}).map(([model, block]) => [el("h4", {}, nameOf(model)), el("p", {}, block.kind), el("ul", {}, (block.assumptions || []).map((text) => el("li", {}, text)))]);
     const layered = (data.layered && data.layered.assumptions) || [];
-    return el("details", {}, el("summary", {}, "Assumptions and what is left out"), el("ul", {}, (data.assumptions || []).map((text) => el("li", {}, text))),
+    return el("details", {}, el("summary", {}, "Assumptions and omissions"), el("ul", {}, (data.assumptions || []).map((text) => el("li", {}, text))),
       own, layered.length > 0 && [el("h4", {}, "Layered skin"), el("ul", {}, layered.map((text) => el("li", {}, text)))]);
   }
 
@@ -242,7 +242,7 @@
       const left = (variant.manifest.skipped || []).find((entry) => entry.output === "estimate");
       const ask = !left || left.reason === "not asked for (--only)";
       return section("estimate", "Attenuation estimate", el("p", { className: "absent" },
-        ask ? ["No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.reason}.`));
+        ask ? ["No estimate here. Make it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.reason}.`));
     }
     return section("estimate", "Attenuation estimate", lead(data.answer), elements(data.fem),
       el("details", {}, el("summary", {}, "How sure?"), el("ul", { className: "lead-notes" }, data.answer.details.map((line) => el("li", {}, line))), levels(data), el("h3", {}, "Outwards from the edge"), curves(data.layered)),

@@ -31,7 +31,7 @@
       return { node, ready: Promise.resolve(null) };
     }
     const ready = new Promise((done) => requestAnimationFrame(done)).then(() => U.createStage(host, model)).catch((error) => {
-      instead(`This browser draws no 3D (${error.message}); the section stands in.`);
+      instead(`This browser draws no 3D (${error.message}); the section replaces it.`);
       return null;
     });
     return { node, ready };
@@ -90,7 +90,7 @@
 
   function footer(data) {
     return el("footer", {}, el("p", {}, `Made by unitcad ${data.version}. This page contacts nothing.`),
-      el("details", {}, el("summary", {}, "Licences of what is in it"), el("pre", {}, document.getElementById("licences").textContent)));
+      el("details", {}, el("summary", {}, "Licences of its parts"), el("pre", {}, document.getElementById("licences").textContent)));
   }
 
   async function start() {

@@ -33,20 +33,20 @@
     const svg = variant.drawings["section.svg"];
     return section("section", "Section", svg ? el("figure", {}, framed(svg, "The unit cut along its tail, with its main dimensions", "Section drawing"),
       el("figcaption", {}, "Cut along the tail; lengths in mm; z = 0 is the skin."))
-      : absent("No section drawing here. Ask for it with", "unitcad build SPEC --only unit"));
+      : absent("No section drawing here. Make it with", "unitcad build SPEC --only unit"));
   }
 
   function checks(variant) {
     const { manifest } = variant;
     const all = manifest.mould_checks || [];
     const row = (check) => ({ className: check.ok ? undefined : "bad", cells: [check.code, check.where, check.value, check.limit, check.unit || "", check.ok ? "passed" : "failed"] });
-    const head = ["Check", "Where", "Value", "Limit", "Unit", ""];
+    const head = ["Check", "Place", "Value", "Limit", "Unit", ""];
     const failed = all.filter((check) => !check.ok);
     const findings = (manifest.check && manifest.check.findings) || [];
     const content = [el("p", { className: `verdict ${verdict(manifest).state}` }, verdict(manifest).text)];
     if (failed.length) content.push(table(head, failed.map(row), { caption: "Failed" }));
     if (all.length) content.push(el("details", {}, el("summary", {}, `All ${all.length} mould checks`), table(head, all.map(row), { label: "All mould checks" })));
-    else content.push(absent("The mould checks were not run. Ask for them with", "unitcad build SPEC --only unit,moulds"));
+    else content.push(absent("The mould checks were not run. Run them with", "unitcad build SPEC --only unit,moulds"));
     content.push(findings.length
       ? table(["File", "Rule", "Severity", "Message"], findings.map((f) => ({ className: f.severity === "error" ? "bad" : undefined, cells: [f.path, f.code, f.severity, f.message] })), { caption: "Findings in files" })
       : manifest.check && el("p", {}, all.length ? "The rules for files found no fault." : ""));
@@ -61,7 +61,7 @@
     const size = (box) => [0, 1, 2].map((i) => number(box[i + 3] - box[i], 4)).join(" × ");
     const rows = list.map((part) => [partName(part.name), part.role, part.made || "", part.material || "", part.volume_mm3, size(part.bbox_mm), part.triangles]);
     return section("parts", "Parts", list.length ? table(["Part", "Role", "Made", "Material", "Volume (mm³)", "Size (mm)", "Triangles"], rows, { label: "Parts" })
-      : absent("No parts here. Ask for them with", "unitcad build SPEC --only unit,moulds"));
+      : absent("No parts here. Make them with", "unitcad build SPEC --only unit,moulds"));
   }
 
   function files(variant) {

@@ -39,7 +39,7 @@
         return;
       }
       const answer = await server.send("/save", { text: text(), name: file.value, replace });
-      if (answer.path) clear(said, `Saved as ${answer.path}.`, answer.refused && el("span", { className: "refusal" }, ` It is refused as it stands, so nothing can be built from it yet: ${answer.refused}`));
+      if (answer.path) clear(said, `Saved as ${answer.path}.`, answer.refused && el("span", { className: "refusal" }, ` It is refused, so nothing can be built from it yet: ${answer.refused}`));
       else {
         const there = answer.faults[0].field === "name" && !replace;
         clear(said, answer.faults[0].message, " ", there && el("button", { type: "button", onclick: () => { file.focus(); save(true); } }, "Replace it"));

@@ -62,10 +62,10 @@
       el("div", { className: "columns" },
         el("section", { id: "spec", "aria-label": "Spec", tabindex: "-1" }, el("div", { className: "buttons" }, template, undo, redo), form.node, tabs),
         el("div", { className: "shown" }, view, section("section", "Section", drawn), jobs.node, pinned.node, section("judgement", "Moulds", judged), estimated)),
-      el("footer", {}, el("p", {}, `unitcad ${data.version}. This page contacts its own server alone.`)));
+      el("footer", {}, el("p", {}, `unitcad ${data.version}. This page contacts only its own server.`)));
 
     let stage = null;
-    const firstModel = (model) => U.createStage(host, model).then((made) => { stage = made; }, (error) => clear(host, el("p", { className: "absent" }, `This browser draws no 3D (${error.message}); the section stands below.`)));
+    const firstModel = (model) => U.createStage(host, model).then((made) => { stage = made; }, (error) => clear(host, el("p", { className: "absent" }, `This browser draws no 3D (${error.message}); the section is below.`)));
 
     // A text that was not changed is the server's to give.
     function keep() {
@@ -206,7 +206,7 @@
       const typing = document.activeElement === text;
       textFault.textContent = !typing && !unread.length ? "" : faults.map((one) => (one.field && one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
       if (unread.length) tabs.open = true;
-      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), faults.length > 0 && el("p", { className: "note" }, state.unit.text ? `What is shown is the last ${noun()} that could be made.` : "Nothing could be made yet."));
+      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), faults.length > 0 && el("p", { className: "note" }, state.unit.text ? `Shown: the last valid ${noun()}.` : "Nothing could be made yet."));
       page.dataset.stale = String(faults.length > 0);
       buttons();
       if (!faults.length) await shown(answer);
@@ -228,7 +228,7 @@
       opened.textContent = state.opened ? `Opened from ${state.opened}. ${UNWRITTEN}` : UNWRITTEN;
       document.title = `${[state.opened, title.textContent].filter(Boolean).join(": ")} - unitcad`;
       clear(figures, (answer.figures || []).map(([name, value, unit]) => el("span", { className: "chip" }, `${name} ${number(value, 3)} ${unit}`.trim())));
-      clear(drawn, answer.section ? U.framed(answer.section, "The unit cut along its tail, with its main dimensions", "Section drawing") : el("p", { className: "absent" }, "The patch's plan stands with its crosstalk, below."));
+      clear(drawn, answer.section ? U.framed(answer.section, "The unit cut along its tail, with its main dimensions", "Section drawing") : el("p", { className: "absent" }, "The patch's plan is below, with its crosstalk."));
       jobs.keys();
       // The moulds of before stay in view until the new ones are there, but not a unit's beside a patch.
       const before = state.model || {};
@@ -307,7 +307,7 @@
       } else if (faults.length) {
         said("bad", "no moulds");
         const left = form.refuse(faults);
-        clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, `This ${noun()} has no moulds; the view keeps it alone.`));
+        clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, "", toForm))), el("p", { className: "note" }, `This ${noun()} has no moulds; the view shows only the ${noun()}.`));
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
       } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.mould_checks.length} mould checks failed` : `${manifest.mould_checks.length} mould checks passed`);

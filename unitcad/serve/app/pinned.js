@@ -11,7 +11,7 @@
     const pin = el("button", { type: "button", onclick: () => set({ ...current() }) }, "Pin this variant");
     const back = el("button", { type: "button", hidden: true, onclick: () => restore(pinned.text) }, "Go back to it");
     const unpin = el("button", { type: "button", hidden: true, onclick: () => { set(null); pin.focus(); } }, "Unpin");
-    const node = section("pinned", "A pinned variant beside this one", el("div", { className: "buttons" }, pin, back, unpin), host);
+    const node = section("pinned", "Compare with a pinned variant", el("div", { className: "buttons" }, pin, back, unpin), host);
 
     function set(one) {
       pinned = one;
@@ -32,19 +32,19 @@
       pin.textContent = pinned ? "Pin this one instead" : "Pin this variant";
       back.hidden = unpin.hidden = !pinned;
       if (!pinned) {
-        clear(host, el("p", { className: "absent" }, "Pin this variant, then change it: both stand here side by side."));
+        clear(host, el("p", { className: "absent" }, "Pin this variant, then change it: both are shown here side by side."));
         return;
       }
       const now = current();
       const columns = [pinned, now].map(column);
-      const heads = [`Pinned: ${pinned.name}`, now.refused ? "The last one that could be made; what is asked for now is refused" : `Now: ${now.name}`];
+      const heads = [`Pinned: ${pinned.name}`, now.refused ? "The last valid variant; the current values are refused" : `Now: ${now.name}`];
       const names = [...new Set(columns.flatMap((one) => [...one.figures.keys()]))];
       const unlike = differences(columns.map((one) => one.spec));
       host.dataset.refused = String(now.refused);
       clear(host, sideBySide(heads, [
         ["Section and estimate", [["Section", columns.map((one) => one.section)], ["Estimate", columns.map((one) => one.answer)]]],
         ["Figures", names.map((name) => [name, columns.map((one) => one.figures.get(name) || "–")])],
-        ["What differs in the specs", unlike.map(([path, cells]) => [path.split(/(?<=[._])/).flatMap((piece) => [piece, el("wbr")]), cells])],
+        ["Differences of the specs", unlike.map(([path, cells]) => [path.split(/(?<=[._])/).flatMap((piece) => [piece, el("wbr")]), cells])],
       ]), !now.refused && !unlike.length && el("p", { className: "note" }, "The specs are the same."));
     }
 
