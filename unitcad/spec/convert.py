@@ -207,8 +207,8 @@ def _name(plain: type, kind: Any) -> str:
     table = table_in(kind)
     if plain is list:
         return f"a list{_list_of(kind)}"
-    if plain is str and (words := _words(kind)[:_MOST_WORDS]):
-        return f"one of {', '.join(words)}" if len(words) > 1 else f'"{words[0]}"'
+    if plain is str and _words(kind):
+        return " or ".join(f'"{word}"' for word in _words(kind)[:_MOST_WORDS])
     if plain is not dict or not table:
         return _NAMES[plain]
     fields = fields_of(table)
