@@ -162,6 +162,8 @@ def list_consumables(
     injected = moulds.spec.moulds.pour == "injected"
     if cups and not injected:
         named.discard("adhesive tape")  # its strips are on the list
+    if "spirit level" in named:
+        named.discard("level")
     for tool in sorted(named, key=[*REQUIRED_TOOLS].index):
         yield Item(tool, 1, *REQUIRED_TOOLS[tool])
     if prop := tongue_prop(moulds):

@@ -71,6 +71,7 @@ def source_text(value: Value) -> str:
     return f"{value.status}: {value.source}"
 
 
+HELD = "area on the base over area in the cup"
 FOAMS = "assumed: 4 x the mix, it foams up"
 SYRINGES_ML = 5.0, 10.0, 20.0, 30.0, 60.0, 100.0
 """The sizes that syringes are sold in, ml; larger mixes take more than one filling."""
@@ -340,7 +341,7 @@ class Batch:
             self.vacuum and ("vacuum", VACUUM_INHG, "inHg", kpa),
             ("cure in this room", self.cure_h, "h", by_temperature + source_text(silicone.cure_h)),
             weep and ("weep by the windows, no grease", weep, "% of a layer", flow),
-            held and ("area on the base over area in the cup", held, "", "computed: adhesion is not measured"),
+            held and (HELD, held, "", "computed: adhesion is not measured"),
         )
         return tuple(Figure(*row) for row in rows if isinstance(row, tuple))
 

@@ -24,6 +24,7 @@ from unitcad.casting.figures import (
     Batch,
     at_room,
     eccentricity,
+    holding_ratio,
     pouring_min,
     unit_heights,
     window_length,
@@ -270,9 +271,10 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
 
 def recovery(moulds: MouldSet, layer: int) -> str:
     """Say where a layer stays when its cup is lifted, and what to do if it does not."""
-    stays = f"Layer {layer} should stay on the {holds(moulds)}"
     back = "from the skin's side" if layer == len(moulds.plan.steps) else "and put it back"
-    return f"{stays}: if it comes off in the cup, push it out {back}."
+    if 0 < holding_ratio(moulds, moulds.plan.steps[layer - 1]) < 1:
+        return f"Layer {layer} may come off in the cup, which holds more of it: then push it out {back}."
+    return f"Layer {layer} should stay on the {holds(moulds)}: if it comes off in the cup, push it out {back}."
 
 
 def _cup_held(moulds: MouldSet, cup: int, picture: str) -> BenchStep:

@@ -26,8 +26,12 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import cylinder, moved
 from unitcad.shape.profile import GRID_PER_MM
 from unitcad.spec.resolved import Moulds
+from unitcad.text import number
 
-KNIFE = "the base carries an edge thinner than that clearance: give the silicone over it a corner less sharp"
+KNIFE = (
+    "the base ends in an edge without thickness under the body: round that corner, or draw a level step there, {} mm "
+    "wide or wider"
+)
 THIN = 1e-3
 """Two heights nearer than this have no slice between them, mm."""
 GRID = 2 / GRID_PER_MM
@@ -41,7 +45,9 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     skirt, window = min(lengths.plinth_clearance_mm, lengths.seat_relief_mm), lengths.window_clearance_mm
     play = lengths.plinth_clearance_mm
     pins = moulds.plan.pins
-    beside_base, advice = (least_play(lengths), too_tight(lengths)) if pins else (window, KNIFE)
+    beside_base, advice = (
+        (least_play(lengths), too_tight(lengths)) if pins else (window, KNIFE.format(number(lengths.least_wall_mm, 3)))
+    )
     for step in moulds.plan.steps:
         base = solids[moulds.plan.base_of(step)]
         if step.cup not in solids:

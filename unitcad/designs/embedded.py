@@ -99,7 +99,11 @@ def assembly(spec: Spec, dims: Dimensions) -> list[Fitting]:
             f"ring, the pad on top of all layers.{hold}"
         )
         return [Fitting(text, ("soldering iron and solder", ADHESIVE))]
-    text = "Set the motor into the ring from above." if dims.mouth_radius else "Push the motor in from the skin's side."
+    text = (
+        "Set the motor into the ring from above."
+        if dims.mouth_radius
+        else "Push the motor in from the skin's side, its leads out at the back."
+    )
     if spec.wires:
         text = "Push the motor into the ring from above, the wires lying in the notch."
     steps = [Fitting(f"{text}{hold}")]

@@ -22,7 +22,7 @@ import numpy as np
 from unitcad.files import no_such_file
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.meshcheck import readers
-from unitcad.meshcheck.builds import check_3mf, check_on_bed, check_step, check_surface
+from unitcad.meshcheck.builds import CheckedMesh, check_3mf, check_assembly, check_on_bed, check_step, check_surface
 from unitcad.meshcheck.findings import Facts, FileReport, Finding, ending, limit_details, merge
 from unitcad.meshcheck.geometry.mesh import Mesh
 from unitcad.meshcheck.readers import kind_of
@@ -160,7 +160,8 @@ def _check(data: bytes | None, path: Path, options: Options, deadline: Deadline)
     if factor != 1.0:
         mesh = replace(mesh, vertices=mesh.vertices * factor)
     with keeping(findings):
-        more, facts = _check_surface(mesh, options, deadline)
+        whole = check_assembly(mesh, deadline, strict=options.strict) if kind == "glb" and options.cross else None
+        more, facts = _check_surface(mesh, options, deadline, whole)
     return findings + more, facts
 
 
@@ -179,9 +180,11 @@ def _bytes_of(path: Path, limits: Limits) -> bytes:
         raise F012.unreadable(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
 
 
-def _check_surface(mesh: Mesh, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
-    """Check the mesh of a file that has no instances."""
-    checked = check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
+def _check_surface(
+    mesh: Mesh, options: Options, deadline: Deadline, checked: CheckedMesh | None = None
+) -> tuple[list[Finding], Facts]:
+    """Check the mesh of a file that has no instances; `checked`: its surface, if that is done."""
+    checked = checked or check_surface(mesh, deadline, cross=options.cross, strict=options.strict)
     findings, facts = [*checked.findings, *s_scale.likely_unit(checked.facts, options.unit)], checked.facts
     if options.printer is not None and checked.inspection is not None:
         with keeping(findings, facts):
