@@ -19,7 +19,6 @@ from unitcad.export import printing, slicer
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.cup import SLOPE, ribs
-from unitcad.pipeline import write
 from unitcad.pipeline.plan import threemf_content
 from unitcad.pipeline.write import build, subject
 from unitcad.validation import load, templates
@@ -161,7 +160,7 @@ def test_print_times_are_written_once_a_piece(tmp_path):
     said: list[str] = []
 
     def run():
-        return write.slice_tools(spec, built.folder, built.manifest, said.append)
+        return slicer.slice_tools(spec, built.folder, built.manifest, said.append)
 
     assert run().startswith("prints in 0 h ")
     report = json.loads((built.folder / "slicer.json").read_text())

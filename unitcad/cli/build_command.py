@@ -39,10 +39,11 @@ from unitcad.pipeline import step_helper
 from unitcad.pipeline.make import Subject
 from unitcad.pipeline.manifest import NO_KERNEL, Manifest, PartRecord, row
 from unitcad.pipeline.subjects import Compound, load_subject
-from unitcad.pipeline.write import BENCH, PAGE, Built, check_slicing, hold_folder, slice_tools
+from unitcad.pipeline.write import BENCH, PAGE, Built, hold_folder
 from unitcad.pipeline.write import build as build_subject
 from unitcad.report import write_report
 from unitcad.report.read_results import check_casts
+from unitcad.rooms import load
 from unitcad.spec import Spec, assumed_lengths, length_text, read_toml
 from unitcad.spec.custom_code import files_named
 from unitcad.text import join_words, number
@@ -225,7 +226,7 @@ def _build_all(
     wanted = [load_subject(spec, changes, chosen) for spec in specs]
     given = [_given_paths(spec, changes) for spec in specs]
     for spec in wanted if slicing else ():
-        check_slicing(spec.unit, chosen)
+        load("unitcad.export.slicer:check_slicing")(spec.unit, chosen)
     results: list[Built] = []
     printing: list[str] = []
     for spec, known in zip(wanted, given, strict=True):
@@ -233,7 +234,9 @@ def _build_all(
             result = build_subject(spec.of, out, only=chosen, check=not no_check, say=say, given=known)
             if slicing:
                 say("slicing")
-                printing.append(slice_tools(spec.unit, result.folder, result.manifest, say))
+                with hold_folder(result.folder):
+                    sliced = load("unitcad.export.slicer:slice_tools")(spec.unit, result.folder, result.manifest, say)
+                printing.append(sliced)
             if paged or (result.folder / PAGE).is_file():
                 say("page")
                 with hold_folder(result.folder):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import shutil
@@ -17,16 +16,14 @@ from typing import Any
 
 from unitcad import cache, files
 from unitcad.cache import MemoryStore, MissingContent, Store, digest
-from unitcad.errors import Missing, Refusal, UnitcadError
-from unitcad.export import slicer
+from unitcad.errors import UnitcadError
 from unitcad.json_text import json_bytes
 from unitcad.pipeline.make import Product, Progress, Subject
 from unitcad.pipeline.manifest import UNCHECKED, Manifest, failed_codes
 from unitcad.pipeline.plan import check_outputs, code_version
 from unitcad.pipeline.subjects import subject
-from unitcad.spec import Spec, printer_of, read_toml
+from unitcad.spec import read_toml
 from unitcad.spec.raw import FORMATS, OUTPUTS, Format
-from unitcad.text import some
 
 LOCK = re.compile(r"\.[a-z0-9.-]+-[0-9a-f]{12}\.lock")
 PAGE = "report.html"
@@ -326,49 +323,3 @@ def _keep_others(old: Path, new: Path) -> None:
                 place.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(file, copy, follow_symlinks=False)
         below[:] = [name for name in below if not (place / name).is_file()]
-
-
-SLICED = "slicer.json"
-
-
-def check_slicing(spec: Spec, only: Sequence[str]) -> None:
-    """Raise UnitcadError, before the work, if nothing of a spec can be sliced."""
-    if slicer.program() is None:
-        raise Missing("--slice: PrusaSlicer is not installed, or not on the path (prusa-slicer)")
-    if "moulds" not in only:
-        raise Refusal("--only", ",".join(only), "has no moulds, which --slice is for", ",".join((*only, "moulds")))
-    if "stl" not in spec.output.formats:
-        raise Refusal("output.formats", list(spec.output.formats), "has no stl, which --slice reads")
-    printer = printer_of(spec)
-    if printer.technology.value != "fdm":
-        raise Refusal("moulds.printer", printer.name, "prints no filament: leave out --slice", "fdm-0.4")
-
-
-def slice_tools(spec: Spec, folder: Path, manifest: Manifest, say: Callable[[str], object]) -> str:
-    """Write the slicer.json of a built folder's tools and return a sentence with time and filament.
-
-    A file that the slicer refuses is named. It is no error, since another slicer may accept it.
-    """
-    tools = [
-        folder / part["files"]["stl"]["path"]
-        for part in manifest["parts"]
-        if part["role"] == "tool" and "stl" in part["files"] and part["files"]["stl"]["path"].startswith("moulds/")
-    ]
-    with hold_folder(folder):
-        try:
-            report = slicer.print_report(tools, printer_of(spec), _earlier(folder / SLICED), say)
-        except UnitcadError as error:
-            return f"not sliced: {error}"
-        files.write(folder / SLICED, (json.dumps(report, indent=2) + "\n").encode())
-    if repaired := [piece["file"] for piece in report["pieces"] if piece["repaired"]]:
-        return f"{report['slicer']} had to repair {some(repaired)}"
-    hours, minutes = divmod(round(report["print_s"] / 60), 60)
-    return f"prints in {hours} h {minutes:02d} min with {report['filament_cm3']:.1f} cm3 ({report['slicer']})"
-
-
-def _earlier(path: Path) -> dict[str, Any]:
-    try:
-        report = files.read_json(path, links=False)
-        return report if all({"file", "sha256"} <= piece.keys() for piece in report["pieces"]) else {}
-    except (UnitcadError, KeyError, TypeError, AttributeError):
-        return {}
