@@ -417,7 +417,7 @@ def pocket_procedure(
         # The sheet must not get thinner at one end by more than a dent.
         level(
             "Put the tray in its final place. Lay a level on the cores, which are as high as the wall, along the tray "
-            f"and across, and put paper under a corner until it shows none. {fall(moulds)} Leave the tray there until "
+            f"and across, and shim its corners with paper. {fall(moulds)} Leave the tray there until "
             "it is cured."
         ),
     )
