@@ -308,7 +308,7 @@ ONCE = frozenset(REQUIRED_TOOLS)
 
 
 def pocket_bill(
-    moulds: PatchMoulds, batch: Batch, steps: Iterable[BenchStep], units: Mapping[str, Procedure]
+    moulds: PatchMoulds, batch: Batch, steps: Sequence[BenchStep], units: Mapping[str, Procedure]
 ) -> tuple[Item, ...]:
     """Return the bill of units and sheet. `batch` and `steps`: of the sheet; `units` by their folder."""
     silicone, mix = batch.silicone, batch.mix

@@ -252,8 +252,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
 
 def level(text: str) -> BenchStep:
     """Say how level the mould must be, and how to see it."""
-    tool = "spirit level" if "spirit level" in text else "level"
-    return BenchStep("Level the bench", text, picture_path("level"), minutes=5.0, required_tools=(tool, "paper"))
+    return BenchStep("Level the bench", text, picture_path("level"), minutes=5.0, required_tools=("level", "paper"))
 
 
 def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
