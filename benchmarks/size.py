@@ -16,9 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "arrays", "lab", "search", "serve", "sweeps")
 LIMITS = {
-    "total": (535_100, 289, 66_300),
-    "core": (264_300, 156, 33_700),
-    "tests": (397_500, 0, 0),
+    "total": (535_500, 289, 66_400),
+    "core": (264_400, 156, 33_700),
+    "tests": (388_500, 0, 0),
 }
 """Tokens, files and lines, at most; 0: no limit. The core is the package without its rooms and without meshcheck."""
 MOST_FILES, LEAST_LINES, MOST_LINES = 45, 25, 900

@@ -67,12 +67,12 @@ def test_the_words_name_marks_faces_and_lengths_of_this_set(made: Procedure) -> 
     assert [float(re.findall(r"outermost ([0-9.]+) mm", text)[0]) for text in greased] == pytest.approx(
         [reach - inner, 1.2]
     )
-    assert all("the top and the end face" in text for text in greased)
+    assert all("top and end face" in text for text in greased)
     (bent,) = [step.text for step in made.preparation if step.title == "Filament in"]
     leg = unit.moulds.plate_mm + patch_moulds(load_array("forearm-patch")).dimensions.core_height + 2
     assert f"one leg {leg:.2g} mm long" in bent
     on = [step.text for pour in made.pours for step in pour.steps if step.title.endswith(" on")]
-    assert all("leave it in the middle" in text and "towards that corner" not in text for text in on)
+    assert all("in the middle of" in text and "towards that corner" not in text for text in on)
 
 
 def test_each_piece_of_a_long_tool_is_held_down() -> None:
@@ -88,7 +88,7 @@ def test_each_piece_of_a_long_tool_is_held_down() -> None:
     hold = next(step.text for step in made.pours[0].steps if step.title == "Hold cup 1 down")
     assert len(places) >= 2 * half / HELD
     assert f"run {len(places)} strips of tape from" in hold
-    (inner,) = re.findall(r"one at either end, the others ([^.;]*) mm from the left one[.] Each piece", hold)
+    (inner,) = re.findall(r"one at either end, the others ([^.;]*) mm from the left one[.] A strip", hold)
     assert [float(at) for at in re.findall(r"\d+", inner)] == pytest.approx(
         [at - places[0] for at in places[1:-1]], rel=0.05
     )
@@ -112,6 +112,6 @@ def test_agent_goes_into_the_last_cup_alone(made: Procedure) -> None:
     on = [next(step.text for step in pour.steps if step.title.endswith(" on")) for pour in made.pours]
     assert on[0].startswith("No release agent: what is cast here bonds later")
     assert "only on the sheet's bed and the bores of cup 2" in on[1]
-    assert "None in the slots for the fins, on the base and Layer 1." in on[1]
+    assert "None in the fins' slots, on the base and Layer 1." in on[1]
     assert "release agent" in {item.item for item in made.bill}
     assert not any(bond.face.tool == "cup2" for bond in made.bonds)

@@ -78,7 +78,7 @@ def test_a_picture_shows_the_state_that_its_words_speak_of(source: tuple[str, ..
         held = False
         for step in pour.steps:
             view = shown.get(step.picture)
-            held = (held or step.title.startswith("Hold")) and "tape or bands" not in step.text
+            held = (held or step.title.startswith("Hold")) and "Remove its" not in step.text
             if view is None:
                 continue
             colours = {extra.colour for extra in view.extras}

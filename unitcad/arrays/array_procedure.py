@@ -237,7 +237,7 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
 def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
     return BenchStep(
         f"Lid {step.index} off",
-        "Take off bands or clamp. Turn a screwdriver in the slit at either end, little by little, until "
+        "Remove its bands or clamp. Turn a screwdriver in the slit at either end, little by little, until "
         f"{spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents tear off. Trim them flush with a "
         "knife.",
         _picture(step, "lid-off"),
@@ -308,7 +308,7 @@ ONCE = frozenset(REQUIRED_TOOLS)
 
 
 def pocket_bill(
-    moulds: PatchMoulds, batch: Batch, steps: Iterable[BenchStep], units: Mapping[str, Procedure]
+    moulds: PatchMoulds, batch: Batch, steps: Sequence[BenchStep], units: Mapping[str, Procedure]
 ) -> tuple[Item, ...]:
     """Return the bill of units and sheet. `batch` and `steps`: of the sheet; `units` by their folder."""
     silicone, mix = batch.silicone, batch.mix
@@ -363,7 +363,7 @@ def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
                 yield replace(item, quantity=times * item.quantity, note=f"{folder}, {often}: {item.note}")
             elif item.item in inside:
                 yield replace(item, quantity=count * item.quantity / unit.cells)
-            elif item.made == "bought" and item.item not in ONCE:
+            elif item.made == "bought" and (item.item not in ONCE or item.unit == "strip"):
                 yield replace(item, quantity=times * item.quantity)
             else:
                 yield item
@@ -376,7 +376,7 @@ def _added(items: Iterable[Item]) -> list[Item]:
     """
     found: dict[tuple[str, str, str], Item] = {}
     for item in items:
-        once = item.item in ONCE or item.made == "tool"
+        once = (item.item in ONCE and item.unit != "strip") or item.made == "tool"
         key = item.item, item.unit, "" if item.unit == "g" or once else item.note
         there = found.get(key)
         if there is None:
@@ -417,8 +417,8 @@ def pocket_procedure(
         # The sheet must not get thinner at one end by more than a dent.
         level(
             "Put the tray in its final place. Lay a level on the cores, which are as high as the wall, along the tray "
-            f"and across, and shim the corners with paper until it reads level. {fall(moulds)} Leave the tray there "
-            "until it is cured."
+            f"and across, and shim its corners with paper. {fall(moulds)} Leave the tray there until "
+            "it is cured."
         ),
     )
     poured = (

@@ -35,7 +35,7 @@ class Item:
 
 
 def bill(
-    moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], after: Sequence[AfterPours] = ()
+    moulds: MouldSet, batches: Sequence[Batch], steps: Sequence[BenchStep], after: Sequence[AfterPours] = ()
 ) -> tuple[Item, ...]:
     """List pieces, silicone, motor, circuit or wires, tools and consumables.
 
@@ -148,7 +148,7 @@ def injecting(batches: Sequence[Batch]) -> Iterator[Item]:
 
 
 def list_consumables(
-    moulds: MouldSet, batches: Sequence[Batch], steps: Iterable[BenchStep], after: int = 0
+    moulds: MouldSet, batches: Sequence[Batch], steps: Sequence[BenchStep], after: int = 0
 ) -> Iterator[Item]:
     """List the items for pours and steps; `after`: mixes after the pours."""
     pours, cups = len(moulds.plan.steps), moulds.plan.of_kind("cup")
@@ -162,10 +162,11 @@ def list_consumables(
     injected = moulds.spec.moulds.pour == "injected"
     if cups and not injected:
         named.discard("adhesive tape")  # its strips are on the list
-    if "spirit level" in named:
-        named.discard("level")
     for tool in sorted(named, key=[*REQUIRED_TOOLS].index):
-        yield Item(tool, 1, *REQUIRED_TOOLS[tool])
+        unit, made, note = REQUIRED_TOOLS[tool]
+        if tool == "level" and any("spirit level" in step.text for step in steps):
+            note = "a spirit level of 0.5 mm/m"
+        yield Item(tool, 1, unit, made, note)
     if prop := tongue_prop(moulds):
         note = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm, {number(prop.thickness_mm, 3)} mm thick"
         yield Item("pad of stacked card", len(prop.pads), "piece", "cut", note)

@@ -143,8 +143,8 @@ def pour_steps(batch: Batch, views: Container[str]) -> Iterator[BenchStep]:
     if faces and plan.pins:
         earlier = f" and Layer {n - 1}" if n > 1 else ""
         agent = (
-            f"Release agent thinly and only on the sheet's bed and the bores of cup {n}, away from the base: a printed "
-            f"cup holds a thin sheet fast. None in the fins' slots, on the base{earlier}."
+            f"Release agent, if any, thinly and only on the sheet's bed and the bores of cup {n}, away from the base: "
+            f"a printed cup holds a thin sheet fast. None in the fins' slots, on the base{earlier}."
         )
     elif faces:
         where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)

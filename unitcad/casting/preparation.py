@@ -135,7 +135,7 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> Pri
     if altered:
         how.append(f"In the files {', and '.join(altered)}.")
     if plan.of_kind("cup"):
-        how.append(f"First time on this printer: print the fit coupon (unitcad coupon {lengths.printer}).")
+        how.append(f"New printer: print the fit coupon (unitcad coupon {lengths.printer}).")
     return Printing(
         sizes(moulds),
         moulds.source,
@@ -235,7 +235,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
             "Filament in",
             "Bend each filament by a right angle, warm from hot water, one leg "
             f"{number(dims.core_height - moulds.plate[0] + SPARE, 2)} mm long.{between} Push that leg up through the "
-            "core until the other lies in the plate's groove. Trim it flush with the core's top.",
+            "core until the other is in the plate's groove. Trim it flush with the core's top.",
             picture_path("filament"),
             minutes=3.0 * cells,
             required_tools=("sharp knife",),
@@ -252,8 +252,7 @@ def preparation(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[Ben
 
 def level(text: str) -> BenchStep:
     """Say how level the mould must be, and how to see it."""
-    tool = "spirit level" if "spirit level" in text else "level"
-    return BenchStep("Level the bench", text, picture_path("level"), minutes=5.0, required_tools=(tool, "paper"))
+    return BenchStep("Level the bench", text, picture_path("level"), minutes=5.0, required_tools=("level", "paper"))
 
 
 def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:

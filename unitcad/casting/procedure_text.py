@@ -105,7 +105,7 @@ def to_markdown(procedure: Procedure) -> str:
     total, bench = duration(procedure.earliest_finish_min), duration(procedure.bench_min)
     out = "units and sheet are out of their moulds" if made == "sheet" else f"{made} is out of the mould"
     lines.append(f"The {out} **{total}** after the print. You work {bench} of it at the bench (assumed).")
-    lines.append(f"If something goes wrong, see {TROUBLES}.\n")
+    lines.append(f"For faults see {TROUBLES}.\n")
     lines += [*_stretches(procedure.time_line), ""]
     if printing.sizes:
         section("0. Measure first", _measuring(procedure))
@@ -134,7 +134,7 @@ def _measuring(procedure: Procedure) -> Iterator[str]:
         for size in printing.sizes
     )
     differ = f"If calipers differ by more than {number(MEASURED_MM, 2)} mm"
-    yield f"\n{differ}, build again here with your figures."
+    yield f"\n{differ}, build again with your figures."
     sets = " ".join(f"--set {key}={number(size.value_mm, 3)}" for size in printing.sizes for key in size.keys)
     yield f"\n```sh\nunitcad build {printing.source} {sets}\n```"
 
@@ -172,7 +172,7 @@ def _stretches(line: Sequence[Phase]) -> Iterator[str]:
         bench += phase.bench_min
         if phase.wait_min or i == len(line):
             wait = f", then wait {duration(phase.wait_min)}" if phase.wait_min and i == len(line) else ""
-            yield f"- {duration(begins)} after the start: {', '.join(names)}; {duration(bench)} of work{wait}"
+            yield f"- at {duration(begins)}: {', '.join(names)} ({duration(bench)}){wait}"
             names, bench = [], 0.0
 
 
@@ -186,12 +186,12 @@ def _appendix(procedure: Procedure) -> Iterator[str]:
         yield f"- {spaced(o.piece)}, {o.edge}: {height} mm; whole layers move it by {by} mm"
     held = [f"{number(f.value, 3)} in pour {p.index}" for p in procedure.pours for f in p.figures if f.name == HELD]
     if held:
-        yield f"- {HELD}: {join_words(held)} (computed, adhesion unmeasured)"
+        yield f"- {HELD}: {join_words(held)} (computed)"
     # The height over all is among the measures.
     inside = [height for height in procedure.unit_heights if height.what != OVER_ALL]
     heights = (f"{h.what} {number(h.printed_mm, 3)} for {number(h.asked_mm, 3)}" for h in inside)
     if inside:
-        yield f"- heights as printed in whole layers, mm: {', '.join(heights)}"
+        yield f"- heights in whole layers, mm: {', '.join(heights)}"
     yield from ("", "All figures and their sources: casting.json.", "", "</details>")
 
 

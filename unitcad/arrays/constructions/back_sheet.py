@@ -703,7 +703,7 @@ def seal_places(array: Array, pour: int) -> str:
     length = max(fin.reach for fin in ridges) - dimensions(array.unit).radii[pour - 1]
     layer = "" if pour == 1 else f" or on Layer {pour - 1}"
     return (
-        "every fin, the ridge that runs out from a core: the faces of its outermost "
+        "every fin, the ridge that runs out from a core: sides, top and end face of its outermost "
         f"{number(length, 3)} mm, none nearer the core{layer}"
     )
 
