@@ -94,7 +94,7 @@ def test_two_shards_at_once(tmp_path):
 
 def test_shards_that_do_not_fit_together(tmp_path):
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
-    with pytest.raises(UnitcadError, match="there are no shards"):
+    with pytest.raises(UnitcadError, match="is required: folders of shards"):
         merge(out, [], BatchOptions())
     made(sweep, out, shard=Shard(1, 2))
     with pytest.raises(UnitcadError, match="1 of 2 shards is missing: 2/2; run it with"):

@@ -36,7 +36,8 @@ def test_a_batch_with_too_little_to_start_workers_ends_in_one_line(which, limit,
     assert "a bug" not in done.stderr
     assert "Traceback" not in done.stderr
     errors = sum(line.startswith("error: ") for line in done.stderr.splitlines())
-    if done.returncode and errors != 1:
+    # CPython itself aborts if it finds no memory for the MemoryError.
+    if done.returncode and errors != 1 and "Cannot recover from MemoryErrors" not in done.stderr:
         assert " failed" in done.stdout, (done.returncode, done.stdout, done.stderr)  # one worker started, one did not
     again = unitcad("batch", sweep, "-o", out, "-j", 2, "--cache", tmp_path / "cache", "--json")
     assert again.returncode == 0, again.stderr
