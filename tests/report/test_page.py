@@ -176,6 +176,17 @@ def test_what_is_no_result_is_refused(tmp_path):
         write_report(tmp_path)
 
 
+def test_a_step_s_picture_is_a_png_in_the_folder(tmp_path):
+    folder = tmp_path / "result"
+    folder.mkdir()
+    for name, content in {"a.png": read_results.PNG, "b.png": b"<script>"}.items():
+        (folder / name).write_bytes(content)
+    (tmp_path / "c.png").write_bytes(read_results.PNG)
+    (folder / "d.png").symlink_to(tmp_path / "c.png")
+    asked = ["a.png", "b.png", "../c.png", str(tmp_path / "c.png"), "d.png", "e.png", ""]
+    assert list(read_results.step_pictures(folder, asked)) == ["a.png"]
+
+
 def test_an_unreadable_spec_leaves_the_rest(built, tmp_path):
     shutil.copytree(built, tmp_path / "a")
     (tmp_path / "a" / "spec.toml").write_text("diameter_mm = ", "utf-8")
