@@ -66,7 +66,6 @@ def pip_install() -> list[str]:
 
 def install_command(extras: str) -> str:
     """Return the command that adds extras to this installation, from the folder or address that it came from."""
-
     try:
         source = json.loads(metadata.distribution("unitcad").read_text("direct_url.json") or "{}")
     except (metadata.PackageNotFoundError, ValueError):
@@ -165,7 +164,6 @@ class UnknownKey(Refusal):
 
 def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusal] = Refusal) -> Refusal:
     """Return a refusal, of class `kind`, of a name that is not in `known`, with the closest names that are."""
-
     known = sorted(known)
     folded = {name.lower(): name for name in known}
     close = [folded[name] for name in get_close_matches(value.lower(), folded, n=3, cutoff=0.6)]
@@ -178,7 +176,6 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
 
     The limit names the most similar keys first, and the command `lists`, which prints all, if it omits any.
     """
-
     table, _, key = field.rpartition(".")
     known = list(known)
     close = get_close_matches(key, known, n=len(known) or 1, cutoff=0.6)

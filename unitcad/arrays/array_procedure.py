@@ -303,8 +303,8 @@ def _bill(moulds: PatchMoulds, batches: Sequence[Batch], steps: Sequence[BenchSt
             yield item
 
 
-ONCE = frozenset(REQUIRED_TOOLS)
-"""Things of which one piece, dab or roll is enough for every casting."""
+ONCE = frozenset((name, unit) for name, (unit, _, _) in REQUIRED_TOOLS.items())
+"""Things, by name and unit, of which one piece, dab or roll is enough for every casting: a roll of tape, no strips."""
 
 
 def pocket_bill(
@@ -363,7 +363,7 @@ def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
                 yield replace(item, quantity=times * item.quantity, note=f"{folder}, {often}: {item.note}")
             elif item.item in inside:
                 yield replace(item, quantity=count * item.quantity / unit.cells)
-            elif item.made == "bought" and (item.item not in ONCE or item.unit == "strip"):
+            elif item.made == "bought" and (item.item, item.unit) not in ONCE:
                 yield replace(item, quantity=times * item.quantity)
             else:
                 yield item
@@ -376,7 +376,7 @@ def _added(items: Iterable[Item]) -> list[Item]:
     """
     found: dict[tuple[str, str, str], Item] = {}
     for item in items:
-        once = (item.item in ONCE and item.unit != "strip") or item.made == "tool"
+        once = (item.item, item.unit) in ONCE or item.made == "tool"
         key = item.item, item.unit, "" if item.unit == "g" or once else item.note
         there = found.get(key)
         if there is None:

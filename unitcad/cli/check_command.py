@@ -295,7 +295,6 @@ def check(
 
     Reads STL, 3MF, OBJ, PLY, OFF and GLB, and STEP if an extra with a B-rep kernel is installed.
     """
-
     if list_rules:
         sys.stdout.write("".join(f"{rule.code} {rule.severity}: {rule.title}\n" for rule in rules().values()))
         return
@@ -409,7 +408,6 @@ def _copy(given: str, formats: Sequence[str]) -> tuple[str, Path]:
 
 def _save(path: Path, text: str) -> None:
     """Write a report to a file, whole or not at all; its folder is made."""
-
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         files.write(path, text.encode("utf-8"))

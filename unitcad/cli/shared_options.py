@@ -56,13 +56,11 @@ def finite(value: float | None) -> float | None:
 
 def with_fit(sets: list[str] | None, fit: Path | None) -> list[str]:
     """Return the overrides of --set and --fit."""
-
     return [*(sets or ()), *([] if fit is None else [f"estimate.fit={json.dumps(str(fit))}"])]
 
 
 def overrides(sets: list[str] | None, formats: str | None) -> list[str]:
     """Return the overrides of --set and --formats. Raises Refusal for an unknown format."""
-
     names = names_in(formats)
     for name in names or ():
         if name not in FORMATS:
@@ -72,7 +70,6 @@ def overrides(sets: list[str] | None, formats: str | None) -> list[str]:
 
 def outputs(only: str | None) -> tuple[str, ...]:
     """Return the outputs of --only; default: all."""
-
     return OUTPUTS if only is None else tuple(name for name in names_in(only) if name)
 
 
@@ -92,7 +89,6 @@ def names_in(text: str | None) -> list[str]:
 
 def allow_code(wanted: bool, nothing_else: bool = False) -> None:
     """Let this process run the code inside a spec; with `nothing_else`, no design's code at all."""
-
     if wanted:
         custom_code.allow({custom_code.ANY})
     elif nothing_else:

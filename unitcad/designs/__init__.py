@@ -28,6 +28,7 @@ __all__ = [
     "default_design",
     "design_of",
     "dimensions",
+    "estimated_designs",
     "inserts",
     "layer_colour",
     "no_estimate",
@@ -73,10 +74,14 @@ def dimensions(spec: Spec) -> Dimensions:
     return design_of(spec).dimensions(spec)
 
 
+def estimated_designs() -> dict[str, Design]:
+    """Return the shipped designs that have an estimate by name."""
+    return {name: design for name, design in shipped().items() if design.passes}
+
+
 def no_estimate() -> str:
     """Write why a design that states no `passes` has no estimate."""
-    known = " and ".join(name for name, design in shipped().items() if design.passes)
-    return f"the models describe {known} units only"
+    return f"the models describe {' and '.join(estimated_designs())} units only"
 
 
 def default_design() -> Design:

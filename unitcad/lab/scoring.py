@@ -21,7 +21,7 @@ from unitcad.attenuation.inputs import EstimateInput
 from unitcad.catalogue import figures, measurements
 from unitcad.cli.output import console, print_json, progress
 from unitcad.cli.shared_options import AsJson
-from unitcad.designs import shipped as designs
+from unitcad.designs import estimated_designs
 from unitcad.errors import Refusal, unknown_name
 from unitcad.estimate_inputs import estimate_input
 from unitcad.files import read_text
@@ -109,7 +109,7 @@ def _point(row: Mapping[str, str | None]) -> Point:
 def _layers(field: str, unit: str) -> tuple[str, list[str]]:
     """Return design and silicones of a name like DESIGN E10/D30."""
     design, _, pair = unit.partition(" ")
-    known = (CONTROL, *(name for name, one in designs().items() if one.passes))
+    known = (CONTROL, *estimated_designs())
     if design not in known:
         raise unknown_name(field, design, known)
     short = measurements().names
@@ -129,10 +129,10 @@ def variants_of(unit: str) -> list[EstimateInput]:
     design, layers = _layers("unit", unit)
     shared = measurements().unit
     wall = 2 * shared.wall_mm / len(layers)
-    chosen = [name for name, one in designs().items() if one.passes and design in (CONTROL, name)]
+    chosen = [name for name in estimated_designs() if design in (CONTROL, name)]
     made = []
     for name in chosen:
-        cap = {"cap_mm": wall} if designs()[name].caps else {}
+        cap = {"cap_mm": wall} if estimated_designs()[name].caps else {}
         table = [{"material": material, "wall_mm": wall, **cap} for material in layers]
         data = {"name": unit, "design": name, "diameter_mm": shared.diameter_mm, "fpcb": {}, "layers": table}
         made.append(estimate_input(from_data(data)))
