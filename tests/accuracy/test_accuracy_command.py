@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from functools import cache, partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,6 +19,7 @@ from unitcad.accuracy.measurements import (
     REFERENCE,
     RTOLS,
     compare,
+    interleaved,
     mesh_rows,
     respond,
     response_rows,
@@ -137,7 +139,8 @@ def test_the_specs_own_tolerance_is_among_the_five() -> None:
     assert tolerances_of(0.0005) == (0.1, 0.03, 0.01, 0.003, 0.0005)
 
 
-def test_a_request_leaves_out_what_it_does_not_ask_for() -> None:
+def test_a_request_leaves_out_what_it_does_not_ask_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("unitcad.accuracy.measurements.interleaved", partial(interleaved, warm=False))
     spec = load("single-embedded", ["output.formats=['stl']"])
     rows = {row["request"]: row for row in skipped_rows(Subject(spec))}
     left = {name: {one["output"] for one in row["skipped"]} for name, row in rows.items()}
@@ -149,7 +152,9 @@ def test_a_request_leaves_out_what_it_does_not_ask_for() -> None:
 
 def test_an_array_is_measured_as_it_is_cast(monkeypatch: pytest.MonkeyPatch) -> None:
     pair = ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3, 10]"]
-    monkeypatch.setattr("unitcad.accuracy.accuracy_command.skipped_rows", lambda subject: [])
+    for part in ("response_rows", "skipped_rows", "amplifications"):  # as of the unit alone
+        monkeypatch.setattr(f"unitcad.accuracy.accuracy_command.{part}", lambda *_: [])
+    monkeypatch.setattr("unitcad.accuracy.accuracy_command.mesh_rows", partial(mesh_rows, repeats=1))
     sets = [word for change in pair for word in ("--set", change)]
     done = CliRunner().invoke(app, ["accuracy", "forearm-pockets", *sets, "--json"])
     assert done.exit_code == 0, done.stderr
@@ -212,19 +217,23 @@ def test_options_of_the_survey_are_refused_for_a_spec(words: list[str], field: s
     assert done.exception.field == field
 
 
-@pytest.mark.parametrize("form", [[], ["--json"]], ids=["text", "json"])
-def test_the_command_shows_every_part(form: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_shows_every_part(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh_row = {"tolerance_mm": 0.1, "distance_mm": None, "triangles": 12, "within_bounds": False}
-    monkeypatch.setattr("unitcad.accuracy.accuracy_command.mesh_rows", lambda *_: [mesh_row])
-    monkeypatch.setattr("unitcad.accuracy.accuracy_command.skipped_rows", lambda spec: [])
-    done = CliRunner().invoke(app, ["accuracy", "single-embedded", *form])
-    assert done.exit_code == 1, done.stderr
-    assert "an error exceeds its bound" in done.stderr
-    if form:
-        assert list(json.loads(done.stdout)) == [
-            "spec", "meshes", "response", "extremes", "amplification", "skipped"
-        ]  # fmt: skip
-    else:
-        for part in ("meshes of unit", "Response of the skin", "Stiff or extreme", "motion of the skin", "Time saved"):
-            assert part in done.stdout
-        assert len(done.stdout.splitlines()) < 60
+    rows = cache(partial(response_rows, repeats=1))
+    found = cache(lambda: amplifications(SPEC, VARIANT))
+    patched = {
+        "mesh_rows": lambda *_: [mesh_row],
+        "response_rows": lambda _: rows(VARIANT),
+        "amplifications": lambda *_: found(),
+        "skipped_rows": lambda _: [],
+    }
+    for part, made in patched.items():
+        monkeypatch.setattr(f"unitcad.accuracy.accuracy_command.{part}", made)
+    text, data = (CliRunner().invoke(app, ["accuracy", "encapsulating", *form]) for form in ([], ["--json"]))
+    for done in (text, data):
+        assert done.exit_code == 1, done.stderr
+        assert "an error exceeds its bound" in done.stderr
+    assert list(json.loads(data.stdout)) == ["spec", "meshes", "response", "extremes", "amplification", "skipped"]
+    for part in ("meshes of unit", "Response of the skin", "Stiff or extreme", "motion of the skin", "Time saved"):
+        assert part in text.stdout
+    assert len(text.stdout.splitlines()) < 60
