@@ -99,7 +99,7 @@ def test_a_batch_that_has_gone_is_told(tmp_path):
     batch = tmp_path / "batch"
     batch.mkdir()
     (batch / "sweep.toml").write_text('base = "embedded"\n[sweep]\nmode = "product"\ndiameter_mm = [13]\n')
-    command = ["batch", str(batch / "sweep.toml"), "-o", str(tmp_path / "results"), "--report"]
+    command = ["batch", str(batch / "sweep.toml"), "-o", str(tmp_path / "results"), "--only", "estimate", "--report"]
     subprocess.run([sys.executable, "-P", "-m", "unitcad", *command], check=True, capture_output=True)
     with serving(tmp_path, "results") as one:
         os.rename(tmp_path / "results", tmp_path / "gone")
