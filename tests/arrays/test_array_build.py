@@ -19,6 +19,7 @@ from tests.report.test_glb import chunks
 from unitcad.arrays.array_file import array_hash, load_array
 from unitcad.arrays.array_page import patch_glb
 from unitcad.arrays.array_procedure import pocket_procedure
+from unitcad.arrays.arrayed import Arrayed
 from unitcad.arrays.patch import patch_bodies, patch_moulds, patch_parts
 from unitcad.cache import MemoryStore
 from unitcad.casting.procedure import procedure
@@ -27,6 +28,7 @@ from unitcad.casting.views import picture_path, views
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.make import Progress
 from unitcad.pipeline.write import build as build_array
 from unitcad.report.bench_page import write_bench
 from unitcad.serve.answers import answered
@@ -157,6 +159,15 @@ def test_the_same_input_gives_the_same_bytes_from_its_own_file(folder: Path, tmp
     again = build_array(load_array(folder / "array.toml"), tmp_path)
     assert again.folder.name == folder.name
     assert _contents(again.folder) == _contents(folder)
+
+
+def test_arrays_that_differ_only_in_their_places_share_no_moulds_in_a_store() -> None:
+    store, trays = MemoryStore(), []
+    for pitch in (20, 22):
+        array = load_array("forearm-pockets", [*SMALL, f"layout.pitch_mm={pitch}"])
+        (base, *_) = Arrayed(array).make(("moulds",), False, store, Progress()).manifest["parts"]
+        trays.append(base["bbox_mm"][3] - base["bbox_mm"][0])
+    assert trays[1] - trays[0] == pytest.approx(2)
 
 
 def test_the_hash_follows_the_array_and_not_its_name() -> None:
