@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 
 import unitcad
@@ -128,12 +129,12 @@ def test_corners_that_meet_are_drawn(columns: int, rows: int) -> None:
 
 def test_tails_keep_clear_of_units_and_each_other() -> None:
     array = load_array("forearm-pockets")
-    drawn = [t for i, p in enumerate(array.places) for t in tails(p.unit, p.x, p.y, p.angle_deg, i)]
-    for tail in drawn:
-        steps = [(tail.x0 + s / 200 * (tail.x1 - tail.x0), tail.y0 + s / 200 * (tail.y1 - tail.y0)) for s in range(201)]
+    drawn = [(i, tail) for i, p in enumerate(array.places) for tail in tails(p, p.angle_deg)]
+    for owner, tail in drawn:
+        steps = np.linspace(tail.start, tail.end, 201)
         for i, place in enumerate(array.places):
-            if i != tail.owner:
-                assert min(math.dist(step, (place.x, place.y)) for step in steps) > place.radius + tail.half
+            if i != owner:
+                assert np.hypot(*(steps - (place.x, place.y)).T).min() > place.radius + tail.half
 
 
 def test_a_place_may_hold_another_unit_in_pockets() -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from tests.arrays.made_arrays import made
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.array_page import FINEST, bend_points, picture_names
+from unitcad.arrays.array_page import FINEST, bend_points, pictures
 from unitcad.arrays.array_page import bent as bent_mesh
-from unitcad.arrays.crosstalk import pairs
+from unitcad.arrays.crosstalk import distances
 from unitcad.arrays.patch import patch_moulds
 from unitcad.arrays.sheet import bending
 from unitcad.kernels.mesh import realise
@@ -31,7 +31,7 @@ def test_the_middle_of_the_sheet_keeps_its_length() -> None:
     x0, _, x1, _ = array.sheet.outline
     assert bent.ends == pytest.approx(bent.closed - (x1 - x0))
     # The skin under it has the shorter arc.
-    assert pairs(array).centre[0, 1] == pytest.approx(2 * math.pi * 40 / 8, abs=2e-3)
+    assert distances(array)[0][0, 1] == pytest.approx(2 * math.pi * 40 / 8, abs=2e-3)
 
 
 @pytest.mark.parametrize("template", ["sleeve-curved", "wrist-band"])
@@ -77,8 +77,8 @@ def test_the_bent_sheet_has_the_flat_ones_volume() -> None:
     ends = bend_points(np.array([[x0, 0, middle], [x1, 0, middle]]), 40, bent.middle_radius)
     chord = 2 * bent.middle_radius * math.sin(bent.ends / 2 / bent.middle_radius)
     assert math.dist(*ends) == pytest.approx(chord, rel=1e-6)
-    assert "pictures/patch-bent.png" in picture_names(moulds)
-    assert "pictures/patch-bent.png" not in picture_names(made("forearm-patch"))
+    assert "pictures/patch-bent.png" in pictures(moulds)
+    assert "pictures/patch-bent.png" not in pictures(made("forearm-patch"))
 
 
 def test_a_bent_sheet_stretches_and_c310_compares_it() -> None:

@@ -17,8 +17,8 @@ from unitcad.arrays.crosstalk import (
     crosstalk,
     crosstalk_csv,
     crosstalk_lines,
+    distances,
     heat_map_svg,
-    pairs,
     patch_map_svg,
 )
 from unitcad.attenuation import UniformDisc
@@ -137,7 +137,7 @@ def test_absolute_values_are_only_a_range() -> None:
 def test_round_a_limb_distances_are_arcs_and_the_ends_of_a_ring_are_neighbours() -> None:
     ring = array({"kind": "ring", "count": 8}, limb={"radius_mm": 40.0})
     arc = 2 * math.pi * 40 / 8
-    found = pairs(ring).centre
+    found = distances(ring)[0]
     assert found[0, 7] == pytest.approx(arc, abs=2e-3)
     assert found[0, 4] == pytest.approx(4 * arc, abs=2e-3)
     assert found.max() <= math.pi * 40 + 1e-3
@@ -206,7 +206,6 @@ def test_the_heat_map_shows_every_pair_and_the_map_every_unit() -> None:
     drawn = ElementTree.fromstring(patch)
     assert len(list(drawn.iter("{http://www.w3.org/2000/svg}circle"))) == 9
     assert "<title>circuit</title>" in patch
-    assert "A1" in patch_map_svg(NINE)
 
 
 def test_eight_units_round_a_limb_get_alike_and_the_middle_of_a_grid_gets_the_most() -> None:

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from unitcad.arrays.array_file import load_array
-from unitcad.arrays.circuit import circuit_files, has_circuit, outline
+from unitcad.arrays.circuit import circuit_files, has_circuit
 from unitcad.arrays.crosstalk import crosstalk, crosstalk_files, crosstalk_lines, extras, ratios
 from unitcad.cli import app
 from unitcad.errors import Refusal
@@ -95,11 +95,11 @@ def test_the_files_of_crosstalk_and_circuit() -> None:
         "crosstalk-edge.svg",
         "crosstalk-patch.svg",
     }
-    joined = load_array("forearm-patch")
+    joined = load_array("forearm-patch", ["output.formats=[]"])
     made, why = circuit_files(joined)
     assert set(made) == {"circuit.dxf", "circuit.svg", "circuit.kicad_pcb", "circuit-pads.csv"}
     assert why == {}
-    assert b"<title>circuit</title>" in crosstalk_files(joined, outline(joined))["crosstalk-patch.svg"]
+    assert b"<title>circuit</title>" in crosstalk_files(joined)["crosstalk-patch.svg"]
 
 
 def test_without_ezdxf_the_other_files_are_made_and_the_dxf_says_why(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,8 @@ import json
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
 from unitcad.arrays.layouts.ring import RingTable
 from unitcad.arrays.offers import suggest_for_array
 from unitcad.arrays.sheet import middle_radius, sheet_of
-from unitcad.arrays.tails import Blocked, angles
+from unitcad.arrays.tails import Blocked, angles, length_field, tail_length
 from unitcad.designs.limits import up
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
@@ -324,18 +325,20 @@ def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
         apart = max(unit.diameter_mm + way.apart(unit)[0] for unit in units)
         _check_closes(asked, table, sheet, middle, apart)
     _check_apart(way, points, units, kind, table, middle)
+    given = {n: asked.place[i].angle_deg for n, i in places.items() if asked.place[i].angle_deg is not None}
+    placed = [
+        Placed(name=p.name, x=p.x, y=p.y, angle_deg=float(given.get(n) or 0.0), unit=units[n])
+        for n, p in enumerate(points)
+    ]
+    if way.own_tails and lay_tails:
+        placed = _turned(asked, placed, given, places, sheet)
     return Array(
         name=asked.name,
         construction=asked.array,
         cast=asked.limb.cast,
         radius_mm=asked.limb.radius_mm,
         layout=dict(asked.layout),
-        places=tuple(
-            Placed(name=p.name, x=p.x, y=p.y, angle_deg=angle, unit=each)
-            for p, each, angle in zip(
-                points, units, _angles(asked, way, points, units, places, sheet, lay_tails), strict=True
-            )
-        ),
+        places=tuple(placed),
         sheet=sheet,
         circuit=asked.circuit,
         asked=_settled(data, unit, asked, units, places),
@@ -473,34 +476,25 @@ def _check_apart(
         raise Refusal(refusal.field, refusal.value, f"{refusal.limit}: {worst[4]}", refusal.nearest)
 
 
-def _angles(
-    asked: AskedArray,
-    way: Construction,
-    points: list[Point],
-    units: list[Spec],
-    places: dict[int, int],
-    sheet: Sheet,
-    lay_tails: bool,
-) -> list[float]:
-    """Return the units' angles, degrees. Raises Refusal for a tail that finds no way."""
-    given = {n: asked.place[i].angle_deg for n, i in places.items() if asked.place[i].angle_deg is not None}
-    wanted = {n: float(angle or 0.0) for n, angle in given.items()}
-    if not (way.own_tails and lay_tails):
-        return [wanted.get(n, 0.0) for n in range(len(points))]
+def _turned(
+    asked: AskedArray, placed: list[Placed], given: Collection[int], places: dict[int, int], sheet: Sheet
+) -> list[Placed]:
+    """Return the places, each turned so that its tail finds a way. Raises Refusal for one that finds none."""
     try:
-        return angles(points, units, wanted, sheet)
+        found = angles(placed, given, sheet)
     except Blocked as blocked:
-        n, unit = blocked.owner, units[blocked.owner]
-        name, i = points[n].name, places.get(blocked.owner)
+        place, i = placed[blocked.owner], places.get(blocked.owner)
+        if blocked.owner in given:
+            limit = (
+                f"at this angle the tail of {place.name} runs into {blocked.by}; it may be {blocked.longest:g} mm long"
+            )
+            raise Refusal(f"place.{i}.angle_deg", place.angle_deg, limit, blocked.turned) from None
         at_unit = f"place.{i}.unit" if i is not None and asked.place[i].unit is not None else "unit"
-        table = "fpcb.tail_length_mm" if unit.fpcb else "wires.length_mm"
-        length = unit.fpcb.tail_length_mm if unit.fpcb else unit.wires.length_mm if unit.wires else 0.0
-        if n in wanted:
-            limit = f"at this angle the tail of {name} runs into {blocked.by}; it may be {blocked.longest:g} mm long"
-            raise Refusal(f"place.{i}.angle_deg", wanted[n], limit, blocked.turned) from None
-        limit = f"the tail of {name} finds no straight way between the units; it may be at most"
+        limit = f"the tail of {place.name} finds no straight way between the units; it may be at most"
         nearest = blocked.longest if blocked.longest >= 0.1 else None
-        raise Refusal(f"{at_unit}.{table}", length, f"{limit} {blocked.longest:g} mm", nearest) from None
+        field, length = f"{at_unit}.{length_field(place.unit)}", tail_length(place.unit)
+        raise Refusal(field, length, f"{limit} {blocked.longest:g} mm", nearest) from None
+    return [replace(place, angle_deg=angle) for place, angle in zip(placed, found, strict=True)]
 
 
 def _settled(

@@ -23,7 +23,7 @@ from unitcad.arrays.array import Array, Placed
 from unitcad.arrays.array_tables import CircuitTable
 from unitcad.arrays.constructions import construction_of
 from unitcad.arrays.sheet import LENGTH, at_place
-from unitcad.arrays.tails import CLEAR
+from unitcad.arrays.tails import CLEAR, Strip
 from unitcad.designs import CIRCUIT_COLOUR, dimensions
 from unitcad.designs.limits import up
 from unitcad.errors import Missing, Refusal, missing_extra
@@ -40,15 +40,6 @@ LEAST_BEND = 10.0
 _EPS = 1e-6
 Line = tuple[float, tuple[float, ...]]
 """A row: its place across, and its units along it."""
-
-
-@dataclass(frozen=True)
-class Strip:
-    """A straight strip between two points of its middle line, with square ends; `half` of its width."""
-
-    start: Point
-    end: Point
-    half: float
 
 
 @dataclass(frozen=True)
@@ -631,7 +622,7 @@ def _mm(value: float) -> str:
     return f"{round(value, 4) + 0.0:.4f}".rstrip("0").rstrip(".")
 
 
-DXF = "circuit.dxf"
+DXF, STEP = "circuit.dxf", "circuit.step"
 
 
 def has_circuit(array: Array) -> bool:
@@ -640,7 +631,7 @@ def has_circuit(array: Array) -> bool:
 
 
 def circuit_files(array: Array) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Return the files by their names, and the reason for a missing one: DXF needs ezdxf.
+    """Return the files by their names, and the reason for a missing one: DXF needs ezdxf, STEP a kernel.
 
     Raises Refusal as `outline`.
     """
@@ -653,7 +644,16 @@ def circuit_files(array: Array) -> tuple[dict[str, bytes], dict[str, str]]:
         "circuit.kicad_pcb": kicad_board(laid, drawn),
         "circuit-pads.csv": pad_table(array, laid),
     }
+    lacking: dict[str, str] = {}
     try:
-        return {**files, DXF: circuit_dxf(laid, drawn)}, {}
+        files[DXF] = circuit_dxf(laid, drawn)
     except Missing as missing:
-        return files, {DXF: str(missing)}
+        lacking[DXF] = str(missing)
+    if "step" in array.unit.output.formats:
+        try:
+            from unitcad.export.step import content
+
+            files[STEP] = content([circuit_body(array)], "circuit")
+        except Missing as missing:
+            lacking[STEP] = str(missing)
+    return files, lacking
