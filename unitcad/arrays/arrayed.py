@@ -33,7 +33,7 @@ from unitcad.arrays.array_file import (
 )
 from unitcad.arrays.array_page import ARRAY_FILE, ArrayManifest, patch_glb, pictures, write_array_page
 from unitcad.arrays.array_procedure import array_procedure
-from unitcad.arrays.circuit import crowded_tracks, has_circuit
+from unitcad.arrays.circuit import crowded_tracks
 from unitcad.arrays.crosstalk import extras
 from unitcad.arrays.estimate_arrays import array_summary, estimate_arrays
 from unitcad.arrays.offers import suggest_for_array
@@ -191,7 +191,7 @@ class Arrayed(Compound):
         own |= more
         warned = [
             *covered_tails_warning(array),
-            *(crowded_tracks(array) if has_circuit(array) else []),
+            *crowded_tracks(array),
             *shallow_grooves(moulds),
             *play_missing(moulds),
             *(pour_warnings([asdict(pour) for pour in made.pours]) if made else []),

@@ -229,7 +229,7 @@ def _sums(matrix: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _quantity(every: np.ndarray) -> dict[str, float]:
-    """Return a value with its range, of `Told.of` at the nominal tissue and at the ends, a row each."""
+    """Return a value with its range, of `Decays.answer` at the nominal tissue and at the ends, a row each."""
     ends = {"value": every[0, 0], "low": every[:, 1].min(), "high": every[:, 2].max()}
     return {key: round(float(one), DIGITS) for key, one in ends.items()}
 
