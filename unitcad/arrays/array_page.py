@@ -16,7 +16,6 @@ from manifold3d import Manifold
 from unitcad import files
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_of
-from unitcad.arrays.crosstalk import crosstalk_lines
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds, PatchPart, patch_bodies, patch_moulds, patch_parts
 from unitcad.casting.steps import duration
@@ -160,7 +159,7 @@ def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
 
 def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) -> str:
     shown = _Shown(folder, warn)
-    array, model = manifest["array"], _model(folder, warn)
+    array, model, drawn = manifest["array"], _model(folder, warn), [Path(path).name for path in manifest["pictures"]]
     parts = [
         '<div class="top"><div>',
         f"<h1>{escape(manifest['name'])}</h1>",
@@ -171,7 +170,7 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         *_section("Warnings", [f"<p>{escape(line)}</p>" for line in manifest["warnings"]]),
         *_section("Patch", [*(shown.of(f"pictures/patch-{side}.png") for side in SIDES), _worn(array)]),
         *_section("Crosstalk", [_answer(shown.json("crosstalk.json")), *(shown.of(name) for name in CROSSTALK)]),
-        *_section("Tools", [shown.of(f"pictures/{name}") for name in ("tools.png", *_pours(manifest))]),
+        *_section("Tools", [shown.of(f"pictures/{name}") for name in drawn if not name.startswith("patch-")]),
         *_section("Circuit", [shown.of(CIRCUIT)]),
         *_section("Casting", list(_casting(folder, shown.json("casting.json")))),
         *_section("Units", [_units(folder, manifest)]),
@@ -273,17 +272,11 @@ def _section(title: str, content: Iterable[str]) -> Iterator[str]:
 
 
 def _answer(crosstalk: Mapping[str, Any]) -> str:
-    if not crosstalk:
+    lines = crosstalk.get("answer")
+    if not lines or not isinstance(lines, list):  # none, or another program's file
         return ""
-    try:
-        first, *others = crosstalk_lines(dict(crosstalk))
-    except (KeyError, TypeError, ValueError, IndexError):  # another program's file
-        return ""
-    return f'<p class="lead">{escape(first)}</p>' + "".join(f"<p>{escape(line)}</p>" for line in others)
-
-
-def _pours(manifest: ArrayManifest) -> list[str]:
-    return [Path(path).name for path in manifest["pictures"] if Path(path).name.startswith("pour")]
+    first, *others = (escape(str(line)) for line in lines)
+    return f'<p class="lead">{first}</p>' + "".join(f"<p>{line}</p>" for line in others)
 
 
 def _casting(folder: Path, casting: Mapping[str, Any]) -> Iterator[str]:

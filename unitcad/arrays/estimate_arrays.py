@@ -15,7 +15,7 @@ from rich.text import Text
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.constructions import construction_of
-from unitcad.arrays.crosstalk import BAND_HZ, CROSSTALK, DRIVES, crosstalk, crosstalk_lines, ratio_line, ratios
+from unitcad.arrays.crosstalk import BAND_HZ, CROSSTALK, DRIVES, crosstalk, ratio_line, ratios
 from unitcad.casting.steps import casting_summary
 from unitcad.cli.build_command import assumed_line, to_open
 from unitcad.cli.output import console, print_json, progress
@@ -46,7 +46,7 @@ def array_summary(array: Array, folder: Path, manifest: Manifest, given: Contain
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
     crosstalk = folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
-        yield from crosstalk_lines(json.loads(crosstalk.read_bytes()))[:2]
+        yield from json.loads(crosstalk.read_bytes())["answer"][:2]
     yield from to_open(folder)
 
 

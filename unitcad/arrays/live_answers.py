@@ -16,7 +16,7 @@ from unitcad.arrays.array_page import patch_model, tools_model
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.array_tables import AskedArray, CircuitTable, LimbTable, SheetTable
 from unitcad.arrays.arrayed import unit_folders
-from unitcad.arrays.crosstalk import crosstalk, crosstalk_lines, heat_map_svg, patch_map_svg
+from unitcad.arrays.crosstalk import crosstalk, heat_map_svg, patch_map_svg
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import patch_moulds
 from unitcad.casting.procedure import Procedure
@@ -174,7 +174,7 @@ def _cast(unit: str) -> Procedure:
 
 def _crosstalk(array: Array, answer: Answer) -> None:
     data = crosstalk(array)
-    answer.lines = crosstalk_lines(data)
+    answer.lines = data["answer"]
     answer.drawings = [
         ("Vibration at each unit from all others, on the patch", patch_map_svg(array, data)),
         ("Crosstalk from each unit (row) to each other one (column)", heat_map_svg(data)),
