@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
+from scipy.ndimage import binary_dilation
 from scipy.signal import oaconvolve
 from scipy.stats import t as student
 
@@ -396,12 +397,12 @@ MOST_RUNNING = 0.65
 ON = 0.5
 """Part of the envelope's largest value from which the motor runs."""
 SILENT = 0.2
-"""Part of it below which the envelope stays in the silence, once it has had FALL_S to fall; a beat falls slowly."""
+"""Part of it below which the envelope stays in the silence, once it has fallen; a beat falls slowly."""
 QUIET = 0.4
 """The same for the rest of the silence without mains: a line that has only changed its frequency is louder."""
 LOWEST_HZ = 20.0
-FALL_S = 0.75 * WINDOW_S
-"""How long the envelope of a line that ends takes to fall, with a margin."""
+FALL = 6
+"""Points of the envelope, 8 a window, over which that of a line that ends falls, with a margin."""
 LEAST_SILENT = 0.2
 """Part of a record that is silent at least."""
 LOUDEST, BEYOND_LOUDEST = 0.92, 1.5
@@ -426,24 +427,23 @@ def running_part(x: Floats, good: Bools, rate: float, band: tuple[float, float],
     on = size >= ON * size.max()
     if on.mean() > MOST_RUNNING:
         return None
-    near = np.zeros(len(on), bool)
-    for first, last in _runs(on):
-        near |= (time >= time[first] - FALL_S) & (time <= time[last] + FALL_S)
-    if (~near).mean() < LEAST_SILENT or size[~near].max() > SILENT * size.max():
+    quiet = np.logical_not(binary_dilation(on, iterations=FALL))
+    if quiet.mean() < LEAST_SILENT or size[quiet].max() > SILENT * size.max():
         return None
-    first, last = max(_runs(~near), key=lambda run: run[1] - run[0])
+    first, last = _longest(quiet)
     silence = x[int(time[first] * rate) : int(time[last] * rate) + 1]
     if _loudest(silence, rate, band, mains_hz) > QUIET * size.max():
         return None
-    first, last = max(_runs(on), key=lambda run: run[1] - run[0])
+    first, last = _longest(on)
     start = 0 if first == 0 else int(time[first] * rate)
     return slice(start, None if last == len(on) - 1 else int(time[last] * rate) + 1)
 
 
-def _runs(on: Bools) -> list[tuple[int, int]]:
-    """Return the first and the last index of each run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
-    return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
+def _longest(on: Bools) -> tuple[int, int]:
+    """Return the first and the last index of the longest run of true values."""
+    runs = np.flatnonzero(np.diff(on.astype(int), prepend=0, append=0)).reshape(-1, 2)
+    first, end = runs[np.argmax(runs[:, 1] - runs[:, 0])]
+    return int(first), int(end) - 1
 
 
 def _loudest(x: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> float:
@@ -451,8 +451,6 @@ def _loudest(x: Floats, rate: float, band: tuple[float, float], mains_hz: float)
 
     The mains and frequencies below LOWEST_HZ are excluded.
     """
-    if len(x) < 16:
-        return 0.0
     window = np.hanning(len(x) + 2)[1:-1]
     turned = np.abs(np.fft.rfft((x - x.mean()) * window))
     hertz = np.fft.rfftfreq(len(x), 1 / rate)
