@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.plan import build_key
 from unitcad.pipeline.subjects import subject
 from unitcad.sweeps import load_sweep
@@ -85,7 +86,7 @@ def test_shipped_sweeps_hold_what_they_say(name, count, geometries):
     sweep = load_sweep(name)
     assert sweep.count == count
     specs = [sweep.spec(i) for i in range(count)]
-    assert len({build_key(spec, ("unit", "moulds"), True) for spec in specs}) == geometries
+    assert len({build_key(MouldSet(spec), ("unit", "moulds"), True) for spec in specs}) == geometries
     assert set(shipped_files("sweeps")) == {"published", "thickness", "all-materials"}
 
 
