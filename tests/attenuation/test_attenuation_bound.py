@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered import FractionalKelvinVoigt, KelvinVoigt, LossFactor, Point, Response, UniformDisc
+from unitcad.attenuation.layered import FractionalKelvinVoigt, KelvinVoigt, LossFactor, Point, UniformDisc
 from unitcad.attenuation.layered.integral import Problem
 from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.validation import load
 
 
-def _random_case(seed: int):
+def _random_case(seed):
     """(medium, load, omega, radii, depth, rtol): 0 to 4 layers of mixed dampings, omega 0 to 3000, all drawn."""
     rng = np.random.default_rng(seed)
 
@@ -38,7 +38,7 @@ def _random_case(seed: int):
     return medium, load, omega, r, z, float(rng.choice([1e-2, 1e-3, 1e-4, 1e-6]))
 
 
-def _off(found: Response, truth: Response) -> float:
+def _off(found, truth):
     return float(max(np.max(np.abs(found.u_z - truth.u_z)), np.max(np.abs(found.u_r - truth.u_r))))
 
 

@@ -22,17 +22,17 @@ def damping_of(tan_delta, viscosity):
     return KelvinVoigt(viscosity) if viscosity else LossFactor(tan_delta) if tan_delta else None
 
 
-def medium_of(bodies) -> LayeredMedium:
+def medium_of(bodies):
     layers = [Layer(h, rho, e, nu, damping_of(*loss)) for h, rho, e, nu, *loss in bodies[:-1]]
     _, rho, e, nu, *loss = bodies[-1]
     return LayeredMedium(layers, HalfSpace(rho, e, nu, damping_of(*loss)))
 
 
-def relative_error(found, reference) -> float:
+def relative_error(found, reference):
     return float(np.linalg.norm(found - reference) / np.linalg.norm(reference))
 
 
-def case_error(case) -> float:
+def case_error(case):
     found = medium_of(case["bodies"]).compliance(case["k"], case["omega"])
     reference = np.array([complex(*pair) for pair in case["compliance"]]).reshape(2, 2)
     return relative_error(found, reference) / case["condition"]
@@ -45,7 +45,7 @@ def test_sixty_digits_everywhere():
     assert errors[worst] <= LIMIT, CASES[worst]
 
 
-def _live(bodies, k, omega) -> tuple[np.ndarray, float]:
+def _live(bodies, k, omega):
     with mp.workdps(60):
         bodies = [layered_mp.Body(*body) for body in bodies]
         found = layered_mp.compliance(bodies, k, omega)

@@ -17,7 +17,7 @@ MODELS = {  # thickness km, v_p km/s, v_s km/s, density g/cm3; frequencies Hz
 }
 
 
-def medium_of(rows) -> LayeredMedium:
+def medium_of(rows):
     def material(vp, vs, rho):
         nu = (vp**2 - 2 * vs**2) / (2 * (vp**2 - vs**2))
         return 1e3 * rho, 2 * 1e9 * rho * vs**2 * (1 + nu), nu

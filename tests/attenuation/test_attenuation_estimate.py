@@ -28,12 +28,12 @@ from unitcad.validation import load
 SOFT, MEDIUM, STIFF = "ecoflex-00-10", "dragon-skin-10-medium", "dragon-skin-30"
 
 
-def pair(design: str, inner: str, outer: str, *more: str):
+def pair(design, inner, outer, *more):
     return load(design, [f"layers.0.material={inner}", f"layers.1.material={outer}", *more])
 
 
 @pytest.fixture(scope="module")
-def encapsulating() -> dict:
+def encapsulating():
     return estimate_spec(load("encapsulating"))
 
 
@@ -388,7 +388,7 @@ def test_a_legal_extreme_prints_no_warning():
 
 
 @pytest.mark.parametrize("layers", [1, 2])
-def test_a_custom_design_has_no_estimate(layers: int) -> None:
+def test_a_custom_design_has_no_estimate(layers):
     from unitcad.validation import from_data, read
 
     own = {**read("embedded"), "design": "d.py:f", "design_source": "def f(spec): ..."}

@@ -5,7 +5,6 @@ import doctest
 import math
 import subprocess
 import sys
-from collections.abc import Callable
 from graphlib import TopologicalSorter
 from itertools import product
 from pathlib import Path
@@ -88,7 +87,7 @@ MEDIUM = attenuation.LayeredMedium([], BASE)
         (lambda: attenuation.UniformDisc(3e-3, "radial").transform(math.nan), "^k = 'nan': wavenumbers"),
     ],
 )
-def test_what_is_of_another_kind_is_refused_in_one_sentence(call: Callable[[], object], words: str):
+def test_what_is_of_another_kind_is_refused_in_one_sentence(call, words):
     with pytest.raises(Refusal, match=words):
         call()
 
@@ -126,7 +125,7 @@ def test_a_medium_is_shown_short():
 
 
 @pytest.mark.parametrize("room", ["attenuation", "accuracy"])
-def test_no_file_imports_one_that_imports_it(room: str):
+def test_no_file_imports_one_that_imports_it(room):
     """Lazy imports and those for types count too."""
     names = {
         ".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts): file
@@ -137,7 +136,7 @@ def test_no_file_imports_one_that_imports_it(room: str):
     assert len(list(TopologicalSorter(imports).static_order())) == len(names)
 
 
-def _imported(file: Path) -> set[str]:
+def _imported(file):
     found = set()
     for node in ast.walk(ast.parse(file.read_text("utf-8"))):
         if isinstance(node, ast.Import):

@@ -153,7 +153,7 @@ def test_the_table_is_the_catalogues():
     assert set(table.levels) == {level for one in tables for level in one.values()}
 
 
-def test_the_measured_designs_are_shipped_and_alone_have_passes() -> None:
+def test_the_measured_designs_are_shipped_and_alone_have_passes():
     assert {name: (design.passes, design.caps) for name, design in shipped().items() if design.passes} == {
         name: (measured.passes, measured.caps) for name, measured in measurements().designs.items()
     }

@@ -17,7 +17,7 @@ A, OMEGA = 3.5e-3, 2 * np.pi * 125
 RADII = np.geomspace(1e-4, 50e-3, 13)
 
 
-def forearm(damped: bool = True) -> LayeredMedium:
+def forearm(damped=True):
     def of(law):
         return law if damped else None
 
@@ -31,11 +31,11 @@ def forearm(damped: bool = True) -> LayeredMedium:
     )
 
 
-def largest(response) -> float:
+def largest(response):
     return float(max(np.max(np.abs(response.u_z)), np.max(np.abs(response.u_r))))
 
 
-def difference(one, other) -> float:
+def difference(one, other):
     return float(max(np.max(np.abs(one.u_z - other.u_z)), np.max(np.abs(one.u_r - other.u_r))))
 
 
@@ -120,7 +120,7 @@ def test_far_field_without_damping():
     assert max(case["r_over_a"] for case in data["cases"]) == 150
 
 
-def _closing(radius: float, step: int) -> tuple[float, float]:
+def _closing(radius, step):
     return radius * (1 - 4.0**-step), radius * (1 + 4.0**-step)
 
 

@@ -153,7 +153,7 @@ def test_without_scikit_fem_the_message_says_what_to_install():
     assert "fem" not in json.loads(plain.stdout)
 
 
-def test_the_change_over_frequency_is_as_the_page_on_what_to_measure_says() -> None:
+def test_the_change_over_frequency_is_as_the_page_on_what_to_measure_says():
     """how-to/what-to-measure.md: from 60 to 200 Hz, the middle 80 % of the draws, a flat motor in the closed unit."""
     unit = estimate_input(load("encapsulating"))
     ratios = []

@@ -22,7 +22,7 @@ def _kernel(k):
     return np.array([1.0 / (k + 300.0), np.exp(-1e-3 * k) * (1.0 + 0.2j)])
 
 
-def _exact(seen: Seen, low: float, high: float) -> np.ndarray:
+def _exact(seen, low, high):
     """The integral by 60,000 midpoints, extrapolated by Richardson from 20,000."""
     sums = []
     for count in (20_000, 60_000):

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.layered import Load, LossFactor, Point, UniformDisc
+from unitcad.attenuation.layered import LossFactor, Point, UniformDisc
 from unitcad.attenuation.layered.loads import disc_integrals
 
 
-def _order(order: int, s: mp.mpf) -> mp.mpf:
+def _order(order, s):
     """Integral of J1(k) J_order(ks) / k."""
     if order == 0:
         return mp.hyp2f1(0.5, -0.5, 1, s * s) if s <= 1 else mp.hyp2f1(0.5, 0.5, 2, s**-2) / (2 * s)
@@ -18,10 +18,10 @@ def _order(order: int, s: mp.mpf) -> mp.mpf:
     return s * s / 8 * mp.hyp2f1(0.5, 1.5, 3, s * s) if s <= 1 else mp.hyp2f1(1.5, -0.5, 2, s**-2) / (2 * s)
 
 
-def _outwards(s: mp.mpf) -> mp.mpf:
+def _outwards(s):
     """Integral of J1(ks) q(k) of a traction outwards: rings of 2 (K - E) / (pi s)."""
 
-    def ring(t: mp.mpf) -> mp.mpf:
+    def ring(t):
         return mp.mpf(0) if t == 1 else t * t * mp.hyp2f1(0.5, 1.5, 2, t * t) / 2
 
     if s > 1:
@@ -29,7 +29,7 @@ def _outwards(s: mp.mpf) -> mp.mpf:
     return s * (2 / mp.pi * (mp.catalan - mp.mpf(1) / 2) + mp.quad(lambda t: ring(t) / t**3, [s, 1]))
 
 
-def _integrals(load: Load, r: float) -> tuple[mp.mpf, mp.mpf, mp.mpf]:
+def _integrals(load, r):
     """Integrals of q(k) J_n(kr) dk, n = 0, 1, 2."""
     r = mp.mpf(r)
     if isinstance(load, Point):
@@ -41,7 +41,7 @@ def _integrals(load: Load, r: float) -> tuple[mp.mpf, mp.mpf, mp.mpf]:
     return a * _order(0, s), a * _order(1, s), a * _order(2, s)
 
 
-def _exact(load: Load, body: HalfSpace, r: float) -> list[mp.mpc]:
+def _exact(load, body, r):
     """(u_r, u_theta, u_z) by Boussinesq and Cerruti."""
     nu, loss = mp.mpf(body.poisson_ratio), body.damping
     mu = mp.mpf(body.youngs_modulus) / (2 * (1 + nu)) * mp.mpc(1, loss.tan_delta if loss else 0)
@@ -55,7 +55,7 @@ def _exact(load: Load, body: HalfSpace, r: float) -> list[mp.mpc]:
     return [across * first, mp.mpf(0), along * zeroth]
 
 
-def _case(seed: int) -> tuple[LayeredMedium, Load, np.ndarray]:
+def _case(seed):
     """Draw a body, whole or cut in up to three layers, a load, and radii: some at the rim, some far away."""
     rng = np.random.default_rng(seed)
     nu = float(rng.choice([-0.9, -0.3, 0.0, 0.01, 0.3, 0.45, 0.4999999, 0.5, rng.uniform(-0.5, 0.5)]))

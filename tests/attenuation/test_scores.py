@@ -28,7 +28,7 @@ TABLE = measured_table()
 RNG = np.random.default_rng(3)
 
 
-def test_leave_one_out_errors_are_those_of_single_fits() -> None:
+def test_leave_one_out_errors_are_those_of_single_fits():
     """Each mask on its own; with one constant also the closed form n/(n - 1) of the residual."""
     for name, model in COMPARED.items():
         errors = leave_one_out_errors(model.levels, TABLE)
@@ -42,7 +42,7 @@ def test_leave_one_out_errors_are_those_of_single_fits() -> None:
 
 
 @pytest.mark.parametrize("name", ["rule", "divider", "baseline"])
-def test_the_range_is_scipy_s_percentile_bootstrap(name: str) -> None:
+def test_the_range_is_scipy_s_percentile_bootstrap(name):
     errors = assessments()[name].leave_one_out_errors
     reference = stats.bootstrap(
         (errors,), np.mean, confidence_level=0.9, n_resamples=40_000, method="percentile", rng=np.random.default_rng(1)
@@ -50,7 +50,7 @@ def test_the_range_is_scipy_s_percentile_bootstrap(name: str) -> None:
     assert bootstrap_range(errors) == pytest.approx(tuple(np.exp(reference)), rel=0.01)
 
 
-def test_ranges_that_were_measured_before() -> None:
+def test_ranges_that_were_measured_before():
     """By another program, to a hundredth or two of resampling."""
     found = {name: one.leave_one_out_range for name, one in assessments().items()}
     for name, ends in {"divider": (1.18, 1.53), "crossings": (1.22, 1.48), "published": (1.45, 2.04)}.items():
@@ -61,7 +61,7 @@ def test_ranges_that_were_measured_before() -> None:
 
 
 @pytest.mark.parametrize(("a", "b"), [("rule", "divider"), ("crossings", "published"), ("published", "baseline")])
-def test_sign_flips_are_scipy_s_exact_permutation_test(a: str, b: str) -> None:
+def test_sign_flips_are_scipy_s_exact_permutation_test(a, b):
     errors, others = (assessments()[name].leave_one_out_errors for name in (a, b))
     reference = stats.permutation_test(
         (errors, others),
@@ -74,7 +74,7 @@ def test_sign_flips_are_scipy_s_exact_permutation_test(a: str, b: str) -> None:
     assert sign_flip_p(others, errors) == sign_flip_p(errors, others)
 
 
-def test_sign_flips_of_many_units_are_drawn_and_agree_with_all_of_them() -> None:
+def test_sign_flips_of_many_units_are_drawn_and_agree_with_all_of_them():
     errors, others = RNG.normal(0.3, 1, 14), np.zeros(14)
     signs = np.array(list(itertools.product((1, -1), repeat=14)))
     exact = np.mean(np.abs(signs @ errors) >= abs(errors.sum()) - 1e-12)
@@ -83,7 +83,7 @@ def test_sign_flips_of_many_units_are_drawn_and_agree_with_all_of_them() -> None
     assert sign_flip_p(np.full(9, 1.0), np.zeros(9)) == 2 / 512
 
 
-def test_the_choice_without_a_unit_is_what_loops_give() -> None:
+def test_the_choice_without_a_unit_is_what_loops_give():
     fits = rules()
     found = choose_without(fits, TABLE)
     errors = []
@@ -103,7 +103,7 @@ def test_the_choice_without_a_unit_is_what_loops_give() -> None:
     assert found.score.geometric_mean > min(one.leave_one_out.geometric_mean for one in assessments().values())
 
 
-def test_a_true_model_is_first_and_chosen_and_the_order_follows_the_scores() -> None:
+def test_a_true_model_is_first_and_chosen_and_the_order_follows_the_scores():
     true = with_levels(TABLE, COMPARED["crossings"].levels(TABLE, np.ones((1, 9), dtype=bool))[0])
     found = assess_all(true)
     assert in_order(found)[0] == "crossings"
@@ -116,7 +116,7 @@ def test_a_true_model_is_first_and_chosen_and_the_order_follows_the_scores() -> 
     assert list(estimated["models"]) == [n for n in in_order(assessments()) if n in estimated["models"]]
 
 
-def test_a_table_of_other_units_is_scored_as_well() -> None:
+def test_a_table_of_other_units_is_scored_as_well():
     """Seven of the units in another order: nothing holds the number nine."""
     kept = [8, 0, 3, 4, 1, 6, 2]
     part = {name: tuple(getattr(TABLE, name)[i] for i in kept) for name in ("names", "designs", "layers", "inputs")}
@@ -125,7 +125,7 @@ def test_a_table_of_other_units_is_scored_as_well() -> None:
     assert found["rule"].leave_one_out_errors.shape == (7,)
 
 
-def test_simulated_tables_know_the_truth_and_shuffled_ones_nothing() -> None:
+def test_simulated_tables_know_the_truth_and_shuffled_ones_nothing():
     study = simulated("rule", 60, TABLE)
     assert study.told_apart.keys() == set(COMPARED) - {"rule"}
     assert 0.6 < study.holds < 1
