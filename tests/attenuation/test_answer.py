@@ -148,23 +148,12 @@ def test_the_command_leads_with_two_lines_and_keeps_the_rest_for_details():
         assert line in full
 
 
-def test_a_slope_stands_beside_the_pairs_that_were_measured():
-    full = CliRunner().invoke(app, ["estimate", "embedded", "--details"], env={"COLUMNS": "200"}).output
-    row = next(line for line in full.splitlines() if "layers.1.youngs_modulus_kpa" in line)
-    assert "-0.41 (0 of 2: -0.41 to +1.61)" in row
-    assert "0 of 2" in row.split("│")[3]
-    wall = next(line for line in full.splitlines() if "layers.0.wall_mm" in line)
-    assert "?" in wall
-
-
 def test_a_build_ends_with_the_two_lines(tmp_path):
-    done = CliRunner().invoke(app, ["build", "embedded", "--only", "estimate", "-o", str(tmp_path), "--json"])
-    found = json.loads(done.output)["variants"][0]["manifest"]["estimate"]
-    assert found["model"] == "rule"
     shown = CliRunner().invoke(app, ["build", "embedded", "--only", "estimate", "-o", str(tmp_path)]).output
-    for line in found["lines"]:
+    manifest = json.loads(next(tmp_path.rglob("manifest.json")).read_text("utf-8"))
+    assert manifest["estimate"]["lines"] == lead("embedded")["lines"]
+    for line in manifest["estimate"]["lines"]:
         assert any(line in one for one in shown.splitlines())
-    assert found["lines"] == lead("embedded")["lines"]
 
 
 def test_a_unit_too_far_from_the_measured_ones_gets_no_level():
@@ -181,9 +170,3 @@ def test_what_the_paper_prints_of_a_unit_without_a_level_is_in_the_first_line():
     assert "187.7 % of a control that it does not name for this unit: 74 to 110 %." in stiff["lines"][0]
     soft = lead("embedded", "layers.0.material=dragon-skin-30", "layers.1.material=ecoflex-00-10")
     assert "The paper states of this unit: amplifies slightly more than D30/D10." in soft["lines"][0]
-
-
-def test_the_nearest_unit_is_of_the_same_class():
-    """Stiff inside is not compared with soft inside, however close the moduli are."""
-    stiff = lead("embedded", "layers.0.material=dragon-skin-30", "layers.1.material=dragon-skin-10-medium")
-    assert stiff["nearest"]["unit"] == "embedded D10/E10"

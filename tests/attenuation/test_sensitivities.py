@@ -121,13 +121,13 @@ def test_the_curve_says_what_its_decay_reads():
         *("diameter_mm", "motor.diameter_mm", "estimate.frequency_hz"),
         *(f"tissue {name}" for name in ("shear modulus", "damping", "thickness", "density")),
     }
-    for path, value in (("estimate.frequency_hz", 125.0), ("diameter_mm", 20.0)):
-        ends = []
-        for factor in (math.exp(-STEP), math.exp(STEP)):
-            variant = estimate_input(load("encapsulating", [f"{path}={value * factor!r}"]))
-            ends.append(layered_block(variant, rtol=1e-8)["drives"]["flat"]["u"]["value"][30])
-        middle = estimate_input(load("encapsulating", [f"{path}={value!r}"]))
-        slope = layered_block(middle)["sensitivities"]["by"][path]
-        assert slope == pytest.approx(math.log(ends[1] / ends[0]) / (2 * STEP), abs=1e-3)
+    ends = []
+    for factor in (math.exp(-STEP), math.exp(STEP)):
+        variant = estimate_input(load("encapsulating", [f"diameter_mm={20 * factor!r}"]))
+        ends.append(layered_block(variant, rtol=1e-8)["drives"]["flat"]["u"]["value"][30])
+    slope = layered_block(estimate_input(load("encapsulating", ["diameter_mm=20"])))["sensitivities"]["by"][
+        "diameter_mm"
+    ]
+    assert slope == pytest.approx(math.log(ends[1] / ends[0]) / (2 * STEP), abs=1e-3)
     assert "layers.0.wall_mm" not in by
     assert "not included" in found["not_included"]
