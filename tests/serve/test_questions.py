@@ -1,7 +1,5 @@
 """Whose question a worker is on: one that is overtaken is ended after a grace, and none of another page."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import os
@@ -144,7 +142,7 @@ def test_a_time_limit_is_told_as_one(monkeypatch):
 
 def test_no_process_is_left(monkeypatch):
     """Those under way and the one that is made ready end with the questions."""
-    pids: list[int] = []
+    pids = []
 
     async def act(asked):
         asked._text = "30"
