@@ -39,11 +39,6 @@ class MouldFinding:
         return FindingRecord(**{**asdict(self), "value": float(f"{self.value:.6g}")})
 
 
-def exactly(code: str, where: str, value: float, wanted: float, unit: str) -> MouldFinding:
-    """Return a finding that passes if `value` is `wanted`."""
-    return MouldFinding(code, where, bool(value == wanted), float(value), float(wanted), unit)
-
-
 def at_most(code: str, where: str, value: float, limit: float, unit: str, advice: str = "") -> MouldFinding:
     """Return a finding that passes up to `limit`."""
     ok = bool(value <= limit)

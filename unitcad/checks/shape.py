@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from unitcad.checks.finding import MouldCheck, MouldFinding, exactly
+from manifold3d import Manifold
+
+from unitcad.checks.finding import MouldCheck, MouldFinding
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Plan
 
@@ -13,18 +15,25 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Look at every body of unit and tooling and the pieces of split tools; the genus if one is expected."""
     genus = expected_genus(moulds.plan)
     for name, solid in moulds.solids.items():
-        yield exactly("C000", f"{name} components", len(solid.decompose()), moulds.pieces(name), "")
-        yield MouldFinding("C000", f"{name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3")
+        yield from _whole(name, solid, moulds.pieces(name))
         if name in genus:
-            yield exactly("C000", f"{name} genus", solid.genus(), genus[name], "")
+            yield _count(f"{name} genus", solid.genus(), genus[name])
     for split in moulds.plan.splits:
         pieces = {piece.name: moulds.mesh(piece) for piece in split.pieces}
         for name, solid in pieces.items():
-            yield exactly("C000", f"{name} components", len(solid.decompose()), 1, "")
-            yield MouldFinding("C000", f"{name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3")
+            yield from _whole(name, solid, 1)
         # A seam that meets no hole leaves as many of them.
         holes, whole = sum(solid.genus() for solid in pieces.values()), moulds.solids[split.tool].genus()
-        yield exactly("C000", f"{split.tool} genus, all pieces", holes, whole, "")
+        yield _count(f"{split.tool} genus, all pieces", holes, whole)
+
+
+def _whole(name: str, solid: Manifold, pieces: int) -> Iterator[MouldFinding]:
+    yield _count(f"{name} components", len(solid.decompose()), pieces)
+    yield MouldFinding("C000", f"{name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3")
+
+
+def _count(where: str, found: int, wanted: int) -> MouldFinding:
+    return MouldFinding("C000", where, found == wanted, float(found), float(wanted), "")
 
 
 def expected_genus(plan: Plan) -> dict[str, int]:

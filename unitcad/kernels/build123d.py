@@ -24,13 +24,13 @@ def solid(shape: Shape) -> B3dShape:
     return _solids([shape])[0]
 
 
-def compound(bodies: Sequence[Body], name: str = "unitcad") -> b3d.Compound:
-    """Return an assembly called `name`, as assembled (mm): one child a body, with its label and colour."""
+def compound(bodies: Sequence[Body]) -> b3d.Compound:
+    """Return an assembly, as assembled (mm): one child a body, with its label and colour."""
     children = _solids([body.shape for body in bodies])
     for child, body in zip(children, bodies, strict=True):
         child.label = body.name
         child.color = b3d.Color(*body.colour)
-    return b3d.Compound(label=name, children=children)
+    return b3d.Compound(label="unitcad", children=children)
 
 
 def show(assembly: b3d.Compound) -> None:

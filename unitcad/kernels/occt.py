@@ -50,6 +50,8 @@ with loading("OCP"):
     from OCP.TopTools import TopTools_ListOfShape
 
 
+_SEGMENTS = 96
+"""Facets a turn of the mesh that a solid is compared with."""
 _SEWN = 1e-6
 """Distance up to which edges of neighbouring faces are one, mm."""
 _FLAT = 1e-9
@@ -91,16 +93,16 @@ def _unplaced(shape: Shape) -> tuple[Shape, list[Place]]:
     return shape, places
 
 
-def confirm(shape: Shape, solid: TopoDS_Shape, segments: int = 96) -> None:
+def confirm(shape: Shape, solid: TopoDS_Shape) -> None:
     """Refuse a `solid` that differs from manifold3d's mesh of `shape` in count or volume.
 
     OCCT can lose a part of a body and call the rest valid. Raises UnitcadError for another count, or for a volume that
-    differs by more than `segments` a turn explain.
+    differs by more than the mesh's facets explain.
     """
-    properties, other = GProp_GProps(), mesh.realise(shape, segments)
+    properties, other = GProp_GProps(), mesh.realise(shape, _SEGMENTS)
     BRepGProp.VolumeProperties_s(solid, properties)
     count, parts = len(solids_in(solid)), len(other.decompose())
-    allowed = volume_bound(shape, segments) + 1e-6 * other.volume()
+    allowed = volume_bound(shape, _SEGMENTS) + 1e-6 * other.volume()
     if count != parts or abs(properties.Mass() - other.volume()) > allowed:
         raise UnitcadError(
             f"OCCT and manifold3d differ: {count} solids of {properties.Mass():.6g} mm3 against {parts} of"

@@ -181,8 +181,8 @@ def _section(rib: Rib, tip: float, back: float, reach: float, z: float) -> Profi
     return polygon(*((x + nx * (d + face) - ny * t, y + ny * (d + face) + nx * t) for d, t in corners))
 
 
-def leaf_slots(standing: tuple[Rib, ...], clearance: float, leaf: float, top: float = 0.0) -> list[Shape]:
-    """Draw the slots that free a leaf of thickness `leaf` behind each rib, up to z = `top`; none without leaves."""
+def leaf_slots(standing: tuple[Rib, ...], clearance: float, leaf: float) -> list[Shape]:
+    """Draw the slots that free a leaf of thickness `leaf` behind each rib, up to z = 0; none without leaves."""
     if not leaf:
         return []
     face, side, shapes = -clearance * SQUARE, LEAF_WIDTH / 2, []
@@ -194,8 +194,8 @@ def leaf_slots(standing: tuple[Rib, ...], clearance: float, leaf: float, top: fl
             (face + BEYOND, behind, -side - leaf, -side),
             (face + BEYOND, behind, side, side + leaf),
         ):
-            lower, upper = (_strip(rib, near, far, t0, t1, z) for z in (low, top))
-            shapes.append(Extrude(lower, low, top, top=upper))
+            lower, upper = (_strip(rib, near, far, t0, t1, z) for z in (low, 0.0))
+            shapes.append(Extrude(lower, low, 0.0, top=upper))
     return shapes
 
 
