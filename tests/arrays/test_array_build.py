@@ -188,6 +188,7 @@ def test_the_procedure_names_every_place_and_weighs_all_units(folder):
     assert bill["ecoflex-00-10 part A"] == pytest.approx(2 * inner)
     assert casting["earliest_finish_min"] > 2 * unit["earliest_finish_min"]
     text = (folder / "casting.md").read_text("utf-8")
+    assert "## Silicone stays tacky" in (folder / "troubleshooting.md").read_text("utf-8")
     assert f"- at {duration(casting['earliest_finish_min'])}: units in (" in text, "not when the sheet is out"
 
 

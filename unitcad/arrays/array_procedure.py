@@ -42,6 +42,7 @@ from unitcad.casting.pouring import shown as grams_shown
 from unitcad.casting.preparation import Printing, Size, cleaning, fall, joining, level, printing
 from unitcad.casting.procedure import Procedure, pour_of, procedure, times
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep, Phase, duration, phases
+from unitcad.casting.troubles import troubles
 from unitcad.casting.views import picture_path, views
 from unitcad.catalogue import Material
 from unitcad.meshcheck.findings import counted
@@ -459,6 +460,7 @@ def pocket_procedure(
         eccentricity=None,
         without_ribs=None,
         walls=(),
+        troubles=troubles(moulds),
         bill=pocket_bill(moulds, batch, [*prepared, *poured, *out, *together], units),
         makes="sheet",
         last="Units in",
