@@ -470,7 +470,7 @@ def test_without_a_lab_s_units_the_scores_are_the_table_s(moduli):
 def test_intervals_that_were_measured_before():
     alone = Campaigns(TABLE, np.zeros(9, dtype=bool), np.zeros(9))
     judged = {name: judge(MODELS[name], alone) for name in ("divider", "crossings", "published", "baseline")}
-    assert [judged[name].coverage() for name in ("published", "crossings", "divider", "baseline")] == [8, 7, 7, 7]
+    assert [judged[name].coverage for name in ("published", "crossings", "divider", "baseline")] == [8, 7, 7, 7]
     one, two = (np.abs(judged[name].errors) for name in ("divider", "baseline"))
     assert paired_difference(judged["divider"], judged["baseline"])[:2] == pytest.approx(
         (np.mean(one - two), stats.sem(one - two))

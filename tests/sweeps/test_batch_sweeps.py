@@ -239,7 +239,7 @@ def test_a_fault_of_a_base_s_file_is_said_with_file_and_line(tmp_path):
     assert said.startswith("diameter_mm = -3") or "; and diameter_mm = -3" in said
 
 
-def test_a_batch_s_folder_is_no_device() -> None:
+def test_a_batch_s_folder_is_no_device():
     from unitcad.sweeps.sweep import from_file
 
     data = {"base": "encapsulating", "name": "Con", "sweep": {"diameter_mm": [14.0, 15.0]}}
@@ -247,7 +247,7 @@ def test_a_batch_s_folder_is_no_device() -> None:
     assert from_file({**data, "name": "Cone"}, Path(), "x").slug == "cone"
 
 
-def test_the_shipped_sweeps_are_listed() -> None:
+def test_the_shipped_sweeps_are_listed():
     done = CliRunner().invoke(app, ["list", "sweeps"])
     assert [line.split("\t")[0] for line in done.output.splitlines()] == ["all-materials", "published", "thickness"]
     assert all(len(line.split("\t")[1]) > 20 for line in done.output.splitlines())

@@ -51,7 +51,7 @@ def as_data(result: Fitted) -> dict[str, Any]:
         source: {"reason": compared.reason}
         if compared.reason
         else {
-            name: {"leave_one_out": one.score, "range": one.range, "coverage": one.coverage()}
+            name: {"leave_one_out": one.score, "range": one.range, "coverage": one.coverage}
             for name, one in compared.judged.items()
         }
         for source, compared in result.by_source.items()

@@ -300,17 +300,16 @@ def _compared(lab: FitLab, moduli: Moduli) -> Compared:
 def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Campaigns:
     """Return the paper's units, if they are wanted, and the lab's own after them."""
     paper = measured_table(moduli)
-    known = np.array([bool(np.all(np.isfinite(units.youngs_modulus))) for units in paper.inputs])
-    kept = np.flatnonzero(known) if lab.settings.include_paper_units else []
+    paper = paper.rows(list(range(len(paper.names))) if lab.settings.include_paper_units else [])
     table = MeasuredTable(
-        (*(paper.names[i] for i in kept), *(unit.name for unit in lab.units)),
-        (*(paper.designs[i] for i in kept), *(CONTROL if len(v.layers) == 1 else v.design for v in inputs)),
-        (*(paper.layers[i] for i in kept), *(tuple(layer.material for layer in v.layers) for v in inputs)),
-        np.array([*(paper.levels[i] for i in kept), *(unit.level.value for unit in lab.units)]),
-        (*(paper.inputs[i] for i in kept), *(nominal(variant) for variant in inputs)),
+        (*paper.names, *(unit.name for unit in lab.units)),
+        (*paper.designs, *(CONTROL if len(v.layers) == 1 else v.design for v in inputs)),
+        (*paper.layers, *(tuple(layer.material for layer in v.layers) for v in inputs)),
+        np.array([*paper.levels, *(unit.level.value for unit in lab.units)]),
+        (*paper.inputs, *(nominal(variant) for variant in inputs)),
     )
-    own = np.arange(len(table.names)) >= len(kept)
-    error = np.array([*[0.0] * len(kept), *(unit.error for unit in lab.units)])
+    own = np.arange(len(table.names)) >= len(paper.names)
+    error = np.array([*(0.0 for _ in paper.names), *(unit.error for unit in lab.units)])
     return Campaigns(table, own, error, lab.settings.between_labs)
 
 
@@ -351,7 +350,7 @@ def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
     }  # fmt: skip
     return ModelFit(
         degrees_of_freedom=found.df,
-        coverage=f"{judged.coverage()} of {judged.errors.size}",
+        coverage=f"{judged.coverage} of {judged.errors.size}",
         at_bound=compared.at_bound(name),
         **rounded(numbers, 6),
     )

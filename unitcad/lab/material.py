@@ -94,21 +94,35 @@ def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]
         said = f"has the unit {unit!r}" if unit else "has no unit"
         limit = f"{recording.path.name}: column {at + 1} ({channels[at].name}) {said}; declare {quantity}={at + 1}:UNIT"
         units = ", ".join(COLUMN_UNITS[quantity])
-        raise Refusal("--column", None, f"{limit} with the unit that it is in, of {units}; {columns_of(recording)}")
+        raise Refusal(
+            "--column", None, f"{limit} with the unit that it is in, of {units}; its columns: {recording.numbered()}"
+        )
     return at, factor
 
 
-def columns_of(recording: Recording) -> str:
-    """Say which columns a file has."""
-    return f"its columns: {recording.numbered()}"
+def read_columns(
+    recording: Recording, given: Mapping[str, Declared], *choices: tuple[str, ...]
+) -> tuple[dict[str, np.ndarray], int]:
+    """Return columns (n,) in SI without the rows that lack a number, and how many rows those were.
 
-
-def columns(recording: Recording, wanted: Mapping[str, tuple[int, float]]) -> tuple[dict[str, np.ndarray], int]:
-    """Return the columns (n,) in SI without the rows that lack a number, and how many rows those were."""
+    Of each choice it is the first quantity that is declared, or else that the file has. Raises Refusal for a choice of
+    which there is none, unless it is the time.
+    """
+    wanted = {}
+    for choice in choices:
+        by_preference = sorted(choice, key=lambda quantity: quantity not in given)
+        found = ((quantity, column_of(recording, quantity, given)) for quantity in by_preference)
+        quantity, column = next(((quantity, one) for quantity, one in found if one), ("", None))
+        if column:
+            wanted[quantity] = column
+        elif choice != ("time",):
+            limit = f"{recording.path.name} has no column of {' or '.join(choice[:2])} that is known by name"
+            limit = f"{limit}; declare {choice[0]}=COLUMN:UNIT; its columns: {recording.numbered()}"
+            raise Refusal("--column", None, limit)
     rows = recording.columns([at for at, _ in wanted.values()])
     whole = np.isfinite(rows).all(axis=1)
-    found = {name: rows[whole, i] * factor for i, (name, (_, factor)) in enumerate(wanted.items())}
-    return found, int((~whole).sum())
+    data = {name: rows[whole, i] * factor for i, (name, (_, factor)) in enumerate(wanted.items())}
+    return data, int((~whole).sum())
 
 
 def _unit(text: str, quantity: str) -> float | None:
@@ -181,18 +195,8 @@ def read_curve(
     """
     recording = open_recording(path, layout)
     specimen = specimen.over(header_of(path))
-    wanted = {
-        q: found for q in ("time", "strain", "stress", "force", "travel") if (found := column_of(recording, q, given))
-    }
-    if "strain" not in wanted and "travel" not in wanted and (found := column_of(recording, "true_strain", given)):
-        wanted["true_strain"] = found
-    if "stress" not in wanted and "force" not in wanted and (found := column_of(recording, "true_stress", given)):
-        wanted["true_stress"] = found
-    for pair in (("strain", "travel", "true_strain"), ("stress", "force", "true_stress")):
-        if not any(q in wanted for q in pair):
-            limit = f"{path.name} has no column of {pair[0]} or {pair[1]} that is known by name"
-            raise Refusal("--column", None, f"{limit}; declare {pair[0]}=COLUMN:UNIT; {columns_of(recording)}")
-    data, lost = columns(recording, wanted)
+    choices = ("time",), ("strain", "travel", "true_strain"), ("stress", "force", "true_stress")
+    data, lost = read_columns(recording, given, *choices)
     strain, stress = data.get("strain"), data.get("stress")
     if "true_strain" in data:
         strain = np.expm1(data["true_strain"])
@@ -628,17 +632,7 @@ def read_dynamic(
     Raises Refusal for columns and units that are missing, and if the file does not say shear or tension.
     """
     recording = open_recording(path, layout)
-    wanted = {q: found for q in ("frequency", "storage", "loss") if (found := column_of(recording, q, given))}
-    if "loss" not in wanted and (found := column_of(recording, "tan_delta", given)):
-        wanted["tan_delta"] = found
-    for quantity in ("frequency", "storage"):
-        if quantity not in wanted:
-            limit = f"{path.name} has no column of {quantity}; declare {quantity}=COLUMN:UNIT"
-            raise Refusal("--column", None, f"{limit}; {columns_of(recording)}")
-    if len(wanted) < 3:
-        limit = f"{path.name} has neither loss nor tan_delta; declare loss=COLUMN:UNIT or tan_delta=COLUMN"
-        raise Refusal("--column", None, f"{limit}; {columns_of(recording)}")
-    data, lost = columns(recording, wanted)
+    data, lost = read_columns(recording, given, ("frequency",), ("storage",), ("loss", "tan_delta"))
     loss = data["loss"] if "loss" in data else data["tan_delta"] * data["storage"]
     order = np.argsort(data["frequency"], kind="stable")
     frequency, storage, loss = data["frequency"][order], data["storage"][order], loss[order]
@@ -646,8 +640,8 @@ def read_dynamic(
         raise UnitcadError(f"{path}: {len(frequency)} frequencies; a law of three constants needs {LEAST_POINTS}")
     if min(frequency.min(), storage.min(), loss.min()) <= 0:
         raise UnitcadError(f"{path}: frequency, storage and loss must be above zero everywhere")
-    name = recording.channels[wanted["storage"][0]].name.lower()
-    if not deformation:
+    if not deformation and (column := column_of(recording, "storage", given)):
+        name = recording.channels[column[0]].name.lower()
         deformation = {"e": "tension", "g": "shear"}.get(name[0], "") if name[1:2] in ("'", "′") else ""
     if deformation not in ("shear", "tension"):
         raise Refusal("--deformation", deformation or None, "must be shear or tension: the file does not say")

@@ -217,7 +217,7 @@ SHOWN_S = 0.1
 STRETCHES = 100
 """Parts of a record of which its chart shows the least and the largest value."""
 BESIDE_HZ = 30.0
-"""Width of a spectrum to either side of the lines: one multiple of 50 Hz at least."""
+"""Width of a spectrum to either side of the line: one multiple of 50 Hz at least."""
 APART = 0.008
 """Part of the axis by which the levels of two chains are drawn apart, so that no bar covers another."""
 LEAST_WIDE_MM = 10.0
@@ -252,18 +252,17 @@ def charts_of(result: Measured) -> dict[str, str]:
 
 
 def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
-    """Chart the spectrum near the lines with the zeros of the chains' combs, or all of it without a sure line."""
+    """Chart the spectrum near the line with the zeros of the chains' combs, or all of it without a sure line."""
     frequency, size = record.picture[2:]
-    at = list(record.lines) or [record.frequency_hz] * bool(record.frequency_hz)
-    if at and not any(one.code == "L117" for one in record.findings):
-        near = (frequency > min(at) - BESIDE_HZ) & (frequency < max(at) + BESIDE_HZ)
+    hertz = record.frequency_hz
+    if hertz and not any(one.code == "L117" for one in record.findings):
+        near = np.abs(frequency - hertz) < BESIDE_HZ
         frequency, size = frequency[near], size[near]
     floor = float(np.median(size)) / 10 if len(size) and np.median(size) > 0 else 1e-12
     kept = size > floor
     series = [Series("spectrum (Hann)", frequency[kept], size[kept])]
-    if at:
-        tops = [float(np.interp(hertz, frequency, size)) for hertz in at]
-        series.append(Series("fitted line" if len(at) == 1 else "fitted lines", at, tops, points=True))
+    if hertz:
+        series.append(Series("fitted line", [hertz], [float(np.interp(hertz, frequency, size))], points=True))
     for chain in chains:
         if chain.zeros_hz and len(frequency):
             first = np.ceil(frequency[0] / chain.zeros_hz) or 1.0

@@ -33,7 +33,7 @@ RULES = {
             A time is off an even grid by more than 0.3 of a step: samples are missing or the clock
             varies. Example: A logger over USB that loses a packet. Fix: Record with a hardware clock.""",
             """L104 error: several lines
-            A second line is near the strongest one, so no amplitude is given: it would belong to neither. Example: Two
+            A second line is near the strongest one, so the record is not used: either may be the motor's. Example: Two
             motors of an array at once. Fix: Run one motor at a time.""",
             """L105 warning: line on the mains
             The record can't tell the line from a multiple of the mains' frequency. Example: A motor at
@@ -44,8 +44,9 @@ RULES = {
             comb at 50 Hz. Fix: Use the chain line, or another drive voltage.""",
             """L107 warning: unsteady
             The amplitude or the frequency varies by more than 5 % in the steady part, or less than half
-            of the record is steady. Example: A battery that runs down. Fix: Use a regulated supply and
-            let the motor warm up, or cut the record.""",
+            of the record is steady. If the amplitude varies by more than 25 %, it is an error. Example: A battery that
+            runs down; two motors that beat. Fix: Use a regulated supply and let the motor warm up, run one motor at a
+            time, or cut the record.""",
             """L108 warning: fewer than 20 periods
             The steady part is too short to know the noise next to the line. Example: 0.1 s at
             125 Hz. Fix: Record 2 s.""",
@@ -298,7 +299,7 @@ def _own_rate(
 LEAST_GAIN = 0.9
 HIGHEST_HZ = 500.0
 """If a record's spectrum ends, in Hz."""
-MOST_SCATTER = MOST_DRIFT = 0.05
+MOST_SCATTER, NO_SCATTER, MOST_DRIFT = 0.05, 0.25, 0.05
 LEAST_PERIODS, NO_PERIODS = 20, 5
 MOST_MASKED = 0.1
 LEAST_STEADY = 0.5
@@ -319,10 +320,8 @@ class RecordResult:
     """A record's figures; amplitudes (peak) and standard uncertainties in um. `ratio` is to the motor's own channel.
 
     `usable`: it counts for levels. `by_chain` has each chain's amplitude over which a level is taken, without the
-    chains that the record is not fit for; `gains` the gain of a chain's filters at the line; `lines` the frequencies of
-    a record that has several lines, which has no amplitude; `picture` the samples and the spectrum, in the sensor's
-    unit;
-    `units` the units of the channels in the file.
+    chains that the record is not fit for; `gains` the gain of a chain's filters at the line; `picture` the
+    samples and the spectrum, in the sensor's unit; `units` the units of the channels in the file.
     """
 
     file: str
@@ -343,7 +342,6 @@ class RecordResult:
     snr: float = 0.0
     steady_s: float = 0.0
     masked: float = 0.0
-    lines: tuple[float, ...] = ()
     ratio: float | None = None
     lag_deg: float | None = None
     by_chain: dict[str, float] = field(default_factory=dict)
@@ -363,7 +361,6 @@ class RecordResult:
             "length_s": self.length_s,
             "by_chain": self.by_chain,
             "gains": self.gains,
-            "lines": [{"frequency_hz": hertz} for hertz in self.lines],
             "findings": [one.as_dict() for one in self.findings],
         }
         return rounded(data, 6)
@@ -413,12 +410,6 @@ def measure_record(
         if each is None:
             message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz{hint}"
             return replace(none, findings=(*findings, finding("L111", where, message)))
-        if each.lines:
-            listed = ", ".join(f"{one.frequency_hz:.2f} Hz" for one in each.lines)
-            sizes = ", ".join(f"{one.amplitude / each.lines[0].amplitude:.2f}" for one in each.lines)
-            message = f"{listed}, of {sizes} of the strongest; run one motor at a time"
-            lines = tuple(one.frequency_hz for one in each.lines)
-            return replace(none, findings=(*findings, finding("L104", where, message)), lines=lines)
     fit, *motors = (each for each in fits if each)
     motor = motors[0] if motors else None
     for each, where, known in zip((fit, *motors), names, mains, strict=False):
@@ -445,6 +436,7 @@ def measure_record(
     else:
         over = factor
     by_chain, gains, unfit = {}, {}, []
+    part = samples[int(fit.start_s * rate) : int(np.ceil(fit.end_s * rate)) + 1]
     for chain in chains:
         if chain.gain:
             gains[chain.name] = chain.gain(hertz)
@@ -452,7 +444,7 @@ def measure_record(
             message = f"the filters of the chain {chain.name} pass {gain:.3f} of {hertz:.2f} Hz"
             findings.append(finding("L106", shown, message))
         try:
-            values = [chain.amplitude(samples[:, i], rate, each) for i, each in enumerate((fit, *motors))]
+            values = [chain.amplitude(part[:, i], rate, each) for i, each in enumerate((fit, *motors))]
             reason = chain.unfit([fit, *motors])
         except Refusal as refusal:
             values, reason = [], refusal.limit
@@ -496,9 +488,7 @@ def _fits(
     """Return the line of each channel, None without one. The other channel has the phase of the motor's line."""
     fits: list[LineFit | None] = []
     for i in reversed(range(samples.shape[1])):
-        motor = fits[0] if fits else None
-        shared = (motor.phase, (motor.start_s, motor.end_s)) if motor else (None, None)
-        fit = fit_line(samples[:, i], rate, band, mains[i], sensors[i].full_scale, *shared)
+        fit = fit_line(samples[:, i], rate, band, mains[i], sensors[i].full_scale, fits[0] if fits else None)
         fits.insert(0, fit if fit and fit.amplitude > 0 else None)
     return fits
 
@@ -517,6 +507,8 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
     if fit.amplitude < LEAST_OVER_U * own:  # nothing else can be said of a line that is not there
         say("L111", f"the strongest has {fit.amplitude / own:.1f} times its uncertainty")
         return out
+    if fit.second_hz:
+        say("L104", f"another one is at about {fit.second_hz:.1f} Hz; run one motor at a time")
     if raw_rate < 4 * hertz:
         say("L102", f"{raw_rate:g} Hz for a line at {hertz:.1f} Hz")
     if fit.mains_hz:
@@ -529,10 +521,11 @@ def _of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Main
     noise = np.sqrt(2 / max(0.2 * rate, 1)) / fit.snr
     scatter = float(np.sqrt(max(fit.scatter**2 - noise**2, 0.0)))
     if scatter > MOST_SCATTER or fit.drift > MOST_DRIFT:
-        say("L107", f"amplitude varies by {scatter:.1%}, frequency by {fit.drift:.1%}")
+        severity = "error" if scatter > NO_SCATTER else "warning"
+        say("L107", f"amplitude varies by {scatter:.1%}, frequency by {fit.drift:.1%}", severity)
     if 2 * fit.u > fit.amplitude:
         say("L118", f"twice the uncertainty is {2 * fit.u / fit.amplitude:.1f} times the amplitude", "error")
-    elif fit.snr < LEAST_SNR:
+    elif fit.snr < LEAST_SNR and scatter <= MOST_SCATTER:  # a modulation is no noise
         say("L118", f"the amplitude is {fit.snr:.1f} times the noise's standard deviation")
     return sorted(out, key=lambda one: one.code)
 

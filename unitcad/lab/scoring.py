@@ -53,57 +53,54 @@ def load_figure(source: str) -> tuple[Point, ...]:
         raise unknown_name("FIGURE", source, known)
     numbered = enumerate(read_text(path).splitlines(), 1)
     lines = {i: line for i, line in numbered if line.strip() and not line.startswith("#")}
-    rows = csv.DictReader(lines.values())
-    points: list[Point] = []
-    faults: list[Refusal] = []
-    right = tuple(rows.fieldnames or ()) == COLUMNS
-    if not right:
-        faults = [Refusal("header", ",".join(rows.fieldnames or ()), f"must be {','.join(COLUMNS)}")]
-        faults[0].line = next(iter(lines), 1)
-    where: list[int] = []
-    for row in rows if right else ():
+    rows = csv.reader(lines.values())
+    head = next(rows, [])
+    points: dict[int, Point] = {}
+    faults: dict[int, Refusal] = {}
+    if tuple(head) != COLUMNS:
+        faults[next(iter(lines), 1)] = Refusal("header", ",".join(head), f"must be {','.join(COLUMNS)}")
+    for cells in rows if not faults else ():
         line = list(lines)[rows.line_num - 1]
         try:
-            points.append(_point(row))
-            where.append(line)
+            points[line] = _point(cells)
         except Refusal as fault:
-            fault.line = line
-            faults.append(fault)
-    at_edge = {point.unit for point in points if point.distance_mm == 0.0}
-    for point, line in zip(points, where, strict=True) if not faults else ():
+            faults[line] = fault
+    at_edge = {point.unit for point in points.values() if point.distance_mm == 0.0}
+    for line, point in points.items() if not faults else ():
         if point.unit not in at_edge:
-            faults.append(
-                Refusal("distance_mm", point.distance_mm, f"{point.unit} needs a row at 0 mm to compare with")
-            )
-            faults[-1].line = line
-    if not points and not faults:
-        raise Refusal("FIGURE", source, "has no points")
-    for fault in faults:
-        fault.file = str(path)
+            limit = f"{point.unit} needs a row at 0 mm to compare with"
+            faults[line] = Refusal("distance_mm", point.distance_mm, limit)
+    for line, fault in faults.items():
+        fault.file, fault.line = str(path), line
     if faults:
-        faults[0].others = tuple(faults[1:])
-        raise faults[0]
-    return tuple(points)
+        first, *others = faults.values()
+        first.others = tuple(others)
+        raise first
+    if not points:
+        raise Refusal("FIGURE", source, "has no points")
+    return tuple(points.values())
 
 
-def _point(row: Mapping[str, str | None]) -> Point:
-    if None in row.values() or None in row:
-        raise Refusal("row", ",".join(str(cell) for cell in row.values() if cell), f"must have {len(COLUMNS)} cells")
-    unit, numbers = (row["unit"] or "").strip(), {}
+def _point(cells: list[str]) -> Point:
+    if len(cells) != len(COLUMNS):
+        raise Refusal("row", ",".join(cells), f"must have {len(COLUMNS)} cells")
+    unit, *numbers, source = (cell.strip() for cell in cells)
     _layers("unit", unit)
-    for name, least, most in (("distance_mm", 0.0, FAR_MM), ("value", 1e-6, 3.0), ("error", 0.0, 3.0)):
-        text = (row[name] or "").strip()
-        if name == "error" and not text:
-            continue
-        try:
-            number = float(text)
-        except ValueError:
-            raise Refusal(name, text, "must be a number") from None
-        if not least <= number <= most:
-            hint = "; a fraction of the motor's amplitude, not per cent" if name == "value" and number > most else ""
-            raise Refusal(name, number, f"must be from {least:g} to {most:g}{hint}")
-        numbers[name] = number
-    return Point(unit, numbers["distance_mm"], numbers["value"], numbers.get("error"), (row["source"] or "").strip())
+    limits = (("distance_mm", 0.0, FAR_MM), ("value", 1e-6, 3.0), ("error", 0.0, 3.0))
+    distance, value, error = (_number(text, *limit) for text, limit in zip(numbers, limits, strict=True))
+    return Point(unit, distance, value, error if numbers[2] else None, source)
+
+
+def _number(text: str, name: str, least: float, most: float) -> float:
+    """Return the number in a cell; 0 for an error that is not given."""
+    try:
+        number = float(text or "0" if name == "error" else text)
+    except ValueError:
+        raise Refusal(name, text, "must be a number") from None
+    if not least <= number <= most:
+        hint = "; a fraction of the motor's amplitude, not per cent" if name == "value" and number > most else ""
+        raise Refusal(name, number, f"must be from {least:g} to {most:g}{hint}")
+    return number
 
 
 def _layers(field: str, unit: str) -> tuple[str, list[str]]:

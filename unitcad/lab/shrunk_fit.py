@@ -48,10 +48,6 @@ class Shrunk:
     sigma: float
     df: int
 
-    def predictive(self, log_level: float, gradient: np.ndarray) -> tuple[int, float, float]:
-        """Return (df, centre, scale) of a further unit's ln level without error of measurement."""
-        return self.df, log_level, self.sigma * float(np.sqrt(1.0 + gradient @ self.covariance @ gradient))
-
 
 @dataclass(frozen=True)
 class Judged:
@@ -89,9 +85,10 @@ class Judged:
         """The same by the stored constants."""
         return None if self.by_stored is None else _factor(self.by_stored[self.own])
 
-    def coverage(self, content: float = 0.8) -> int:
-        """Return how many units are in the middle `content` of their prediction without them."""
-        return int(np.sum(np.abs(self.share - 0.5) <= content / 2))
+    @property
+    def coverage(self) -> int:
+        """How many units are in the middle 80 % of their prediction without them."""
+        return int(np.sum(np.abs(self.share - 0.5) <= 0.4))
 
 
 def shrunk(model: Model, campaigns: Campaigns, own: bool = True) -> Shrunk:
@@ -125,8 +122,9 @@ def judge(model: Model, campaigns: Campaigns) -> Judged:
     centre, scale, df = np.empty(logs.size), np.empty(logs.size), 1
     for i in range(logs.size):
         found = shrunk(model, campaigns.without(i), bool(campaigns.own[i]))
-        at = float(_logs(model, table, found.constants)[i])
-        df, centre[i], scale[i] = found.predictive(at, gradients(model, table, found.constants)[i])
+        gradient = gradients(model, table, found.constants)[i]
+        df, centre[i] = found.df, _logs(model, table, found.constants)[i]
+        scale[i] = found.sigma * np.sqrt(1.0 + gradient @ found.covariance @ gradient)
     scale = np.hypot(scale, campaigns.error)
     errors = centre - logs
     paper = ~campaigns.own

@@ -13,17 +13,8 @@ from unitcad.geometry.arrays import Floats
 from unitcad.rooms import load
 from unitcad.spec.raw import Table
 
-
-@dataclass(frozen=True)
-class Phase:
-    """A line's phase in rad over time in s, and by how many parameters it was fitted."""
-
-    at: Callable[[Floats], Floats]
-    parameters: int
-
-    def later(self, by_s: float) -> Phase:
-        """Return the phase of the same line over a time that begins later by so many seconds."""
-        return Phase(lambda t: self.at(t + by_s), self.parameters)
+Phase = Callable[[Floats], Floats]
+"""A line's phase in rad over time in s."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +30,6 @@ class Mains:
 
 
 @dataclass(frozen=True)
-class Line:
-    """One line: frequency in Hz, amplitude (peak) in the signal's unit."""
-
-    frequency_hz: float
-    amplitude: float
-
-
-@dataclass(frozen=True)
 class LineFit:
     """A record's line: amplitude (peak) with its standard uncertainty, in the signal's unit.
 
@@ -55,8 +38,7 @@ class LineFit:
     amplitude over the residual's standard deviation, `scatter` the standard deviation of the amplitude of blocks over
     their mean. `masked` is the fraction of samples excluded by their residual, `dropped` the same if one of them
     exceeds noise, otherwise 0; `missing` the fraction without numbers. `clipped` is the level at which the signal is
-    cut off over its true amplitude, infinite if it is not cut off. `lines` are the lines of a record with several near
-    each other, the strongest first: `amplitude` is then none of theirs.
+    cut off over its true amplitude, infinite if it is not cut off.
     """
 
     amplitude: float
@@ -70,14 +52,15 @@ class LineFit:
     scatter: float
     start_s: float
     end_s: float
-    masked: float = 0.0
-    dropped: float = 0.0
-    missing: float = 0.0
-    clipped: float = float("inf")
-    mains_hz: float = 0.0
+    masked: float
+    dropped: float
+    missing: float
+    clipped: float
+    mains_hz: float
     """The multiple of the mains' frequency that the record can't tell from the line; 0 if there is none."""
-    lines: tuple[Line, ...] = ()
-    phase: Phase | None = field(default=None, compare=False, repr=False)
+    second_hz: float
+    """The frequency of another line near this one; 0 if there is none."""
+    phase: Phase = field(compare=False, repr=False)
 
 
 Hertz = Annotated[float, Meta(ge=1, le=500)]

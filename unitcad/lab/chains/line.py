@@ -9,15 +9,15 @@ over the record's length, of the scatter of blocks, and of mains that can't be s
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
+from scipy.ndimage import binary_dilation
 from scipy.signal import oaconvolve
 from scipy.stats import t as student
 
 from unitcad.geometry.arrays import Bools, Floats
-from unitcad.lab.chains import Chain, ChainTable, Line, LineFit, Mains, Phase
+from unitcad.lab.chains import Chain, ChainTable, LineFit, Mains, Phase
 
 BAND_HZ = (60.0, 250.0)
 NO_MAINS = Mains()
@@ -43,62 +43,24 @@ def fit_line(
     band: tuple[float, float] = BAND_HZ,
     mains: Mains = NO_MAINS,
     full_scale: float | None = None,
-    phase: Phase | None = None,
-    span: tuple[float, float] | None = None,
+    motor: LineFit | None = None,
 ) -> LineFit | None:
     """Return the line of samples x (n) at `rate` in Hz; None if the band has no line.
 
-    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude. If
+    With `motor`, the fit of another channel of the record, the line has that channel's phase and its own amplitude. If
     the line is there for less than about two thirds of the samples, the fit takes the longest stretch that has it.
     """
     good = np.isfinite(x)
-    if span is not None:
-        short = span[1] - span[0] <= MOST_RUNNING * len(x) / rate
-        part = (int(span[0] * rate), int(np.ceil(span[1] * rate)) + 1) if short else None
-    elif good.sum() < LEAST_SAMPLES:
+    if good.sum() < LEAST_SAMPLES:
         return None
-    else:
+    if motor is None:
         part = running_part(x - np.median(x[good]), good, rate, band, mains.frequency_hz)
-    if part is None:
-        return _fit_running(x, rate, band, mains, full_scale, phase, span)
-    start = part[0] / rate
-    within = None if span is None else (span[0] - start, span[1] - start)
-    fit = _fit_running(x[slice(*part)], rate, band, mains, full_scale, phase and phase.later(start), within)
-    if fit is None or fit.phase is None:
-        return fit
-    return replace(fit, start_s=fit.start_s + start, end_s=fit.end_s + start, phase=phase or fit.phase.later(-start))
-
-
-@dataclass(frozen=True)
-class _Solution:
-    """One least-squares solution of a record."""
-
-    phase: Phase
-    span: tuple[float, float]
-    frequency: float
-    value: complex
-    residual: Floats
-    mains: Floats
-    line: Floats
-    good: Bools
-    widening: float
-    """How much wider the line's amplitude is than if all columns were orthogonal and no sample excluded."""
-    beyond_noise: bool
-    """Whether an excluded sample exceeds noise."""
-
-
-def _fit_running(
-    x: Floats,
-    rate: float,
-    band: tuple[float, float],
-    mains: Mains,
-    full_scale: float | None,
-    phase: Phase | None,
-    span: tuple[float, float] | None,
-) -> LineFit | None:
-    """Return the line of samples that have it for most of their length; see `fit_line`."""
-    good = np.isfinite(x)
-    x = np.where(good, x, 0.0)
+    elif motor.end_s - motor.start_s <= MOST_RUNNING * len(x) / rate:
+        part = slice(int(motor.start_s * rate), int(np.ceil(motor.end_s * rate)) + 1)
+    else:
+        part = None
+    part = part or slice(None)
+    x, good, time = x[part], good[part], (np.arange(len(x)) / rate)[part]
     if good.sum() < LEAST_SAMPLES or not np.ptp(x[good]) > 0:
         return None
     middle = float(np.median(x[good]))
@@ -106,18 +68,21 @@ def _fit_running(
     clipped = clip_level(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
     deviation = 1.4826 * np.median(np.abs(x[good]))
     known = good & (np.abs(x) < 6 * deviation) if deviation > 0 else good
-    time = np.arange(len(x)) / rate
 
-    def solved(phase: Phase, span: tuple[float, float]) -> _Solution | None:
-        """Fit a line of given phase over a span, without the samples of a far residual; None if too few are left."""
+    def solved(phase: Phase, span: tuple[float, float]) -> tuple[LineFit, Floats, Bools] | None:
+        """Fit a line of given phase over a span, without the samples of a far residual; None if too few are left.
+
+        Return with it the samples without mains, outliers replaced by the fit, and which of them may be used.
+        """
         inside = _within(time, span)
-        here, part = time[inside], x[inside]
-        frequencies = _frequencies(phase, span)
-        frequency = float(frequencies.mean())
-        orders = mains_orders(mains.frequency_hz, rate, (frequency,), span[1] - span[0], float(np.ptp(frequencies)))
-        line = line_columns(phase.at(here), frequency, rate)
+        here, part, length = time[inside], x[inside], span[1] - span[0]
+        edges = np.linspace(*span, max(round(length / 0.5), 2) + 1)
+        frequencies = np.diff(phase(edges)) / np.diff(edges) / (2 * np.pi)
+        frequency, spread = float(frequencies.mean()), float(np.ptp(frequencies))
+        orders = mains_orders(mains.frequency_hz, rate, (frequency,), length, spread)
+        line = line_columns(phase(here), frequency, rate)
         columns = np.concatenate([line, mains_columns(here, mains.frequency_hz, orders), trend_columns(here)])
-        use = known[inside].copy()
+        use = known[inside]
         if use.sum() < LEAST_SAMPLES:
             return None
         for _ in range(ROUNDS):
@@ -131,98 +96,91 @@ def _fit_running(
             if fresh.sum() < 0.3 * len(part) or np.array_equal(fresh, use):
                 break
             use = fresh
-        deviation = 1.4826 * float(np.median(np.abs(residual[use])))
-        left_out = np.abs(residual[good[inside]])
-        hum, shape, left, kept = np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x)), known.copy()
-        count = len(line)
-        hum[inside] = found[count:-2] @ columns[count:-2]
-        shape[inside] = found[:count] @ line + found[-2:] @ columns[-2:]
+        usual = 1.4826 * float(np.median(np.abs(residual[use])))
+        beyond_noise = usual > 0 and np.any(np.abs(residual[good[inside]]) > DROP_OUT * usual)
+        clean, usable, kept, count = x.copy(), known.copy(), known.copy(), len(line)
+        shape = found[:count] @ line + found[-2:] @ columns[-2:]
+        clean[inside] = np.where(use, part - found[count:-2] @ columns[count:-2], shape)
+        usable[inside] |= ~use
         kept[inside] = use
-        left[inside] = np.where(use, residual, 0.0)
-        towards = found[:2] / max(float(np.hypot(*found[:2])), 1e-300)
-        widening = np.sqrt(max(float(towards @ covariance[:2, :2] @ towards) * use.sum() / 2, 1.0))
-        far_off = deviation > 0 and np.any(left_out > DROP_OUT * deviation)
+        masked = float(np.mean(~kept[good]))
+
         value = complex(found[0], -found[1])
-        return _Solution(phase, span, frequency, value, left, hum, shape, kept, float(widening), bool(far_off))
+        amplitude = max(abs(value), 1e-300)
+        towards = found[:2] / amplitude
+        widening = np.sqrt(max(float(towards @ covariance[:2, :2] @ towards) * use.sum() / 2, 1.0))
+        turned = np.where(use, residual, 0.0) * np.exp(-1j * phase(here))
+        noise = float(widening * noise_beside(turned, use, rate))
+        blocks = np.real(block_means(value, turned, use, rate) * np.conj(value)) / amplitude
+        wander, scatter = of_mean(blocks, noise**2 * len(blocks))
+        deviation = float(np.sqrt(np.mean(residual[use] ** 2)))
+        beside, size = line_beside(
+            turned, rate, max(LEAST_LINE * amplitude, OVER_NOISE * deviation * np.sqrt(2 / use.sum()))
+        )
+        order = round(frequency / mains.frequency_hz)
+        order = 0 if order in orders else order
+        # Mains that the record can't tell from the line have any phase: their part is that of a motor-off record.
+        share = (mains.amplitude(order) or 0.0) / np.sqrt(2) if order else 0.0
+        fit = LineFit(
+            amplitude=abs(value),
+            u=float(np.sqrt(noise**2 + wander**2 + share**2)),
+            u_noise=noise,
+            u_mains=float(share),
+            value=value,
+            frequency_hz=frequency,
+            drift=spread / frequency,
+            snr=abs(value) / deviation if deviation > 0 else float("inf"),
+            scatter=max(scatter, np.sqrt(2) * size) / abs(value) if value else float("inf"),
+            start_s=span[0],
+            end_s=span[1],
+            masked=masked,
+            dropped=masked if beyond_noise else 0.0,
+            missing=float(np.mean(~good)),
+            clipped=clipped,
+            mains_hz=order * mains.frequency_hz,
+            second_hz=frequency + beside if beside else 0.0,
+            phase=phase,
+        )
+        return fit, clean, usable
 
-    if phase is not None and span is not None:
-        found = solved(phase, span)
-    else:  # demodulate and fit; then again without the mains and the drop-outs of the first fit
-        found, clean, use = None, x, known
-        frequency = coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
-        for _ in range(2 if frequency > 0 else 0):
-            at, line = envelope(clean, use, rate, frequency)
-            if len(at) < 4:
-                return None
-            span = steady_span(at, line, len(x) / rate)
-            inside = (at >= span[0]) & (at <= span[1])
-            best = _best_phase(clean, time, rate, use, span, phases(at[inside], line[inside], frequency))
-            fresh = best and solved(best, span)
-            if fresh is None:
-                break
-            found, frequency = fresh, fresh.frequency
-            left_out = (time >= span[0]) & (time <= span[1]) & ~found.good
-            clean, use = np.where(left_out, found.line, x - found.mains), use | left_out
-    if found is None:
-        return None
-    fit = _summary(found, time, rate, mains)
-    masked, dropped = float(np.mean(~found.good[good])), found.beyond_noise
-    fit = replace(
-        fit, masked=masked, dropped=masked if dropped else 0.0, missing=float(np.mean(~good)), clipped=clipped
-    )
-    use = (time >= found.span[0]) & (time <= found.span[1]) & found.good
-    return _with_lines(x - found.mains, found.residual, time, use, fit, rate)
-
-
-def _summary(found: _Solution, time: Floats, rate: float, mains: Mains) -> LineFit:
-    """Return a solution's figures with their uncertainty.
-
-    Mains that the record can't tell from the line have any phase: their part in u is that of a motor-off record.
-    """
-    span = found.span
-    inside = (time >= span[0]) & (time <= span[1])
-    good = found.good[inside]
-    residual = found.residual[inside] * np.exp(-1j * found.phase.at(time[inside]))
-    noise = found.widening * noise_beside(residual, good, rate)
-    blocks = block_means(found.value, residual, good, rate)
-    amplitude = abs(found.value)
-    towards = np.real(blocks * np.conj(found.value)) / max(amplitude, 1e-300)
-    wander, scatter = of_mean(towards, noise**2 * len(towards))
-    frequency, spread = found.frequency, float(np.ptp(_frequencies(found.phase, span)))
-    order = round(frequency / mains.frequency_hz)
-    if order in mains_orders(mains.frequency_hz, rate, (frequency,), span[1] - span[0], spread):
-        order = 0
-    share = (mains.amplitude(order) or 0.0) / np.sqrt(2) if order else 0.0
-    deviation = float(np.sqrt(np.mean(found.residual[inside][good] ** 2)))
-    return LineFit(
-        amplitude=amplitude,
-        u=float(np.sqrt(noise**2 + wander**2 + share**2)),
-        u_noise=float(noise),
-        u_mains=float(share),
-        value=found.value,
-        frequency_hz=frequency,
-        drift=spread / frequency,
-        snr=amplitude / deviation if deviation > 0 else float("inf"),
-        scatter=scatter / amplitude if amplitude > 0 else float("inf"),
-        start_s=span[0],
-        end_s=span[1],
-        mains_hz=order * mains.frequency_hz,
-        phase=found.phase,
-    )
+    if motor is not None:
+        found = solved(motor.phase, (motor.start_s, motor.end_s))
+        return found and found[0]
+    # Demodulate and fit; then again without the mains and the drop-outs of the first fit.
+    fit, clean, usable = None, x, known
+    frequency = coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
+    for _ in range(2 if frequency > 0 else 0):
+        at, line = envelope(clean, usable, time, rate, frequency)
+        if len(at) < 4:
+            return None
+        span = steady_span(at, line, (float(time[0]), float(time[0] + len(x) / rate)))
+        steady = (at >= span[0]) & (at <= span[1])
+        phase = _best_phase(clean, time, rate, usable, span, phases(at[steady], line[steady], frequency))
+        found = solved(phase, span) if phase else None
+        if found is None:
+            break
+        fit, clean, usable = found
+        frequency = fit.frequency_hz
+    return fit
 
 
 def _best_phase(
-    x: Floats, time: Floats, rate: float, use: Bools, span: tuple[float, float], candidates: Iterator[Phase]
+    x: Floats,
+    time: Floats,
+    rate: float,
+    use: Bools,
+    span: tuple[float, float],
+    candidates: Iterator[tuple[Phase, int]],
 ) -> Phase | None:
     """Return the phase that explains the samples best for its number of parameters (Schwarz's criterion), if any."""
     inside = _within(time, span)
     here, part, weight = time[inside], x[inside], use[inside]
     best, least = None, np.inf
-    for candidate in candidates:
-        columns = np.concatenate([line_columns(candidate.at(here), 0.5 * rate, rate), trend_columns(here)])
+    for candidate, parameters in candidates:
+        columns = np.concatenate([line_columns(candidate(here), 0.5 * rate, rate), trend_columns(here)])
         left = part - solve(columns, part, weight)[0] @ columns
         squares = float(np.sum(weight * left**2)) / max(weight.sum(), 1)
-        score = weight.sum() * np.log(max(squares, 1e-300)) + candidate.parameters * np.log(max(weight.sum(), 2))
+        score = weight.sum() * np.log(max(squares, 1e-300)) + parameters * np.log(max(weight.sum(), 2))
         if score < least:
             best, least = candidate, score
     return best
@@ -231,12 +189,6 @@ def _best_phase(
 def _within(time: Floats, span: tuple[float, float]) -> slice:
     """Return the samples with a time in a span, ends included."""
     return slice(int(np.searchsorted(time, span[0])), int(np.searchsorted(time, span[1], side="right")))
-
-
-def _frequencies(phase: Phase, span: tuple[float, float]) -> Floats:
-    """Return the half-second means of a phase's frequency over a span, in Hz."""
-    edges = np.linspace(*span, max(round((span[1] - span[0]) / 0.5), 2) + 1)
-    return np.diff(phase.at(edges)) / np.diff(edges) / (2 * np.pi)
 
 
 # Least squares.
@@ -380,12 +332,10 @@ def _length(count: int) -> int:
     return 2 ** (int(count - 1).bit_length() + 1)
 
 
-def envelope(x: Floats, good: Bools, rate: float, frequency: float) -> tuple[Floats, Floats]:
+def envelope(x: Floats, good: Bools, time: Floats, rate: float, frequency: float) -> tuple[Floats, Floats]:
     """Return times in s and the line's complex amplitude there; samples that are not `good` count for nothing."""
-
     count = min(max(int(WINDOW_S * rate), 8), len(x) // 2)
     window = np.hanning(count + 2)[1:-1]
-    time = np.arange(len(x)) / rate
     turned = np.where(good, x, 0.0) * np.exp(-2j * np.pi * frequency * time)
     weight = oaconvolve(good.astype(float), window, mode="same")
     step = max(count // 8, 1)
@@ -396,22 +346,21 @@ def envelope(x: Floats, good: Bools, rate: float, frequency: float) -> tuple[Flo
     return centre, 2 * oaconvolve(turned, window, mode="same")[::step][full] / weight[::step][full]
 
 
-def steady_span(time: Floats, line: Floats, length_s: float) -> tuple[float, float]:
-    """Return the span in s in which the line has spun up: ends below STEADY of its median are cut."""
+def steady_span(time: Floats, line: Floats, whole: tuple[float, float]) -> tuple[float, float]:
+    """Return the span in s in which the line has spun up: ends of the whole below STEADY of its median are cut."""
     size = np.abs(line)
     enough = np.flatnonzero(size >= STEADY * np.median(size))
     first, last = int(enough[0]), int(enough[-1])
-    start = float(time[first] + WINDOW_S / 2) if first else 0.0
-    end = float(time[last] - WINDOW_S / 2) if last < len(time) - 1 else length_s
-    return (start, end) if end - start > 0.25 * length_s else (0.0, length_s)
+    start = float(time[first] + WINDOW_S / 2) if first else whole[0]
+    end = float(time[last] - WINDOW_S / 2) if last < len(time) - 1 else whole[1]
+    return (start, end) if end - start > 0.25 * (whole[1] - whole[0]) else whole
 
 
-def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
-    """Yield the line's phase, of rising flexibility: constant frequency, linear, cubic, splines.
+def phases(time: Floats, line: Floats, frequency: float) -> Iterator[tuple[Phase, int]]:
+    """Yield the line's phase and its number of parameters: constant frequency, linear, cubic, splines.
 
     Nothing if fewer than three points have a line. A spline has a point between any two of its knots.
     """
-
     there = np.abs(line) > NO_LINE * np.abs(line).max(initial=0.0)
     time, line = time[there], line[there]
     if len(time) < 3:
@@ -423,7 +372,7 @@ def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
     for degree in (1, 2, 4):
         if degree + 1 < len(time):
             fitted = np.polynomial.Polynomial.fit(time, angle, degree, w=weight, domain=[middle - half, middle + half])
-            yield Phase(lambda t, fitted=fitted: omega * t + fitted(t), degree + 1)
+            yield (lambda t, fitted=fitted: omega * t + fitted(t)), degree + 1
     for distance in KNOTS_S:
         pieces = round((time[-1] - time[0]) / distance)
         if pieces < 2 or pieces + 4 > len(time) / 2:
@@ -431,15 +380,14 @@ def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
         ends = np.linspace(time[0], time[-1], pieces + 1)
         if np.histogram(time, ends)[0].min() == 0:  # a gap: the spline is unknown there
             continue
-        inner = ends[1:-1]
-        knots = np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4])
+        knots = np.concatenate([[time[0]] * 3, ends, [time[-1]] * 3])
         spline = make_lsq_spline(time, angle, knots, 3, w=weight)
 
         def straight_beyond(t: Floats, spline: Callable[..., Floats] = spline) -> Floats:
             inside = np.clip(t, time[0], time[-1])
             return omega * t + spline(inside) + (t - inside) * np.where(t != inside, spline(inside, 1), 0.0)
 
-        yield Phase(straight_beyond, pieces + 3)
+        yield straight_beyond, pieces + 3
 
 
 # The part of a record in which a motor runs, for records with more silence than half, whose medians are of the silence.
@@ -449,22 +397,20 @@ MOST_RUNNING = 0.65
 ON = 0.5
 """Part of the envelope's largest value from which the motor runs."""
 SILENT = 0.2
-"""Part of it below which the envelope stays in the silence, once it has had FALL_S to fall; a beat falls slowly."""
+"""Part of it below which the envelope stays in the silence, once it has fallen; a beat falls slowly."""
 QUIET = 0.4
 """The same for the rest of the silence without mains: a line that has only changed its frequency is louder."""
 LOWEST_HZ = 20.0
-FALL_S = 0.75 * WINDOW_S
-"""How long the envelope of a line that ends takes to fall, with a margin."""
+FALL = 6
+"""Points of the envelope, 8 a window, over which that of a line that ends falls, with a margin."""
 LEAST_SILENT = 0.2
 """Part of a record that is silent at least."""
 LOUDEST, BEYOND_LOUDEST = 0.92, 1.5
 """Quantile of the samples' size, and how many times it a sample counts at most: drop-outs are no motion."""
 
 
-def running_part(
-    x: Floats, good: Bools, rate: float, band: tuple[float, float], mains_hz: float
-) -> tuple[int, int] | None:
-    """Return the first sample of the longest stretch in which the line of a record runs, and the one after its last.
+def running_part(x: Floats, good: Bools, rate: float, band: tuple[float, float], mains_hz: float) -> slice | None:
+    """Return the longest stretch of samples in which the line of a record runs.
 
     `x` has no offset; samples that are not `good` count for nothing. None if the line runs for most of the record,
     or the rest is not silent.
@@ -474,31 +420,30 @@ def running_part(
     frequency = coarse_frequency(x, rate, band, mains_hz)
     if not frequency > 0:
         return None
-    time, line = envelope(x, good, rate, frequency)
+    time, line = envelope(x, good, np.arange(len(x)) / rate, rate, frequency)
     if len(time) < 4:
         return None
     size = np.abs(line)
     on = size >= ON * size.max()
     if on.mean() > MOST_RUNNING:
         return None
-    near = np.zeros(len(on), bool)
-    for first, last in _runs(on):
-        near |= (time >= time[first] - FALL_S) & (time <= time[last] + FALL_S)
-    if (~near).mean() < LEAST_SILENT or size[~near].max() > SILENT * size.max():
+    quiet = np.logical_not(binary_dilation(on, iterations=FALL))
+    if quiet.mean() < LEAST_SILENT or size[quiet].max() > SILENT * size.max():
         return None
-    first, last = max(_runs(~near), key=lambda run: run[1] - run[0])
+    first, last = _longest(quiet)
     silence = x[int(time[first] * rate) : int(time[last] * rate) + 1]
     if _loudest(silence, rate, band, mains_hz) > QUIET * size.max():
         return None
-    first, last = max(_runs(on), key=lambda run: run[1] - run[0])
+    first, last = _longest(on)
     start = 0 if first == 0 else int(time[first] * rate)
-    return start, len(x) if last == len(on) - 1 else int(time[last] * rate) + 1
+    return slice(start, None if last == len(on) - 1 else int(time[last] * rate) + 1)
 
 
-def _runs(on: Bools) -> list[tuple[int, int]]:
-    """Return the first and the last index of each run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
-    return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
+def _longest(on: Bools) -> tuple[int, int]:
+    """Return the first and the last index of the longest run of true values."""
+    runs = np.flatnonzero(np.diff(on.astype(int), prepend=0, append=0)).reshape(-1, 2)
+    first, end = runs[np.argmax(runs[:, 1] - runs[:, 0])]
+    return int(first), int(end) - 1
 
 
 def _loudest(x: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> float:
@@ -506,8 +451,6 @@ def _loudest(x: Floats, rate: float, band: tuple[float, float], mains_hz: float)
 
     The mains and frequencies below LOWEST_HZ are excluded.
     """
-    if len(x) < 16:
-        return 0.0
     window = np.hanning(len(x) + 2)[1:-1]
     turned = np.abs(np.fft.rfft((x - x.mean()) * window))
     hertz = np.fft.rfftfreq(len(x), 1 / rate)
@@ -574,99 +517,30 @@ def block_means(value: complex, residual: Floats, good: Bools, rate: float) -> F
     return value + 2 * np.add.reduceat(residual, edges) / np.maximum(np.add.reduceat(good.astype(float), edges), 1)
 
 
-# Other lines next to the strongest: another motor that runs.
+# A second line next to the strongest: another motor that runs.
 
 BESIDE_HZ = 15.0
-"""Distance from the strongest line, to either side, within which others are searched."""
+"""Distance from the strongest line, to either side, within which a second one is searched."""
 LEAST_LINE = 0.05
 """Part of the strongest line's amplitude from which another one counts."""
 OVER_NOISE = 8
 """Standard deviations of noise from which a peak of the spectrum counts as a line."""
-MOST_LINES = 6
-MOST_LEFT = 0.5
-"""Largest fraction of the residual power of a single line, beyond noise, that several steady lines may leave."""
-STEPS = 12
-SAME_PLACE, SAME_SIZE, SAME_PHASE = 0.4, 0.25, 0.4
-"""How far lines to either side may be from a modulation's: periods of a record, logarithm of a ratio, rad."""
+MOST_MIRRORED = 0.25
+"""Part of a second line's size that the spectrum has as far on the other side of the first; of a modulation all."""
 
 
-def _with_lines(x: Floats, residual: Floats, time: Floats, use: Bools, fit: LineFit, rate: float) -> LineFit:
-    """Return the fit with the steady lines of samples x without mains, if a single line explains them less well.
+def line_beside(residual: Floats, rate: float, least: float) -> tuple[float, float]:
+    """Return the distance of a second line from the first in Hz, 0 without one, and the size of a modulation or 0.
 
-    `residual` is the rest that the single line leaves. Lines at equal distances to either side may be one line of
-    varying amplitude, whose standard deviation over the mean is then the fit's scatter.
+    `residual` is that of the fit, turned back by the line's phase; `least` the least size that counts. A second line is
+    on one side of the first, a modulation of the amplitude on both. A beat slower than about 2 Hz looks like a
+    modulation: the line's phase follows it.
     """
-    if not fit.snr > 0:
-        return fit
-    first, last = np.flatnonzero(use)[[0, -1]]
-    inside = slice(first, last + 1)
-    weight, time = use[inside].astype(float), time[inside]
-    x, length = x[inside] * weight, time[-1] - time[0]
-    noise = fit.amplitude / fit.snr if np.isfinite(fit.snr) else 0.0
-    least = max(LEAST_LINE * fit.amplitude, OVER_NOISE * noise * np.sqrt(2 / max(weight.sum(), 1)))
-    frequency, single = spectrum(residual[inside] * weight, rate)
-    beside = np.abs(frequency - fit.frequency_hz) < BESIDE_HZ
-    if not np.any(single[beside] > least):
-        return fit
-    hertz, values, left = np.empty(0), np.empty(0, complex), x
-    for _ in range(MOST_LINES):
-        size = np.where(beside, spectrum(left * weight, rate)[1], 0.0)
-        peak = int(np.argmax(size))
-        if size[peak] < least or np.any(np.abs(frequency[peak] - hertz) < 0.5 / length):
-            break
-        hertz, values, left = _refined(x, time, weight, np.append(hertz, frequency[peak]))
-    powers = [sizes[beside] ** 2 for sizes in (single, spectrum(left * weight, rate)[1])]
-    floor = len(powers[1]) * float(np.median(powers[1])) / np.log(2)  # white noise, whose power is exponential
-    order = np.argsort(-np.abs(values))
-    strong = order[np.abs(values[order]) > LEAST_LINE * np.abs(values).max(initial=0.0)]
-    if len(strong) < 2 or powers[1].sum() - floor > MOST_LEFT * (powers[0].sum() - floor):
-        return fit
-    hertz, values = hertz[strong], values[strong]
-    if (swing := _modulation(hertz, values, length)) > 0:
-        deviation = float(np.sqrt(np.mean(left[weight > 0] ** 2)))
-        snr = fit.amplitude / deviation if deviation > 0 else float("inf")
-        return replace(fit, scatter=max(fit.scatter, swing), snr=snr)
-    lines = (Line(float(f), float(abs(value))) for f, value in zip(hertz, values, strict=True))
-    return replace(fit, lines=tuple(lines))
-
-
-def _modulation(hertz: Floats, values: Floats, length_s: float) -> float:
-    """Return the standard deviation of an amplitude whose modulation the lines are, over its mean; 0 if they aren't.
-
-    `hertz` and `values` have the strongest line first. The others are then pairs of equal strength as far below it as
-    above, in phase with each other about its phase: of lines that have nothing to do with each other few are.
-    """
-    rest = list(range(1, len(values)))
-    power = 0.0
-    while rest:
-        i = rest.pop(0)
-        off = [abs(hertz[k] + hertz[i] - 2 * hertz[0]) for k in rest]
-        if not rest or min(off) > SAME_PLACE / length_s:
-            return 0.0
-        one, other = values[i], values[rest.pop(int(np.argmin(off)))]
-        if abs(np.log(abs(one / other))) > SAME_SIZE or abs(np.angle(one * other / values[0] ** 2)) > SAME_PHASE:
-            return 0.0
-        power += (abs(one) + abs(other)) ** 2 / 2
-    return float(np.sqrt(power) / abs(values[0]))
-
-
-def _refined(x: Floats, time: Floats, weight: Floats, hertz: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return frequencies (k), complex amplitudes at the middle and the residual, after Gauss-Newton steps over all."""
-    omega, time = 2 * np.pi * hertz, time - time.mean()
-    length = max(np.ptp(time), 1e-9)
-    for step in range(STEPS + 1):
-        turns = np.exp(1j * omega[:, None] * time)
-        base = np.concatenate([_waves(turns), trend_columns(time)])
-        found = solve(base, x, weight)[0]
-        values = found[: 2 * len(omega) : 2] - 1j * found[1 : 2 * len(omega) : 2]
-        left = x - found @ base
-        if step == STEPS:
-            break
-        # d/d omega of a cos + b sin is t (-a sin + b cos)
-        slopes = time * np.real(1j * values[:, None] * turns)
-        change = solve(np.concatenate([base, slopes]), x, weight)[0][-len(omega) :]
-        change = np.clip(change, -np.pi / length, np.pi / length)
-        omega = omega + change
-        if np.all(np.abs(change) * length < 1e-6):
-            break
-    return omega / (2 * np.pi), values, left
+    window, count = np.hanning(len(residual)), _length(len(residual))
+    size = 2 * np.abs(np.fft.fft(residual * window, count)) / max(window.sum(), 1e-300)
+    distance = np.fft.fftfreq(count, 1 / rate)
+    peak = int(np.argmax(np.where(np.abs(distance) < BESIDE_HZ, size, 0.0)))
+    if size[peak] < least:
+        return 0.0, 0.0
+    second = size[-peak] < MOST_MIRRORED * size[peak]
+    return (float(distance[peak]), 0.0) if second else (0.0, float(size[peak]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,6 @@ def read(path: Path, layout: Layout) -> list[Channel]:
     """Return the time records of a universal file as channels. Raises Unreadable for a file without any."""
     import pyuff
 
-    _expect_binary_whole(path)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         file = pyuff.UFF(str(path))
@@ -36,22 +34,6 @@ def read(path: Path, layout: Layout) -> list[Channel]:
         listed = ", ".join(map(str, kinds)) or "none"
         raise Unreadable(str(path), None, f"has no time record (its data sets: {listed})")
     return [_record(path, one) for one in records]
-
-
-def _expect_binary_whole(path: Path) -> None:
-    """Raise Unreadable if a binary data set does not end as many bytes behind its header as that states."""
-    content = path.read_bytes()
-    for head in _BINARY.finditer(content):
-        at = head.end()
-        for _ in range(int(head[1])):
-            at = content.find(b"\n", at) + 1 or len(content)
-        end = content[at + int(head[2]) :]
-        if not re.match(rb"\s{0,2}    -1\s", end[:16]):
-            raise Unreadable(str(path), None, f"lacks some of the {int(head[2])} bytes that a data set states")
-
-
-_BINARY = re.compile(rb"^ {4}58b[ \d]{12}([ \d]{12})([ \d]{12})[^\n]*\n", re.MULTILINE)
-"""The first line of a data set 58b: the lines of its header and the bytes of its data."""
 
 
 def _record(path: Path, one: dict[str, Any]) -> Channel:
