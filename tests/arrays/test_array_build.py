@@ -117,6 +117,18 @@ def test_the_bench_page_speaks_of_the_sheet(folder):
     assert wanted <= set(content["pictures"])
 
 
+def test_a_blade_that_no_bed_takes_is_a_bar_of_metal():
+    array = load_array(
+        "hex-19", {"layout.rings": 3, "moulds.bed_x_mm": 100, "moulds.bed_y_mm": 100, "moulds.cavities": [1, 1]}
+    )
+    _, made = pockets_cast(array)
+    assert [(item.made, "bar of metal" in item.note) for item in made.bill if item.item == "blade"] == [
+        ("printed upside down", False),
+        ("tool", True),
+    ]
+    assert "upside down" not in made.printing.how[0]
+
+
 def test_the_sheet_of_injected_units_is_struck_off_without_a_syringe():
     unit, made = pockets_cast(load_array("forearm-pockets", ["moulds.pour=injected"]))
     syringes = [next(item.quantity for item in each.bill if item.item == "syringe") for each in (unit, made)]
@@ -188,6 +200,7 @@ def test_the_procedure_names_every_place_and_weighs_all_units(folder):
     assert bill["ecoflex-00-10 part A"] == pytest.approx(2 * inner)
     assert casting["earliest_finish_min"] > 2 * unit["earliest_finish_min"]
     text = (folder / "casting.md").read_text("utf-8")
+    assert "## Silicone stays tacky" in (folder / "troubleshooting.md").read_text("utf-8")
     assert f"- at {duration(casting['earliest_finish_min'])}: units in (" in text, "not when the sheet is out"
 
 

@@ -16,7 +16,7 @@ from unitcad.arrays.constructions.pockets import hold_strain
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch import PatchMoulds
 from unitcad.arrays.tails import covered_tails, longer_tails, where_they_end
-from unitcad.casting.bill import Item, bill, list_consumables, motor_name, mould_plates
+from unitcad.casting.bill import Item, bill, list_consumables, list_pieces, motor_name, mould_plates
 from unitcad.casting.figures import (
     LAY_IN_MIN,
     LIFT_MIN,
@@ -42,6 +42,7 @@ from unitcad.casting.pouring import shown as grams_shown
 from unitcad.casting.preparation import Printing, Size, cleaning, fall, joining, level, printing
 from unitcad.casting.procedure import Procedure, pour_of, procedure, times
 from unitcad.casting.steps import REQUIRED_TOOLS, BenchStep, Phase, duration, phases
+from unitcad.casting.troubles import troubles
 from unitcad.casting.views import picture_path, views
 from unitcad.catalogue import Material
 from unitcad.meshcheck.findings import counted
@@ -310,7 +311,7 @@ def pocket_bill(
     silicone, mix = batch.silicone, batch.mix
     net = f"sheet: {number(mix.net_g, 3)} g net"
     own = [
-        *_pieces(moulds),
+        *(replace(item, note=f"for the sheet: {item.note}") for item in list_pieces(moulds)),
         Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", net),
         Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", net),
         *_wires(moulds.arranged),
@@ -326,14 +327,6 @@ def kinds(array: Array, units: Mapping[str, Procedure]) -> list[tuple[Spec, str,
         (spec, folder, unit, held[i], math.ceil(held[i] / unit.cells))
         for i, (spec, (folder, unit)) in enumerate(zip(array.units, units.items(), strict=True))
     ]
-
-
-def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
-    lengths = moulds.spec.moulds
-    note = f"for the sheet: {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
-    for tool in moulds.plan.pieces:
-        attitude = "upside down" if tool.upside_down else "as drawn"
-        yield Item(moulds.plan.called(tool.name), 1, "piece", f"printed {attitude}", note)
 
 
 def _wires(array: Array) -> Iterator[Item]:
@@ -459,6 +452,7 @@ def pocket_procedure(
         eccentricity=None,
         without_ribs=None,
         walls=(),
+        troubles=troubles(moulds),
         bill=pocket_bill(moulds, batch, [*prepared, *poured, *out, *together], units),
         makes="sheet",
         last="Units in",

@@ -44,9 +44,9 @@ ASSUMPTIONS = [
 
 
 def distances(array: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distances along the skin (mm, shape (n, n), rows the unit that drives): to the other unit's middle,
-    and to the point of its edge that is nearest.
+    """Return the distances to each other unit's middle, and to the nearest point of its edge, along the skin (mm).
 
+    Their shape is (n, n), rows the unit that drives.
     On a limb, x goes round it: distances are those along the unrolled skin, the shorter way round, and shorter than on
     the flat sheet.
     """
@@ -412,7 +412,7 @@ def ratios(every: Sequence[Crosstalk]) -> list[dict[str, Any]]:
 
 
 def _quantities(data: Crosstalk) -> dict[str, Any]:
-    """Return what is compared of an array's crosstalk: the nearest neighbour, None of a single unit, and the sums."""
+    """Return the quantities that are compared: the sums, and the nearest neighbour's, None for a single unit."""
     nearest = data["nearest"] or dict.fromkeys(("centre", "nearest_edge"))
     return {
         "nearest_centre": nearest["centre"],
@@ -532,8 +532,8 @@ def heat_map_svg(data: Crosstalk, target: str = "centre") -> str:
 def patch_map_svg(array: Array, data: Crosstalk, circuit: Profile | None = None) -> str:
     """Return the patch from outside as an SVG document: sheet, strap slots, units by name, the circuit if given.
 
-    Each unit is coloured by the amplitude that all others together give it, the root of the sum of squares, in per cent
-    of one unit's level at its edge.
+    Each unit is coloured by the root of the sum of squares of the amplitudes that all others give it. These are in per
+    cent of one unit's level at its edge.
     """
     x0, y0, x1, y1 = array.sheet.outline if circuit is None else tuple(
         pick(a, b) for pick, a, b in zip((min, min, max, max), array.sheet.outline, circuit.bounds, strict=True)

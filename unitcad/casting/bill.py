@@ -41,7 +41,7 @@ def bill(
 
     Silicone is every pour's mix, and the batches mixed `after` the pours.
     """
-    items = [*_pieces(moulds)]
+    items = [*list_pieces(moulds)]
     for material in dict.fromkeys([*(batch.silicone for batch in batches), *(more.silicone for more in after)]):
         own = [batch.mix for batch in batches if batch.silicone == material]
         ratio, later = float(material.mix_ratio), [more for more in after if more.silicone == material]
@@ -89,7 +89,8 @@ def to_csv(items: Iterable[Item]) -> str:
     return text.getvalue()
 
 
-def _pieces(moulds: MouldSet) -> Iterator[Item]:
+def list_pieces(moulds: MouldSet) -> Iterator[Item]:
+    """List the pieces of the tools, printed or cut."""
     lengths, plan = moulds.spec.moulds, moulds.plan
     dims, kinds = plan.dimensions, dict[str, list[Body]]()
     for tool in plan.pieces:
