@@ -64,7 +64,9 @@ def rows_of(table, design, materials):
 
 @pytest.fixture(scope="module")
 def found():
-    return candidates(_target(crosstalk_ratio_max=0.4, pitch_mm=20, vary={"layers": [1, 2], "step_mm": 0.5}))
+    target = {"edge_max": 0.06, "crosstalk_ratio_max": 0.4, "pitch_mm": 20}
+    motors = {"motors": ["LCM0720A3463F", "VC0820B006F"]}
+    return candidates(target_of({"target": target, "at_hand": motors, "vary": {"layers": [1, 2], "step_mm": 0.5}}))
 
 
 def test_each_candidate_is_what_its_spec_is_alone(found):
