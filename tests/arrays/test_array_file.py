@@ -93,6 +93,7 @@ REFUSED = [
     ({"place": [{"at": [4, 1]}]}, "place.0.at", [3, 1]),
     ({"place": [{"at": "B4"}]}, "place.0.at", None),
     ({"place": [{"at": "B2", "angle_deg": 0}]}, "place.0.angle_deg", 27),
+    ({"array": "back-sheet", "place": [{"at": "B2", "angle_deg": 0}]}, "place.0.angle_deg", None),
     ({"sheet": {"thickness_mm": 4}}, "sheet.thickness_mm", 2.41),
     ({"sheet": {"hold_mm": 5}}, "sheet.hold_mm", 1.4),
     ({"sheet": {"corner_mm": 30}}, "sheet.corner_mm", 10),

@@ -66,6 +66,7 @@ def test_a_ratio_with_a_single_unit_is_none():
         (("encapsulating", "--masses"), "--masses: is for arrays"),
         ((NINE, "--set", "layout.pitch_mm=14"), "nearest accepted"),
         ((NINE, "--frequency", "0"), "--frequency"),
+        (("sleeve-curved", "--masses"), "--masses: are worked out on flat skin"),
     ],
 )
 def test_what_an_array_has_not_is_refused(words, said):

@@ -274,6 +274,8 @@ def _masses(units: Decays) -> dict[str, Any]:
     By the model of `attenuation.receivers`: every unit loads the skin under it, those between two others too.
     """
     n = len(units.kind)
+    if units.array.radius_mm is not None:
+        raise Refusal("--masses", None, "are worked out on flat skin, and this array is round a limb (limb.radius_mm)")
     if n > MOST_LOADED:
         raise Refusal("--masses", n, f"are worked out for at most {MOST_LOADED} units at once")
     frequencies = {one.frequency.middle for one in units.inputs}
